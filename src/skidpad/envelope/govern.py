@@ -25,7 +25,8 @@ from skidpad.core.specs import (
 )
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.vocabulary import Supervision
-from skidpad.envelope.grip import COLD_C, STIFFNESS, Grip, GripEstimator
+from skidpad.envelope.belief import COLD_C
+from skidpad.envelope.grip import STIFFNESS, Grip, GripEstimator
 from skidpad.envelope.limits import (
     Binding,
     bends_speed,
@@ -35,6 +36,7 @@ from skidpad.envelope.limits import (
     sight_speed,
 )
 from skidpad.envelope.sight import Sight, Way, way_ahead
+from skidpad.envelope.signals import BusModel, CarBus
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.interface import Stack
 
@@ -67,6 +69,8 @@ class EnvelopeSettings:
         factor: on the estimated grip, for studies.
         table_kmh: speeds when dry, in rain, in the cold, in the place of the envelope: a rival.
         oracle: true grip, for studies only.
+        seed: of the errors of the car's signals.
+        bus: errors of the car's signals.
     """
 
     share: float = 0.7
@@ -78,6 +82,8 @@ class EnvelopeSettings:
     factor: float = 1.0
     table_kmh: tuple[float, float, float] | None = None
     oracle: GripAt | None = None
+    seed: int = 1
+    bus: BusModel = BusModel()
     dt: float = DT
 
     def __post_init__(self) -> None:
@@ -117,6 +123,7 @@ class Envelope:
         radar = next((spec for spec in specs if isinstance(spec, RadarSpec)), None)
         self.sight = Sight(radar, settings.dt)
         self.grip = GripEstimator(settings.dt, stiffness=settings.stiffness)
+        self.bus = CarBus(settings.seed, settings.bus, self.grip.car.steer_max)
 
     def reset(self) -> None:
         """Forgets what was seen and felt at another place."""
@@ -129,7 +136,9 @@ class Envelope:
         stage, air_c = int(frame.extra[RAIN_ID]), float(frame.extra[AIR_ID])
         way = way_ahead(self.map, ego.pose)
         grade = 0.0 if way is None else way.grade
-        grip = self.grip.update(ego, applied, stage, air_c, grade)
+        drive = self.grip.car.drive_at(applied.throttle, v)
+        signals = self.bus.read(ego, applied, drive, grade)
+        grip = self.grip.update(signals, stage, air_c, grade)
         if set_to.oracle is not None:
             true = set_to.oracle(v)
             grip = Grip(true, true, 1.0, grip.prior)

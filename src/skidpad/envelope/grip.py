@@ -1,44 +1,43 @@
-"""Grip from the car's own signals: what it asked for, what it got, and how far its wheels slipped.
+"""Grip from the car's own signals: what its wheels slip, what it gets, and what it asked for.
 
-Three sources, of falling trust: a car that gets less than it asks for is at its limit; one that
-gets something has at least that much; slip against force tells of a limit not yet reached. The last
-inverts the brush tyre, whose force bends away from its initial slope as the limit comes near
-(Pacejka, Tire and Vehicle Dynamics, chapter 3; slip slopes as a sign of grip: Gustafsson, Automatica
-33, 1997; Rajamani et al., IEEE Control Systems 30, 2010; braking: Mueller, Uchanski and Hedrick, Journal
-of Dynamic Systems 125, 2003, doi 10.1115/1.1636773). Knowledge fades with the distance driven.
+Three kinds of evidence go into one belief: slip against force, driving (against the wheels that are not
+driven) and braking (against a speed that the inertial unit carries on: Mueller, Uchanski and Hedrick,
+Journal of Dynamic Systems 125, 2003, doi 10.1115/1.1636773); what a car got, which its road has; and
+a car that gets much less than its pedals or its steering ask for, which is at its limit.
 """
 
 from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from math import exp, sqrt
+from math import cos, exp, sqrt
 
 from skidpad.core.constants import G
-from skidpad.core.states import EgoEstimate, VehicleCommand
+from skidpad.envelope.belief import CAUTION, COLD_C, GripBelief, prior_of, quantile
+from skidpad.envelope.signals import BRAKE_BAR, CarSignals
 
 STIFFNESS = 22.0  # force over load per unit slip of the design's tyre; that of the simulator's, so
 # results with it are a best case
-GRIPS = (0.05, 1.0)  # least and highest grip that is believed
-WINDOW = 6  # ticks over which signals are averaged
-SETTLED = 6  # ticks for which a shortfall must last: pedals and gears take up to 0.3 s
-SHORT, SHORT_LEAST = 0.8, 0.4  # share of the wanted acceleration, and m/s^2, that are missing
-ASK_LEAST = 0.6  # m/s^2 that a car asks for at least
+WINDOW = 6  # ticks of one reading
 V_LEAST = 2.0  # m/s, below which slip and engine tell nothing
-BRAKE_USE, DRIVE_USE = 0.97, 0.93  # of the grip that anti-lock and traction control take
+SHORT, SHORT_LEAST, ASK_LEAST = (
+    0.75,
+    0.4,
+    0.6,
+)  # share, m/s^2 that are missing, m/s^2 asked at least
+SLIP_LEAST = 0.004  # of wheels at their limit, beyond its error
+USED_AT_LIMIT, LIMIT_SPREAD = 0.93, 0.12  # of the grip that controls take; relative error of that
 LIMIT_LEAST = 0.04  # of the load; a car that gets less has an engine that drags or rolls
-FORCE_LEAST = 0.06  # of the load, less tells nothing about the curve's shape
-SLIPPING = 1.6  # times the slip that the force would need far from the limit
-AY_MOST, STEADY = 0.5, 0.3  # m/s^2 across, and share by which pedals move, in a usable window
-SIGMA_LEAST, SIGMA_SURE = 0.35, 0.75  # shares of full sliding: less tells nothing, more is sure
-TURN_SHORT, TURN_ASK, V_CHARACTERISTIC = 0.6, 1.0, 25.0  # share, m/s^2, m/s of the single-track car
-FADE_LOW, FADE_HIGH = 3000.0, 400.0  # m over which low and high grip are believed; our assumption
+STEADY = 0.3  # share by which pedals move in a usable window
+AY_MOST = 0.5  # m/s^2 across in a window whose slip is used
+TURN_SHORT, TURN_ASK, V_CHARACTERISTIC = 0.6, 1.5, 25.0  # share, m/s^2, m/s of the single-track car
+TURN_SPREAD = 0.2
+WHEEL_SIGMA, RATIO_FIRST, RATIO_ERROR = 0.012, 0.007, 0.0008  # m/s of an axle; of front over rear
+FORCE_SIGMA, FORCE_SHARE = 0.012, 0.06  # of the load: offset of the unit; loads, torque, shape
+FOLLOW, LEARN = 0.2, 0.02  # 1 and 1/s, of the observer of speed and offset
+OFFSET_FIRST, OFFSET_LEFT, OFFSET_TIME = 0.2, 0.03, 10.0  # m/s^2 at first, in the end, s
+BRAKING_MOST = 3.0  # s over which the inertial unit carries the speed on
 RISE = 3.0  # m/s above the speed of its evidence, to which a grip on wet roads holds
-COLD_C = 3.0  # deg C that a thermometer with 2 K of error says where the road may be frozen
-COLD_PRIOR = 0.25  # packed snow: between ice and the tests that docs/physics.md lists
-# By stage of the rain sensor: dry, wet (0.2 mm), in between, 1 mm at 90 km/h; friction table of the
-# Bosch Automotive Handbook, as in docs/physics.md
-RAIN_PRIORS = (0.8, 0.6, 0.45, 0.3)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,38 +51,56 @@ class Car:
     front_share: float = 0.61  # of the weight, at rest
     height_ratio: float = 0.22  # of the centre of gravity over the wheelbase
     drag: float = 3.4e-4  # 1/m, of air: a = drag v^2
+    rolling: float = 0.011  # of the load
     steer_max: float = 1.22  # rad
+
+    def drive_at(self, throttle: float, v: float) -> float:
+        """Returns the m/s^2 that the throttle asks for."""
+        return throttle * min(self.a_drive, self.power_per_mass / max(v, V_LEAST))
 
 
 @dataclass(frozen=True, slots=True)
 class Grip:
-    """An estimate: `value` mixes what was shown with the prior; confidence 0 means no information."""
+    """An estimate: `value` is a careful one; confidence 0 means no information, then shown is None."""
 
     value: float
-    shown: float | None
+    shown: float | None  # middle of the belief
     confidence: float
     prior: float
 
 
-def prior_grip(stage: int, air_c: float) -> float:
-    """Returns the grip that rain sensor and thermometer let a careful driver expect."""
-    if air_c < COLD_C:
-        return min(COLD_PRIOR, RAIN_PRIORS[stage])
-    return RAIN_PRIORS[stage]
+@dataclass(slots=True)
+class SpeedObserver:
+    """Speed over ground from free wheels, carried on by the inertial unit while they brake."""
 
+    v: float = 0.0
+    offset: float = 0.0  # m/s^2 of the unit
+    learned: float = 0.0  # s over which the offset was learned
+    braking: float = 0.0  # s since the pedal was pressed
 
-def brush_grip(force: float, slip: float, stiffness: float = STIFFNESS) -> tuple[float, float]:
-    """Returns the grip of a brush tyre with this force over load and slip, and the share of sliding.
+    def update(self, signals: CarSignals, grade: float, dt: float) -> None:
+        """Takes one message; grade: of the map, uphill is > 0."""
+        rear = 0.5 * (signals.wheels[2] + signals.wheels[3])
+        if rear < V_LEAST and self.braking == 0.0:
+            self.v = rear
+            return
+        self.v = max(self.v + (signals.ax - self.offset - G * grade) * dt, 0.0)
+        if signals.brake > 0.0 and self.braking < BRAKING_MOST:
+            self.braking += dt
+            return
+        error = rear - self.v
+        if signals.brake > 0.0 or self.braking > 0.0:  # brakes are held for long, or just released
+            self.v = rear
+            self.braking = self.braking if signals.brake > 0.0 else 0.0
+            return
+        self.v += FOLLOW * error
+        self.offset -= LEARN * error * (5.0 if self.learned < OFFSET_TIME else 1.0)
+        self.learned += dt
 
-    force / (C slip) = 1 - sigma + sigma^2 / 3 with sigma = C slip / (3 mu), solved for mu.
-    """
-    wanted = stiffness * slip
-    secant = min(force / wanted, 1.0)
-    root = 1.0 - 4.0 * (1.0 - secant) / 3.0
-    sigma = 1.0 if root <= 1.0 / 9.0 else 1.5 * (1.0 - sqrt(root))
-    if sigma >= 1.0:
-        return force, 1.0
-    return (wanted / (3.0 * sigma) if sigma > 1e-6 else GRIPS[1]), sigma
+    @property
+    def sigma_offset(self) -> float:
+        """m/s^2 that the offset may be wrong by."""
+        return OFFSET_LEFT + OFFSET_FIRST * exp(-self.learned / (0.4 * OFFSET_TIME))
 
 
 class GripEstimator:
@@ -91,42 +108,34 @@ class GripEstimator:
 
     def __init__(self, dt: float, car: Car | None = None, stiffness: float = STIFFNESS) -> None:
         self.dt, self.car, self.stiffness = dt, car or Car(), stiffness
-        self.shown: float | None = None
-        self.confidence, self.v_shown, self.prior = 0.0, 0.0, RAIN_PRIORS[0]
+        self.belief = GripBelief()
+        self.ratio, self.ratio_variance = 0.0, RATIO_FIRST**2  # front over rear wheels, less 1
+        self.v_shown = 0.0
         self.reset()
 
     def reset(self) -> None:
         """Forgets the signals of another place; what was learned stays."""
         self.rows: deque[tuple[float, ...]] = deque(maxlen=WINDOW)
-        self.short_ticks = self.turn_ticks = 0
+        known = getattr(self, "speed", None) or SpeedObserver()
+        self.speed = SpeedObserver(offset=known.offset, learned=known.learned)
 
-    def update(
-        self,
-        ego: EgoEstimate,
-        command: VehicleCommand,
-        stage: int,
-        air_c: float,
-        grade: float = 0.0,
-    ) -> Grip:
-        """Returns the estimate after a tick; command: the one applied before it; grade: uphill is > 0."""
-        v = max(ego.speed, 0.0)
-        self.prior = prior_grip(stage, air_c)
-        self._fade(v * self.dt)
-        front = 0.5 * (ego.wheel_speeds[0] + ego.wheel_speeds[1])
-        rear = 0.5 * (ego.wheel_speeds[2] + ego.wheel_speeds[3])
-        asked = self._wanted_acceleration(v, command)
+    def update(self, signals: CarSignals, stage: int, air_c: float, grade: float = 0.0) -> Grip:
+        """Returns the estimate after a tick; grade: of the map, uphill is > 0."""
+        self.speed.update(signals, grade, self.dt)
+        v = self.speed.v
+        self.belief.forget(v * self.dt, prior_of(stage, air_c < COLD_C))
+        front = 0.5 * (signals.wheels[0] + signals.wheels[1]) * cos(signals.steer)
+        rear = 0.5 * (signals.wheels[2] + signals.wheels[3])
+        asked = signals.drive - signals.brake / BRAKE_BAR * self.car.a_brake
         self.rows.append(
-            (v, ego.ax + G * grade, ego.ay, front, rear, asked, command.steer, ego.yaw_rate)
-        )
-        if len(self.rows) == WINDOW and v > V_LEAST:
-            self._judge(*(sum(column) / WINDOW for column in zip(*self.rows, strict=True)))
+            (v, signals.ax - self.speed.offset, signals.ay, front, rear, asked, signals.steer,
+             signals.yaw_rate)
+        )  # fmt: skip
+        if len(self.rows) == WINDOW:
+            if v > V_LEAST:
+                self._judge(*(sum(column) / WINDOW for column in zip(*self.rows, strict=True)))
+            self.rows.clear()
         return self._estimate(v, stage)
-
-    def _wanted_acceleration(self, v: float, command: VehicleCommand) -> float:
-        """m/s^2 that the pedals ask for."""
-        if command.brake > 0.0:
-            return -command.brake * self.car.a_brake
-        return command.throttle * min(self.car.a_drive, self.car.power_per_mass / max(v, V_LEAST))
 
     def _judge(
         self, v: float, ax: float, ay: float, front: float, rear: float, asked: float,
@@ -134,66 +143,74 @@ class GripEstimator:
     ) -> None:  # fmt: skip
         force = ax + self.car.drag * v * v  # what the tyres give, over the mass
         use = sqrt(force * force + ay * ay) / G
-        load = self.car.front_share - self.car.height_ratio * ax / G  # of the driven axle
-        drives = asked > 0.0
-        along = force / (G * load) if drives else -force / G
-        slip = ((front - v) if drives else v - 0.5 * (front + rear)) / v
-        self._limit_along(v, force, asked, along, drives, slip)
-        self._limit_across(v, ay, steer, yaw_rate)
-        if along > FORCE_LEAST and slip > 1e-4 and abs(ay) < AY_MOST and self._is_steady():
-            grip, sigma = brush_grip(along, slip, self.stiffness)
-            sure = min(max((sigma - SIGMA_LEAST) / (SIGMA_SURE - SIGMA_LEAST), 0.0), 1.0)
-            if sure > 0.0:
-                self._learn(max(grip, use), 0.3 * sure, v)
-        if use > (self.prior if self.shown is None else self.shown):  # at least what it got
-            self._learn(use, 1.0, v)
+        steady = self._is_steady()
+        if asked >= 0.0 and self.speed.braking == 0.0:
+            along, slip, sigma = self._drive_slip(v, ax, force, front, rear)
+            usable = abs(ay) < AY_MOST and (steady or asked < ASK_LEAST)
+        else:
+            along, slip, sigma = self._brake_slip(v, force, front, rear)
+            usable = abs(ay) < AY_MOST and steady and 0.0 < self.speed.braking < BRAKING_MOST
+        if usable and along > -0.05:
+            self.belief.see_slip(
+                along, slip, self.stiffness, sigma, FORCE_SIGMA + FORCE_SHARE * abs(along)
+            )
+        self._see_limit_along(asked, force, along, slip - 2.0 * sigma, steady)
+        self._see_limit_across(v, ay, steer, yaw_rate)
+        self.belief.see_least(use, 0.02 + 0.05 * use)
+        if self.belief.confidence > 0.3:
+            self.v_shown = v
+
+    def _drive_slip(
+        self, v: float, ax: float, force: float, front: float, rear: float
+    ) -> tuple[float, float, float]:
+        """Force over load and slip of the driven front wheels, and the slip's error."""
+        load = self.car.front_share - self.car.height_ratio * ax / G
+        along = (force / G + self.car.rolling * (1.0 - load)) / load
+        measured = front / max(rear, V_LEAST) - 1.0
+        noise = WHEEL_SIGMA / v
+        soft = self.belief.softness / self.stiffness
+        if abs(along) < 0.06 and v > 5.0:
+            error = RATIO_ERROR**2 + noise**2 + (0.3 * along * soft) ** 2
+            gain = self.ratio_variance / (self.ratio_variance + error)
+            self.ratio += gain * (measured - along * soft - self.ratio)
+            self.ratio_variance = max((1.0 - gain) * self.ratio_variance, 1e-8)
+        sigma = sqrt(self.ratio_variance + noise**2 + 1e-7)
+        return along, measured - self.ratio, sigma
+
+    def _brake_slip(
+        self, v: float, force: float, front: float, rear: float
+    ) -> tuple[float, float, float]:
+        """Force over load and slip of all wheels, and the slip's error."""
+        slip = (v - 0.5 * (front / (1.0 + self.ratio) + rear)) / v
+        drift = (self.speed.sigma_offset + 0.02 * abs(force)) * self.speed.braking
+        return -force / G, slip, sqrt((0.01 + drift) ** 2 / (v * v) + 0.25 * self.ratio_variance)
 
     def _is_steady(self) -> bool:
         """Tells whether pedals hold still in the window, or slip and force belong to two moments."""
         asked = [row[5] for row in self.rows]
-        steady = max(asked) - min(asked) < STEADY * max(map(abs, asked))
-        return steady and min(map(abs, asked)) > ASK_LEAST
+        most = max(map(abs, asked))
+        return most > ASK_LEAST and max(asked) - min(asked) < STEADY * most
 
-    def _limit_along(
-        self, v: float, force: float, asked: float, along: float, drives: bool, slip: float
+    def _see_limit_along(
+        self, asked: float, force: float, along: float, slip: float, steady: bool
     ) -> None:
-        """Learns where the car gets much less than its pedals ask for, with wheels that slip."""
-        got = force if drives else -force
-        missing = abs(asked) - got
-        short = abs(asked) > ASK_LEAST and got > 0.0 and got < SHORT * abs(asked)
-        # without slip the engine or the brakes give less, or are on their way
-        slipping = slip * self.stiffness > SLIPPING * along and self._is_steady()
-        is_limit = short and missing > SHORT_LEAST and slipping and along > LIMIT_LEAST
-        self.short_ticks = self.short_ticks + 1 if is_limit else 0
-        if self.short_ticks >= SETTLED:
-            self._learn(along / (DRIVE_USE if drives else BRAKE_USE), 0.5, v)
+        """Sees a car that gets much less than its pedals ask for, with wheels that slip for sure."""
+        got = force if asked > 0.0 else -force
+        short = 0.0 < got < SHORT * abs(asked) and abs(asked) - got > SHORT_LEAST
+        if steady and short and slip > SLIP_LEAST and along > LIMIT_LEAST:
+            self.belief.see_limit(along / USED_AT_LIMIT, LIMIT_SPREAD)
 
-    def _limit_across(self, v: float, ay: float, steer: float, yaw_rate: float) -> None:
-        """Learns where the car turns much less than its wheels are turned."""
-        angle = steer * self.car.steer_max
-        wanted = v * angle / (self.car.wheelbase * (1.0 + (v / V_CHARACTERISTIC) ** 2))
+    def _see_limit_across(self, v: float, ay: float, steer: float, yaw_rate: float) -> None:
+        """Sees a car that turns much less than its wheels are turned."""
+        wanted = v * steer / (self.car.wheelbase * (1.0 + (v / V_CHARACTERISTIC) ** 2))
         short = abs(wanted) * v > TURN_ASK and abs(yaw_rate) < TURN_SHORT * abs(wanted)
-        self.turn_ticks = self.turn_ticks + 1 if short and wanted * yaw_rate > 0.0 else 0
-        if self.turn_ticks >= 2 * SETTLED:
-            self._learn(abs(ay) / G, 0.3, v)
-
-    def _learn(self, grip: float, weight: float, v: float) -> None:
-        grip = min(max(grip, GRIPS[0]), GRIPS[1])
-        known = grip if self.shown is None or self.confidence < 0.1 else self.shown
-        self.shown = known + weight * (grip - known)
-        self.confidence = max(self.confidence, weight + (1.0 - weight) * self.confidence)
-        self.v_shown = v
-
-    def _fade(self, way: float) -> None:
-        if self.shown is not None:
-            length = FADE_LOW if self.shown < self.prior else FADE_HIGH
-            self.confidence *= exp(-way / length)
+        if short and wanted * yaw_rate > 0.0:
+            self.belief.see_limit(abs(ay) / G, TURN_SPREAD)
 
     def _estimate(self, v: float, stage: int) -> Grip:
-        if self.shown is None:
-            return Grip(self.prior, None, 0.0, self.prior)
-        shown = self.shown
+        belief = self.belief
+        careful, prior = quantile(belief.grips, CAUTION), quantile(belief.prior, CAUTION)
         if stage and v > self.v_shown + RISE:  # water takes more at a higher speed
-            shown = min(shown, self.prior)
-        value = self.confidence * shown + (1.0 - self.confidence) * self.prior
-        return Grip(value, self.shown, self.confidence, self.prior)
+            careful = min(careful, prior)
+        sure = belief.confidence
+        return Grip(careful, quantile(belief.grips, 0.5) if sure > 0.1 else None, sure, prior)

@@ -43,16 +43,17 @@ def way_ahead(map: RoadMap, pose: Pose) -> Way | None:
     here = map.project(pose.x, pose.y, pose.z)
     if here is None:
         return None
-    rows = [(0.0, here.x, here.y, here.z, here.curvature)]
-    while rows[-1][0] < REACH:
-        distance = rows[-1][0] + STEP
-        place = map.ahead(here, distance, pose.yaw)
-        if place is None:
-            break
-        rows.append((distance, place.x, place.y, place.z, place.curvature))
-    s, x, y, z, curvature = np.array(rows).T
+    further = map.trace_ahead(here, STEP, round(REACH / STEP), pose.yaw)
+    x, y, z, curvature = np.vstack(((here.x, here.y, here.z, here.curvature), further)).T
+    s = STEP * np.arange(len(x))
     grade = float((z[1] - z[0]) / STEP) if len(s) > 1 else 0.0
     return Way(s, x, y, z, curvature, grade)
+
+
+def grade_at(map: RoadMap, pose: Pose) -> float:
+    """Returns the map's grade at a pose, uphill > 0; 0 off every lane."""
+    way = way_ahead(map, pose)
+    return 0.0 if way is None else way.grade
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from skidpad.core.jit import Held, kernel
 from skidpad.roads import kernels
 from skidpad.roads.kernels import LaneArrays
@@ -20,6 +23,23 @@ def project(map: Held[LaneArrays], x: float, y: float, z: float, driving: bool) 
 def advance(map: Held[LaneArrays], lane: int, s: float, distance: float, heading: float) -> Point:
     """See `kernels.advance_point`."""
     return kernels.advance_point(map.value, lane, s, distance, heading)
+
+
+@kernel
+def trace_lane(
+    map: Held[LaneArrays], lane: int, s: float, step: float, heading: float,
+    out: NDArray[np.float64],
+) -> int:  # fmt: skip
+    """Fills rows of out, (n, 4), with x, y, z, curvature of places 1, 2, .. n steps further.
+
+    Returns how many there are before the road ends; each is what `advance` gives for its distance.
+    """
+    for i in range(len(out)):
+        point = kernels.advance_point(map.value, lane, s, (i + 1) * step, heading)
+        if point[0] < 0:
+            return i
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = point[3], point[4], point[5], point[7]
+    return len(out)
 
 
 @kernel

@@ -146,6 +146,18 @@ class RoadMap:
             *entries.advance(self.held, point.lane, point.s, float(distance), measured)
         )
 
+    def trace_ahead(
+        self, point: LanePoint, step: float, steps: int, heading: float | None = None
+    ) -> NDArray[np.float64]:
+        """Returns (n, 4) x, y, z, curvature of the places that `ahead` gives at each step, in one call.
+
+        n is less than `steps` where the road ends.
+        """
+        out = np.empty((steps, 4))
+        measured = nan if heading is None else heading
+        n = entries.trace_lane(self.held, point.lane, point.s, float(step), measured, out)
+        return out[:n]
+
     def behind(self, point: LanePoint, distance: float) -> LanePoint | None:
         """The place `distance` m back along the straightest predecessor."""
         return self.ahead(point, -distance)

@@ -27,11 +27,13 @@ def choose_envelope(spec: RunSpec, setup: Setup) -> EnvelopeSettings | None:
         case Govern.NONE:
             return None
         case Govern.ENVELOPE:
-            return EnvelopeSettings(dt=dt)
+            return EnvelopeSettings(dt=dt, seed=spec.seed)
         case Govern.TABLE:
-            return EnvelopeSettings(dt=dt, table_kmh=TABLE_KMH)
+            return EnvelopeSettings(dt=dt, seed=spec.seed, table_kmh=TABLE_KMH)
         case Govern.FIXED:
-            return EnvelopeSettings(dt=dt, table_kmh=(FIXED_KMH,) * 3)
+            return EnvelopeSettings(dt=dt, seed=spec.seed, table_kmh=(FIXED_KMH,) * 3)
         case Govern.ORACLE:
             params = road_of(setup).params()
-            return EnvelopeSettings(dt=dt, oracle=lambda v: float(mu_at(params, v)))
+            return EnvelopeSettings(
+                dt=dt, seed=spec.seed, oracle=lambda v: float(mu_at(params, v))
+            )

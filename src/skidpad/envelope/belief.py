@@ -23,7 +23,11 @@ LOG_GRIP = np.log(GRIP)
 CHANGE = 1000.0  # m over which a surface is expected to change; our assumption
 CAUTION = 0.3  # quantile of the grip that is taken for its value
 WILD = 0.01  # least likelihood of a reading over the best one: readings may be wrong
-TEMPER = 0.5  # exponent of a window's likelihood, as windows share their errors
+TEMPER = 0.5  # exponent of a reading's likelihood, as readings share their errors
+REPEATED, NEW_FORCE = (
+    0.05,
+    0.03,
+)  # exponent where force over load is within this of the last reading's
 COLD_C = 3.0  # deg C that a thermometer with 2 K of error says where the road may be frozen
 # (grip, relative spread, weight) by stage of the rain sensor: dry, wet (0.2 mm), in between, 1 mm at 90
 # km/h of the friction table of the Bosch Automotive Handbook (docs/physics.md); the weights are our
@@ -73,12 +77,12 @@ class GripBelief:
     """Probabilities (grips, stiffnesses) of what the tyres stand on."""
 
     def __init__(self) -> None:
-        self.prior = prior_of(0, False)
+        self.prior, self.is_new, self.force = prior_of(0, False), True, 0.0
         self.p = np.outer(self.prior, STIFFNESS_PRIOR)
 
     def forget(self, way: float, prior: Floats) -> None:
-        """Lets the surface have changed on the way of so many m."""
-        self.prior = prior
+        """Lets the surface have changed on the way of so many m; at first, takes the prior."""
+        way, self.is_new, self.prior = 1e9 if self.is_new else way, False, prior
         share = 1.0 - exp(-way / CHANGE)
         self.p = (1.0 - share) * self.p + share * np.outer(prior, STIFFNESS_PRIOR)
 
@@ -92,7 +96,10 @@ class GripBelief:
         expected = GRIP[:, None] * (1.0 - left**3)
         variance = sigma_force**2 + (sigma_slip * stiff * left * left) ** 2
         error = (force if slip >= 0.0 else -force) - expected
-        self._multiply(np.exp(-0.5 * error * error / variance) / np.sqrt(variance))
+        is_repeated = abs(force - self.force) < NEW_FORCE
+        self.force = force
+        likelihood = np.exp(-0.5 * error * error / variance) / np.sqrt(variance)
+        self._multiply(likelihood, REPEATED if is_repeated else TEMPER)
 
     def see_least(self, use: float, sigma: float) -> None:
         """Takes what the car got, over gravity: its road has at least that much."""
@@ -104,9 +111,9 @@ class GripBelief:
         error = (LOG_GRIP - log(max(grip, 1e-3))) / spread
         self._multiply(np.exp(-0.5 * error * error)[:, None])
 
-    def _multiply(self, likelihood: Floats) -> None:
+    def _multiply(self, likelihood: Floats, exponent: float = TEMPER) -> None:
         likely = likelihood / likelihood.max() if likelihood.max() > 0.0 else 1.0
-        self.p = self.p * np.maximum(likely, WILD) ** TEMPER
+        self.p = self.p * np.maximum(likely, WILD) ** exponent
         self.p /= self.p.sum()
 
     @property

@@ -25,9 +25,11 @@ SHORT, SHORT_LEAST, ASK_LEAST = (
     0.4,
     0.6,
 )  # share, m/s^2 that are missing, m/s^2 asked at least
+BLUNT, BLUNT_ASK = 0.5, 1.5  # share and m/s^2, for which wheels need not slip for sure
 SLIP_LEAST = 0.004  # of wheels at their limit, beyond its error
 USED_AT_LIMIT, LIMIT_SPREAD = 0.93, 0.12  # of the grip that controls take; relative error of that
 LIMIT_LEAST = 0.04  # of the load; a car that gets less has an engine that drags or rolls
+FORCE_LEAST = 0.05  # of the load, less tells nothing about the curve's shape
 STEADY = 0.3  # share by which pedals move in a usable window
 AY_MOST = 0.5  # m/s^2 across in a window whose slip is used
 TURN_SHORT, TURN_ASK, V_CHARACTERISTIC = 0.6, 1.5, 25.0  # share, m/s^2, m/s of the single-track car
@@ -73,7 +75,7 @@ class Grip:
 class SpeedObserver:
     """Speed over ground from free wheels, carried on by the inertial unit while they brake."""
 
-    v: float = 0.0
+    v: float = -1.0  # before the first message
     offset: float = 0.0  # m/s^2 of the unit
     learned: float = 0.0  # s over which the offset was learned
     braking: float = 0.0  # s since the pedal was pressed
@@ -81,7 +83,7 @@ class SpeedObserver:
     def update(self, signals: CarSignals, grade: float, dt: float) -> None:
         """Takes one message; grade: of the map, uphill is > 0."""
         rear = 0.5 * (signals.wheels[2] + signals.wheels[3])
-        if rear < V_LEAST and self.braking == 0.0:
+        if self.v < 0.0 or (rear < V_LEAST and self.braking == 0.0):
             self.v = rear
             return
         self.v = max(self.v + (signals.ax - self.offset - G * grade) * dt, 0.0)
@@ -146,15 +148,15 @@ class GripEstimator:
         steady = self._is_steady()
         if asked >= 0.0 and self.speed.braking == 0.0:
             along, slip, sigma = self._drive_slip(v, ax, force, front, rear)
-            usable = abs(ay) < AY_MOST and (steady or asked < ASK_LEAST)
+            usable = abs(ay) < AY_MOST and steady
         else:
             along, slip, sigma = self._brake_slip(v, force, front, rear)
             usable = abs(ay) < AY_MOST and steady and 0.0 < self.speed.braking < BRAKING_MOST
-        if usable and along > -0.05:
+        if usable and along > FORCE_LEAST:
             self.belief.see_slip(
                 along, slip, self.stiffness, sigma, FORCE_SIGMA + FORCE_SHARE * abs(along)
             )
-        self._see_limit_along(asked, force, along, slip - 2.0 * sigma, steady)
+        self._see_limit_along(asked, force, along, slip - sigma, steady)
         self._see_limit_across(v, ay, steer, yaw_rate)
         self.belief.see_least(use, 0.02 + 0.05 * use)
         if self.belief.confidence > 0.3:
@@ -197,7 +199,9 @@ class GripEstimator:
         """Sees a car that gets much less than its pedals ask for, with wheels that slip for sure."""
         got = force if asked > 0.0 else -force
         short = 0.0 < got < SHORT * abs(asked) and abs(asked) - got > SHORT_LEAST
-        if steady and short and slip > SLIP_LEAST and along > LIMIT_LEAST:
+        # so little that neither engine nor brakes can be the cause
+        is_blunt = got < BLUNT * abs(asked) and abs(asked) > BLUNT_ASK and slip > -SLIP_LEAST
+        if steady and short and (is_blunt or slip > SLIP_LEAST) and along > LIMIT_LEAST:
             self.belief.see_limit(along / USED_AT_LIMIT, LIMIT_SPREAD)
 
     def _see_limit_across(self, v: float, ay: float, steer: float, yaw_rate: float) -> None:

@@ -110,6 +110,7 @@ def test_water_counts_for_more_at_a_higher_speed_than_the_one_of_the_evidence():
         estimator.belief.see_limit(0.6, 0.1)
     estimator.v_shown = 10.0
     slow = estimator.update(message(10.0, 0.0), 3, 15.0)
+    estimator.reset()
     for _ in range(40):
         fast = estimator.update(message(25.0, 0.0), 3, 15.0)
     assert slow.value > 0.5

@@ -44,7 +44,7 @@ class KeptSignals(Sink):
     truth: list[float] = field(default_factory=list)
 
     def see(self, moment: Moment) -> None:
-        """Keeps one tick."""
+        """Keeps the signals and the true grip of one tick."""
         self.ego.append(moment.frame.ego)
         self.commands.append(moment.command)
         self.air.append((int(moment.frame.extra[RAIN_ID]), float(moment.frame.extra[AIR_ID])))
@@ -63,7 +63,7 @@ class Estimates:
 
     @property
     def is_judged(self) -> NDArray[np.bool_]:
-        """(n,) moving, with information."""
+        """(n,) ticks in which the car moves and its signals told something."""
         judged: NDArray[np.bool_] = (self.v > V_LEAST) & (self.confidence >= SURE)
         return judged
 

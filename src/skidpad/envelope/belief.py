@@ -118,7 +118,7 @@ class GripBelief:
 
     @property
     def grips(self) -> Floats:
-        """(n,) probabilities of GRIP."""
+        """(n,) probabilities of the grips in GRIP, all stiffnesses together."""
         marginal: Floats = self.p.sum(axis=1)
         return marginal
 
@@ -130,9 +130,9 @@ class GripBelief:
     @property
     def confidence(self) -> float:
         """1 less the spread of the grip over that of the prior, at least 0: what signals have added."""
-        return max(1.0 - _spread(self.grips) / _spread(self.prior), 0.0)
+        return max(1.0 - _compute_spread(self.grips) / _compute_spread(self.prior), 0.0)
 
 
-def _spread(p: Floats) -> float:
+def _compute_spread(p: Floats) -> float:
     mean = p @ LOG_GRIP
     return sqrt(max(float(p @ (LOG_GRIP - mean) ** 2), 1e-9))

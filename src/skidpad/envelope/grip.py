@@ -34,6 +34,7 @@ STEADY = 0.3  # share by which pedals move in a usable window
 AY_MOST = 0.5  # m/s^2 across in a window whose slip is used
 TURN_SHORT, TURN_ASK, V_CHARACTERISTIC = 0.6, 1.5, 25.0  # share, m/s^2, m/s of the single-track car
 TURN_SPREAD = 0.2
+USED_MUCH = 0.6  # of the grip; a car that gets so much shows it at its speed
 WHEEL_SIGMA, RATIO_FIRST, RATIO_ERROR = 0.012, 0.007, 0.0008  # m/s of an axle; of front over rear
 FORCE_SIGMA, FORCE_SHARE = 0.012, 0.06  # of the load: offset of the unit; loads, torque, shape
 FOLLOW, LEARN = 0.2, 0.02  # 1 and 1/s, of the observer of speed and offset
@@ -156,10 +157,10 @@ class GripEstimator:
             self.belief.see_slip(
                 along, slip, self.stiffness, sigma, FORCE_SIGMA + FORCE_SHARE * abs(along)
             )
-        self._see_limit_along(asked, force, along, slip - sigma, steady)
-        self._see_limit_across(v, ay, steer, yaw_rate)
+        at_limit = self._see_limit_along(asked, force, along, slip - sigma, steady)
+        at_limit |= self._see_limit_across(v, ay, steer, yaw_rate)
         self.belief.see_least(use, 0.02 + 0.05 * use)
-        if self.belief.confidence > 0.3:
+        if at_limit or use > USED_MUCH * quantile(self.belief.grips, CAUTION):
             self.v_shown = v
 
     def _drive_slip(
@@ -195,21 +196,25 @@ class GripEstimator:
 
     def _see_limit_along(
         self, asked: float, force: float, along: float, slip: float, steady: bool
-    ) -> None:
+    ) -> bool:
         """Sees a car that gets much less than its pedals ask for, with wheels that slip for sure."""
         got = force if asked > 0.0 else -force
         short = 0.0 < got < SHORT * abs(asked) and abs(asked) - got > SHORT_LEAST
         # so little that neither engine nor brakes can be the cause
         is_blunt = got < BLUNT * abs(asked) and abs(asked) > BLUNT_ASK and slip > -SLIP_LEAST
-        if steady and short and (is_blunt or slip > SLIP_LEAST) and along > LIMIT_LEAST:
+        found = steady and short and (is_blunt or slip > SLIP_LEAST) and along > LIMIT_LEAST
+        if found:
             self.belief.see_limit(along / USED_AT_LIMIT, LIMIT_SPREAD)
+        return found
 
-    def _see_limit_across(self, v: float, ay: float, steer: float, yaw_rate: float) -> None:
+    def _see_limit_across(self, v: float, ay: float, steer: float, yaw_rate: float) -> bool:
         """Sees a car that turns much less than its wheels are turned."""
         wanted = v * steer / (self.car.wheelbase * (1.0 + (v / V_CHARACTERISTIC) ** 2))
         short = abs(wanted) * v > TURN_ASK and abs(yaw_rate) < TURN_SHORT * abs(wanted)
-        if short and wanted * yaw_rate > 0.0:
+        found = short and wanted * yaw_rate > 0.0
+        if found:
             self.belief.see_limit(abs(ay) / G, TURN_SPREAD)
+        return found
 
     def _estimate(self, v: float, stage: int) -> Grip:
         belief = self.belief

@@ -34,6 +34,4 @@ def choose_envelope(spec: RunSpec, setup: Setup) -> EnvelopeSettings | None:
             return EnvelopeSettings(dt=dt, seed=spec.seed, table_kmh=(FIXED_KMH,) * 3)
         case Govern.ORACLE:
             params = road_of(setup).params()
-            return EnvelopeSettings(
-                dt=dt, seed=spec.seed, oracle=lambda v: float(mu_at(params, v))
-            )
+            return EnvelopeSettings(dt=dt, seed=spec.seed, oracle=lambda v: float(mu_at(params, v)))

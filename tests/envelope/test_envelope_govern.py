@@ -14,20 +14,26 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
 from skidpad.core.run import Passenger, Roads, RunSpec, Scenario
 from skidpad.core.setup import ActorSetup, Setup
-from skidpad.core.states import VehicleCommand
+from skidpad.core.states import EgoEstimate, VehicleCommand
 from skidpad.core.vocabulary import Govern, GripModel, Outcome, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.envelope.govern import (
+    PULSE_BRAKE,
+    PULSE_TIME,
     SENSORS,
     V_CREEP,
+    Allowed,
+    BrakePulses,
     EnvelopeSettings,
     GovernedStack,
     govern,
     lower,
 )
+from skidpad.envelope.grip import Grip
 from skidpad.envelope.limits import Binding
 from skidpad.physics.presets import preset
 from skidpad.sensors.outside import make_rain_sensor, make_thermometer, wiper_stage
+from skidpad.stack.configurations import numbered_driver
 
 UNIT = st.floats(0.0, 1.0)
 SPEEDS = st.floats(0.0, 60.0)
@@ -191,3 +197,56 @@ def test_the_thermometer_knows_the_air_within_2_k_and_never_the_road():
     read = [make_thermometer(SENSORS[1], Host(cold_road, seed))() for seed in range(40)]
     assert read == [make_thermometer(SENSORS[1], Host(warm_road, seed))() for seed in range(40)]
     assert 3.75 <= min(read) < 5.0 < 7.0 < max(read) <= 8.25
+
+
+def numbered_run(kind, weather, duration):
+    spec = RunSpec(
+        driver=numbered_driver(3), course=Roads(), weather=preset(weather), duration=duration,
+        seed=900_001, sensors=SensorLevel.OBJECTS, govern=kind,
+    )  # fmt: skip
+    return drive_run(spec)
+
+
+def settings_of(kind):
+    host = Host(Weather(), 1)
+    return choose_envelope(RunSpec(govern=kind), host.setup)
+
+
+@pytest.mark.parametrize("kind", [k for k in Govern if k is not Govern.NONE])
+def test_each_word_of_govern_has_settings_of_its_own(kind):
+    others = [settings_of(k) for k in Govern if k not in (kind, Govern.NONE)]
+    assert settings_of(kind) is not None
+    assert settings_of(kind) not in others
+
+
+@pytest.mark.parametrize(
+    ("kind", "binding"),
+    [
+        (Govern.ONLY_SIGHT, Binding.SIGHT),
+        (Govern.ONLY_LEAD, Binding.LEAD),
+        (Govern.ONLY_BEND, Binding.BEND),
+    ],
+)
+def test_an_ablation_knows_one_limit_alone(kind, binding):
+    run = numbered_run(kind, "snow", 8.0)
+    found = set(run.readings.table["envelope.binding"].to_list())
+    assert found <= {float(binding), float(Binding.NONE)}
+
+
+def test_watching_changes_no_drive_and_records_what_would_be_allowed():
+    watched, bare = (numbered_run(kind, "icy_100", 10.0) for kind in (Govern.WATCH, Govern.NONE))
+    assert np.array_equal(np.asarray(watched.log.ego.x), np.asarray(bare.log.ego.x))
+    assert watched.readings.table["envelope.speed_mps"].min() < 20.0
+
+
+def test_brake_pulses_are_short_gentle_and_far_apart_and_end_where_something_is_known():
+    pulses, dt = BrakePulses(0.05), 0.05
+    ego = EgoEstimate(Pose(0.0, 0.0), 20.0, 0.0, 0.0, 0.0, (20.0,) * 4, 3)
+    unknown = Allowed(20.0, Binding.NONE, Grip(0.2, None, 0.0, 0.2), 80.0)
+    asked = [pulses.update(ego, unknown, False) for _ in range(1000)]  # 1 km
+    pulsed = np.flatnonzero(asked)
+    assert max(asked) == PULSE_BRAKE <= 2.0
+    assert len(pulsed) * dt == pytest.approx(3 * PULSE_TIME, rel=0.1)
+    known = replace(unknown, grip=Grip(0.8, 0.8, 0.9, 0.2))
+    assert not any(pulses.update(ego, known, False) for _ in range(1000))
+    assert not any(pulses.update(ego, unknown, True) for _ in range(1000))

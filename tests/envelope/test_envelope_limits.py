@@ -6,11 +6,14 @@ import pytest
 
 from skidpad.envelope.limits import (
     Binding,
+    RssParameters,
     bend_speed,
     bends_speed,
     floating_speed,
     following_speed,
     lowest,
+    rss_gap,
+    rss_speed,
     safe_gap,
     sight_speed,
     speed_before_bend,
@@ -95,3 +98,25 @@ def test_the_whole_vehicle_model_stops_within_sight_below_the_limit_and_not_abov
     limit = sight_speed(60.0, mu * G, 0.1)
     below, above = stops([GripParams(mu, 1.0, 0.0)] * 2, [0.98 * limit, 1.15 * limit])
     assert below.distance < 60.0 < above.distance
+
+
+@pytest.mark.parametrize("v_lead", [0.0, 10.0, 25.0])
+@pytest.mark.parametrize("gap", [10.0, 40.0, 120.0])
+def test_rss_speed_is_the_one_whose_distance_the_gap_is(v_lead, gap):
+    constants = RssParameters()
+    v = rss_speed(gap, v_lead, constants)
+    assert rss_gap(v, v_lead, constants) == pytest.approx(gap) or v == 0.0
+
+
+@pytest.mark.parametrize("v_lead", [5.0, 20.0])
+def test_at_the_rss_distance_a_follower_that_still_accelerates_just_stops_behind_the_lead(v_lead):
+    """Step by step: full throttle in the response time, as the rule allows, then its least braking."""
+    c = RssParameters()
+    v, apart = 20.0, rss_gap(20.0, v_lead, c)
+    t, lead = 0.0, v_lead
+    while v > 0.0 or lead > 0.0:
+        v_next = v + c.acceleration * STEP if t < c.response else max(v - c.brake_least * STEP, 0.0)
+        lead_next = max(lead - c.brake_most * STEP, 0.0)
+        apart += 0.5 * STEP * (lead + lead_next - v - v_next)
+        t, v, lead = t + STEP, v_next, lead_next
+    assert apart == pytest.approx(0.0, abs=0.1)

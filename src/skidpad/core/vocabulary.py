@@ -236,5 +236,14 @@ class Govern(str, Enum):
     NONE = "none"
     ENVELOPE = "envelope"  # grip and sight from own signals
     ORACLE = "oracle"  # the same with true grip, for studies
+    WATCH = "watch"  # records what the envelope would allow, and lets the stack drive
     TABLE = "table"  # a rival: three speeds by wiper stage and temperature
     FIXED = "fixed"  # another one: 80 km/h always
+    RSS = "rss"  # another one: RSS distances with constant grip
+    PULSES = "pulses"  # the envelope, with brake pulses where nothing is known of the grip
+    ONLY_SIGHT = "only-sight"  # one limit of the envelope alone
+    ONLY_LEAD = "only-lead"
+    ONLY_BEND = "only-bend"
+    ONLY_WATER = "only-water"
+    GRIP_LOW = "grip-low"  # an estimate of grip that is 30 % too low
+    GRIP_HIGH = "grip-high"  # and 30 % too high

@@ -23,16 +23,18 @@ from skidpad.core.specs import (
     RadarSpec,
     SensorSpec,
 )
-from skidpad.core.states import StackReport, VehicleCommand
+from skidpad.core.states import EgoEstimate, StackReport, VehicleCommand
 from skidpad.core.vocabulary import Supervision
 from skidpad.envelope.belief import COLD_C
 from skidpad.envelope.grip import STIFFNESS, Grip, GripEstimator
 from skidpad.envelope.limits import (
     Binding,
+    RssParameters,
     bends_speed,
     floating_speed,
     following_speed,
     lowest,
+    rss_speed,
     sight_speed,
 )
 from skidpad.envelope.sight import Sight, Way, way_ahead
@@ -52,6 +54,9 @@ SOFT = 1.0  # m/s below the limit, over which throttle is taken away
 CLOSE = 2.0  # m kept behind a standing lead
 LEAD_GRIP = 1.2  # times the estimate that a lead's tyres may have
 LEAD_BRAKE = 8.0  # m/s^2 that it brakes at most
+# of brake pulses: within what drivers find comfortable, 2 m/s^2 (our assumption)
+PULSE_BRAKE, PULSE_TIME, PULSE_EVERY = 1.5, 0.8, 300.0  # m/s^2, s, m from one to the next
+PULSE_BELOW, PULSE_V_LEAST, PULSE_AY_MOST = 0.3, 8.0, 0.5  # confidence, m/s, m/s^2 across
 GripAt = Callable[[float], float]  # grip at a speed in m/s
 
 
@@ -69,6 +74,10 @@ class EnvelopeSettings:
         factor: on the estimated grip, for studies.
         table_kmh: speeds when dry, in rain, in the cold, in the place of the envelope: a rival.
         oracle: true grip, for studies only.
+        limits: those that count; all but for ablations.
+        rss: RSS distances with constant grip and the dry row of the table, in its place: a rival.
+        watches: it records what it would allow and leaves the stack alone.
+        pulses: it brakes a little where nothing is known of the grip.
         seed: of the errors of the car's signals.
         bus: errors of the car's signals.
     """
@@ -82,6 +91,10 @@ class EnvelopeSettings:
     factor: float = 1.0
     table_kmh: tuple[float, float, float] | None = None
     oracle: GripAt | None = None
+    limits: frozenset[Binding] = frozenset(Binding)
+    rss: bool = False
+    watches: bool = False
+    pulses: bool = False
     seed: int = 1
     bus: BusModel = BusModel()
     dt: float = DT
@@ -147,9 +160,19 @@ class Envelope:
         if set_to.table_kmh is not None:
             row = 2 if air_c < COLD_C else min(stage, 1)
             limits, reach = {Binding.TABLE: set_to.table_kmh[row] / 3.6}, 0.0
+        elif set_to.rss:
+            limits, reach = self._limit_by_rss(frame, way, v), 0.0
         else:
             limits, reach = self._limits(frame, way, grip, stage, v)
+            limits = {name: limit for name, limit in limits.items() if name in set_to.limits}
         return Allowed(*lowest(limits, set_to.most), grip, reach)
+
+    def _limit_by_rss(self, frame: SensorFrame, way: Way | None, v: float) -> dict[Binding, float]:
+        limits = {Binding.TABLE: TABLE_KMH[0] / 3.6}
+        lead = None if way is None else self.sight.look(frame.radar, frame.ego.pose, way, v)
+        if lead is not None:
+            limits[Binding.LEAD] = rss_speed(lead.gap, lead.speed, RssParameters())
+        return limits
 
     def _limits(
         self, frame: SensorFrame, way: Way | None, grip: Grip, stage: int, v: float
@@ -187,6 +210,25 @@ def lower(
     return replace(command, throttle=throttle, brake=max(command.brake, brake))
 
 
+class BrakePulses:
+    """Brakes a little, now and then, where nothing is known of the grip and the way is free."""
+
+    def __init__(self, dt: float) -> None:
+        self.dt, self.way, self.left = dt, 0.0, 0.0
+
+    def update(self, ego: EgoEstimate, allowed: Allowed, has_lead: bool) -> float:
+        """Returns m/s^2 to brake with in this tick; 0: none."""
+        self.way += max(ego.speed, 0.0) * self.dt
+        is_free = not has_lead and ego.speed > PULSE_V_LEAST and abs(ego.ay) < PULSE_AY_MOST
+        if allowed.grip.confidence >= PULSE_BELOW or not is_free:
+            self.left = 0.0
+            return 0.0
+        if self.way > PULSE_EVERY:
+            self.way, self.left = 0.0, PULSE_TIME
+        self.left -= self.dt
+        return PULSE_BRAKE if self.left > 0.0 else 0.0
+
+
 class GovernedStack:
     """A stack inside the envelope; to all others it looks like the stack itself."""
 
@@ -198,6 +240,7 @@ class GovernedStack:
         self.applied = VehicleCommand()
         self.supervision = Supervision.NONE
         self.allowed: Allowed | None = None
+        self.pulses = BrakePulses(settings.dt) if settings.pulses else None
 
     def sensors(self) -> tuple[SensorSpec, ...]:
         """Returns what the stack asks for, and the two sensors of the envelope."""
@@ -233,17 +276,25 @@ class GovernedStack:
             self.supervision = frame.supervision
         driven = frame.supervision is Supervision.NONE
         self.allowed = self.envelope.update(frame, self.applied if driven else VehicleCommand())
+        acts = driven and not self.settings.watches
         tell = getattr(self.inner, "limit_speed", None)
-        if callable(tell):
+        if callable(tell) and not self.settings.watches:
             tell(max(self.allowed.speed, V_CREEP))
         command = self.inner.tick(frame)
-        if driven and isinstance(command, VehicleCommand) and isfinite(frame.ego.speed):
+        if acts and isinstance(command, VehicleCommand) and isfinite(frame.ego.speed):
             braking = self.settings.share * self.allowed.grip.value * G
             approach = min(self.settings.approach, braking)
             if self.allowed.binding is Binding.LEAD:  # a lead may brake at any moment
                 approach = braking
             car = self.envelope.grip.car
             command = lower(command, frame.ego.speed, self.allowed.speed, approach, car.a_brake)
+            if self.pulses is not None:
+                least = self.pulses.update(
+                    frame.ego, self.allowed, self.envelope.sight.lead is not None
+                )
+                if least > 0.0:
+                    brake = max(command.brake, least / car.a_brake)
+                    command = replace(command, throttle=0.0, brake=brake)
         self.applied = command
         return command
 

@@ -6,6 +6,7 @@ Speeds in m/s, distances in m, decelerations positive in m/s^2. The lowest speed
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from enum import IntEnum
 from math import inf, sqrt
 
@@ -61,6 +62,33 @@ def following_speed(
     """
     lead_way = v_lead * v_lead / (2.0 * lead_deceleration)
     return sight_speed(max(gap, 0.0) + lead_way, deceleration, delay)
+
+
+@dataclass(frozen=True, slots=True)
+class RssParameters:
+    """Constants of RSS, here those of intel/ad-rss-lib's documentation; they know no weather."""
+
+    response: float = 1.0  # s
+    acceleration: float = 3.5  # m/s^2, at most in the response time
+    brake_least: float = 4.0  # m/s^2 of the follower
+    brake_most: float = 8.0  # m/s^2 of the lead
+
+
+def rss_gap(v: float, v_lead: float, constants: RssParameters) -> float:
+    """Returns the longitudinal safe distance of RSS, arXiv 1708.06374, lemma 2; IEEE 2846-2022.
+
+    v t + a t^2 / 2 + (v + a t)^2 / (2 b_least) - v_lead^2 / (2 b_most), at least 0.
+    """
+    t, a = constants.response, constants.acceleration
+    own = v * t + 0.5 * a * t * t + (v + a * t) ** 2 / (2.0 * constants.brake_least)
+    return max(own - v_lead * v_lead / (2.0 * constants.brake_most), 0.0)
+
+
+def rss_speed(gap: float, v_lead: float, constants: RssParameters) -> float:
+    """Returns the highest speed for which `gap` is safe by `rss_gap`: solved for v + a t."""
+    t, a = constants.response, constants.acceleration
+    way = max(gap, 0.0) + v_lead * v_lead / (2.0 * constants.brake_most) + 0.5 * a * t * t
+    return max(sight_speed(way, constants.brake_least, t) - a * t, 0.0)
 
 
 def bend_speed(curvature: float, lateral: float) -> float:

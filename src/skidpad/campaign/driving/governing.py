@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from skidpad.core.run import AdasDriver, RunSpec
 from skidpad.core.setup import Setup
 from skidpad.core.vocabulary import Govern
 from skidpad.envelope.govern import TABLE_KMH, EnvelopeSettings, govern
+from skidpad.envelope.limits import Binding
 from skidpad.physics.grip import mu_at, road_of
 from skidpad.stack.interface import Stack
 
@@ -18,20 +21,36 @@ def apply_envelope(stack: type[Stack], spec: RunSpec, setup: Setup) -> type[Stac
     return stack if found is None else govern(stack, found)
 
 
+LIMITS = {
+    Govern.ONLY_SIGHT: Binding.SIGHT,
+    Govern.ONLY_LEAD: Binding.LEAD,
+    Govern.ONLY_BEND: Binding.BEND,
+    Govern.ONLY_WATER: Binding.WATER,
+}  # of the ablations, each alone
+GRIP_FACTORS = {Govern.GRIP_LOW: 0.7, Govern.GRIP_HIGH: 1.3}
+
+
 def choose_envelope(spec: RunSpec, setup: Setup) -> EnvelopeSettings | None:
     """Returns the settings of the run's envelope; None: it has none."""
-    dt = setup.dt
     own = isinstance(spec.driver, AdasDriver) and spec.driver.envelope
     kind = Govern.ENVELOPE if own and spec.govern is Govern.NONE else spec.govern
+    plain = EnvelopeSettings(dt=setup.dt, seed=spec.seed)
+    if kind in LIMITS:
+        return replace(plain, limits=frozenset({LIMITS[kind]}))
     match kind:
         case Govern.NONE:
             return None
-        case Govern.ENVELOPE:
-            return EnvelopeSettings(dt=dt, seed=spec.seed)
         case Govern.TABLE:
-            return EnvelopeSettings(dt=dt, seed=spec.seed, table_kmh=TABLE_KMH)
+            return replace(plain, table_kmh=TABLE_KMH)
         case Govern.FIXED:
-            return EnvelopeSettings(dt=dt, seed=spec.seed, table_kmh=(FIXED_KMH,) * 3)
+            return replace(plain, table_kmh=(FIXED_KMH,) * 3)
+        case Govern.RSS:
+            return replace(plain, rss=True)
+        case Govern.WATCH:
+            return replace(plain, watches=True)
+        case Govern.PULSES:
+            return replace(plain, pulses=True)
         case Govern.ORACLE:
             params = road_of(setup).params()
-            return EnvelopeSettings(dt=dt, seed=spec.seed, oracle=lambda v: float(mu_at(params, v)))
+            return replace(plain, oracle=lambda v: float(mu_at(params, v)))
+    return replace(plain, factor=GRIP_FACTORS.get(kind, 1.0))

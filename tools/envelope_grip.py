@@ -15,7 +15,12 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from skidpad.campaign.grip_judging import Estimates, estimate_again, judge_estimates, keep_signals
+from skidpad.campaign.studies.grip_judging import (
+    Estimates,
+    estimate_again,
+    judge_estimates,
+    keep_signals,
+)
 from skidpad.core.run import Roads, RunSpec
 from skidpad.core.settings import load_profile
 from skidpad.core.surface import SurfacePatch
@@ -90,8 +95,8 @@ def main() -> None:
         "time to notice, median |\n|---|---|---|---|---|---|---|---|"
     )
     rows = []
-    for (label, surface), estimates in sorted(found.items()):
-        j = judge_estimates(estimates)
+    for (label, surface), made in sorted(found.items()):
+        j = judge_estimates(made)
         error = "no information" if j.error is None else ", ".join(f"{e:+.0%}" for e in j.error)
         within = sum(s <= 1.0 for s in j.notice)
         middle = float(np.median(j.notice)) if j.notice else inf

@@ -51,7 +51,8 @@ def prior_of(stage: int, is_cold: bool) -> Floats:
     for grip, spread, weight in parts:
         bell = np.exp(-0.5 * ((LOG_GRIP - log(min(grip, wet))) / spread) ** 2)
         p += weight * bell / bell.sum()
-    return p / p.sum()
+    p /= p.sum()
+    return p
 
 
 def quantile(p: Floats, share: float) -> float:
@@ -66,8 +67,9 @@ def prior_grip(stage: int, air_c: float) -> float:
 
 def _stiffness_prior() -> Floats:
     bell = np.exp(-0.5 * (np.log(STIFFNESS_SHARES) / STIFFNESS_SPREAD) ** 2)
-    flat = np.full(len(bell), 1.0 / len(bell))
-    return (1.0 - STIFFNESS_OPEN) * bell / bell.sum() + STIFFNESS_OPEN * flat
+    p = np.full(len(bell), STIFFNESS_OPEN / len(bell))
+    p += (1.0 - STIFFNESS_OPEN) * bell / bell.sum()
+    return p
 
 
 STIFFNESS_PRIOR = _stiffness_prior()

@@ -45,7 +45,7 @@ def way_ahead(map: RoadMap, pose: Pose) -> Way | None:
         return None
     further = map.trace_ahead(here, STEP, round(REACH / STEP), pose.yaw)
     x, y, z, curvature = np.vstack(((here.x, here.y, here.z, here.curvature), further)).T
-    s = STEP * np.arange(len(x))
+    s = STEP * np.arange(len(x), dtype=np.float64)
     grade = float((z[1] - z[0]) / STEP) if len(s) > 1 else 0.0
     return Way(s, x, y, z, curvature, grade)
 

@@ -64,7 +64,11 @@ class BusModel:
     delay: int = 1  # ticks
 
 
-EXACT = BusModel(**dict.fromkeys(BusModel.__slots__, 0.0) | {"delay": 0})
+EXACT = BusModel(
+    wheel_noise=0.0, wheel_step=0.0, radius_offset=0.0, a_noise=0.0, a_offset=0.0, a_step=0.0,
+    yaw_noise=0.0, yaw_offset=0.0, yaw_step=0.0, steer_step=0.0, steer_offset=0.0, bar_noise=0.0,
+    bar_step=0.0, torque_offset=0.0, delay=0,
+)  # fmt: skip
 
 
 class CarBus:

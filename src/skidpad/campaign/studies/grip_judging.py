@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.campaign.drive import Moment, Sink
-from skidpad.campaign.run import run
+from skidpad.campaign.driving.loop import Moment, Sink
+from skidpad.campaign.runs.run import run
 from skidpad.core.run import RunSpec
 from skidpad.core.setup import DT
 from skidpad.core.states import EgoEstimate, VehicleCommand

@@ -30,7 +30,7 @@ from skidpad.core.randomness import stream
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.fleet.identity import new_id
-from skidpad.fleet.patterns.series import POINTS, SIGNALS, VERSION, to_plain
+from skidpad.fleet.patterns.analysis import POINTS, SIGNALS, VERSION, to_plain
 from skidpad.fleet.service import Places, open_store
 from skidpad.fleet.store.accounts import add_person, add_vehicle
 from skidpad.fleet.store.tables import batches, drives, hazards, series

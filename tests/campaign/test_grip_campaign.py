@@ -13,8 +13,7 @@ import pytest
 
 from skidpad.campaign.campaign import Campaign, uncertain_cells
 from skidpad.campaign.cells.grip import Cross, cross, seeds, template
-from skidpad.campaign.recipes.grip import recipe, warm_up
-from skidpad.campaign.recipes.grip_shown import select_shown_runs
+from skidpad.campaign.recipes.grip import recipe, select_shown_runs, warm_up
 from skidpad.campaign.workers.cluster import run_on, runner_of
 from skidpad.campaign.workers.pool import local
 from skidpad.campaign.workers.worker import Finished, Runner

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from skidpad.campaign.sight_labels import label_of
+from skidpad.campaign.dataset import label_of
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind
 from skidpad.roads.bundled import load_map

@@ -13,7 +13,7 @@ from lxml import etree
 
 from fleet_world import packed, record, text_of
 from skidpad.fleet.api.guard import Needs
-from skidpad.fleet.rate import Rate
+from skidpad.fleet.service import Rate
 from skidpad.fleet.unpacking import unpack
 from skidpad.fleet.words import RIGHTS, Action, Limits, Refused, Role
 

@@ -14,6 +14,7 @@ from fleet_world import NOW, packed, record
 from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import HazardType
 from skidpad.fleet.identity import digest
+from skidpad.fleet.patterns.analysis import POINTS, SIGNALS, from_plain, series_of, to_plain
 from skidpad.fleet.patterns.clusters import (
     Case,
     ClusterSettings,
@@ -21,7 +22,6 @@ from skidpad.fleet.patterns.clusters import (
     recurring,
     warping_table,
 )
-from skidpad.fleet.patterns.series import POINTS, SIGNALS, from_plain, series_of, to_plain
 from skidpad.fleet.store.accounts import add_person, add_vehicle
 from skidpad.fleet.words import Role
 

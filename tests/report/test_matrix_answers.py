@@ -11,11 +11,10 @@ from skidpad.evidence.verdicts import Verdict, judge
 from skidpad.recording.campaign.matrix import MATRIX, Metrics
 from skidpad.recording.campaign.results import Timing
 from skidpad.report.matrix.answers import answers
-from skidpad.report.matrix.baseline import baseline_text
 from skidpad.report.matrix.data import EVENTS, FIRST, WEATHERS, config_list, load_matrix
 from skidpad.report.matrix.figures import collisions, speed_figure
-from skidpad.report.matrix.headline import headline_numbers
-from skidpad.report.matrix.kinds import count, kinds_of
+from skidpad.report.matrix.headline import baseline_text, headline_numbers
+from skidpad.report.matrix.next import count, kinds_of
 from skidpad.report.matrix.page import write_report
 from skidpad.report.matrix.tables import count_table, kinds_table
 

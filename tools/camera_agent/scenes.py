@@ -13,7 +13,7 @@ from math import cos, hypot, pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.campaign.sight_labels import label_of
+from skidpad.campaign.dataset import label_of
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.physics.presets import preset
 from skidpad.physics.types import EGO_TYPE, vehicle_types

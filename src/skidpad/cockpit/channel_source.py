@@ -6,10 +6,12 @@ traffic lights and the commands are not recorded: bodies have the height of thei
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
 
 from skidpad.campaign.driving.loop import Moment
@@ -17,7 +19,6 @@ from skidpad.campaign.runs.stored import read_segment
 from skidpad.campaign.user_files import with_kept_map
 from skidpad.cockpit.indicators import every, least_of, ttc_ahead
 from skidpad.cockpit.marks import RADAR_MOUNT
-from skidpad.cockpit.monitored import read_judgements
 from skidpad.cockpit.source import Curves, Said, Seat
 from skidpad.core.channels import ChannelFrame, Context, Decision, TruthFrame
 from skidpad.core.errors import FileError, InputError
@@ -45,7 +46,10 @@ from skidpad.core.vocabulary import (
 )
 from skidpad.core.weather import Weather
 from skidpad.evidence.pairs import Body
+from skidpad.live.links import MONITORED
+from skidpad.recording.channels.indicators import FILE, read_indicators
 from skidpad.recording.channels.mcap_files import McapRecording
+from skidpad.recording.hazards.records import INDEX_FILE, read_index
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.recovery import Action
@@ -341,3 +345,37 @@ def weather_of(context: dict[str, str]) -> Weather:
     return Weather(
         name="recorded", precipitation=rain, wetness=rain, cloudiness=rain, sun_altitude_deg=sun
     )
+
+
+# --- what a monitor said of a recording, along its time: hazards, and indicators beyond their bounds
+
+
+class MonitoredRun(NamedTuple):
+    """Of one recording; empty where no monitor looked at it."""
+
+    hazards: list[tuple[int, int, str]]  # first and last tick, and what it was
+    violated: list[int]  # indicators beyond their bounds, the most up to the next shown moment
+
+    @property
+    def marks(self) -> list[tuple[int, str, str]]:
+        """Where each hazard begins: tick, kind and text."""
+        return [(first, "hazard", f"hazard: {text}") for first, _, text in self.hazards]
+
+
+def read_judgements(recording: Path, ticks: Sequence[int]) -> MonitoredRun:
+    """What the folder NAME.monitor beside a recording with moments at `ticks` says."""
+    folder = recording.with_suffix(MONITORED)
+    hazards, violated = [], np.zeros(len(ticks), dtype=np.int64)
+    if (folder / INDEX_FILE).is_file():
+        for row in read_index(folder):
+            first, last = (round(row[name] / DT) for name in ("t_start", "t_end"))
+            words = row["type"].replace("_", " ")
+            hazards.append((first, last, f"{words} ({row['id']})"))
+    if (folder / FILE).is_file():
+        beyond = read_indicators(folder).filter(pl.col("violated")).group_by("t").len()
+        at = np.searchsorted(ticks, np.round(beyond["t"].to_numpy() / DT))
+        within = at < len(ticks)
+        np.add.at(violated, at[within], beyond["len"].to_numpy()[within])
+    starts = np.arange(len(ticks))[every(len(ticks))]
+    most = np.maximum.reduceat(violated, starts).tolist() if violated.any() else []
+    return MonitoredRun(sorted(hazards), most)

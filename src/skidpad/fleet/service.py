@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from threading import Lock
 
 from sqlalchemy import Engine
 
@@ -17,13 +18,39 @@ from skidpad.fleet.alerting.hub import Hub
 from skidpad.fleet.alerting.orders import Signer
 from skidpad.fleet.alerting.relays import Relay
 from skidpad.fleet.blobs import Blobs
-from skidpad.fleet.rate import Rate
 from skidpad.fleet.store.engine import migrate, open_engine, sqlite_url
 from skidpad.fleet.store.intake import Batch, Intake
 from skidpad.fleet.updates.repository import Repository
 from skidpad.fleet.warehouse import Warehouse
 from skidpad.fleet.words import Limits
 from skidpad.recording.hazards.records import HazardRecord
+
+
+@dataclass(slots=True)
+class _Bucket:
+    left: float
+    at: float
+
+
+class Rate:
+    """A bucket per credential: so many requests at once, refilled at a lasting rate."""
+
+    def __init__(self, per_s: float, burst: int) -> None:
+        self.per_s, self.burst = per_s, float(burst)
+        self._buckets: dict[str, _Bucket] = {}
+        self._lock = Lock()
+
+    def take(self, who: str, now: float) -> float:
+        """0 when a request is granted, else the seconds until one will be."""
+        with self._lock:
+            bucket = self._buckets.setdefault(who, _Bucket(self.burst, now))
+            gained = max(0.0, now - bucket.at) * self.per_s
+            bucket.left, bucket.at = min(self.burst, bucket.left + gained), now
+            if bucket.left >= 1.0:
+                bucket.left -= 1.0
+                return 0.0
+            return (1.0 - bucket.left) / self.per_s
+
 
 CAME = "came"  # topic, with a tenant: something new of its vehicles
 Clock = Callable[[], float]  # s since 1970

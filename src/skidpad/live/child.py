@@ -8,17 +8,20 @@ from __future__ import annotations
 
 import gc
 import json
+import os
+import resource
 import sys
+import time
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from skidpad.core.channels import ChannelFrame, Cycle
-from skidpad.core.errors import SkidpadError
+from skidpad.core.errors import ConfigError, SkidpadError
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
-from skidpad.live.isolation import isolate
-from skidpad.live.walltime import WallTimer
-from skidpad.live.watch import Alarms, watch
+from skidpad.live.watch import Alarms, Timer, watch
 from skidpad.live.wire import WireSource
 
 ALARMS = "alarms.jsonl"
@@ -83,3 +86,71 @@ def _scene(t: float) -> ChannelFrame:
 
 if __name__ == "__main__":
     sys.exit(main(*sys.argv[1:]))
+
+
+# --- a processor for the monitor alone, as far as the system allows (C-231)
+GOVERNOR = "/sys/devices/system/cpu/cpu{}/cpufreq/scaling_governor"
+HIGHEST = -20  # nice
+
+
+def require_processor(pin: int) -> None:
+    """ConfigError unless this process may run on processor `pin`."""
+    if not hasattr(os, "sched_getaffinity"):
+        raise ConfigError("--pin: this system has no affinity of processes to processors")
+    allowed = sorted(os.sched_getaffinity(0))
+    if pin not in allowed:
+        raise ConfigError(f"--pin must be one of the processors {allowed}, got {pin}")
+
+
+def isolate(pin: int | None) -> dict[str, Any]:
+    """Pin this process and raise its priority; says what was granted.
+
+    The governor is read only: to change it is the administrator's.
+    """
+    if pin is None:
+        return {}
+    require_processor(pin)
+    os.sched_setaffinity(0, {pin})
+    with suppress(OSError):  # where it is not allowed; what holds is read below
+        os.setpriority(os.PRIO_PROCESS, 0, HIGHEST)
+    governor = Path(GOVERNOR.format(pin))
+    return {
+        "processor": pin,
+        "nice": os.getpriority(os.PRIO_PROCESS, 0),
+        "governor": governor.read_text().strip() if governor.exists() else "unknown",
+    }
+
+
+# --- wall time from a cycle's last word to its judgement, and what the system says of it (C-005)
+SCHEDULE = Path("/proc/thread-self/schedstat")  # ns on a processor, ns waiting for one, slices
+
+
+class WallTimer(Timer):
+    """Processor time per part, and per cycle: wall_ms since it was sent, waits and page faults."""
+
+    def __init__(self, source: WireSource) -> None:
+        super().__init__(time.thread_time_ns)
+        self.source = source
+        self._waited, self._faults = _waited_ns(), _faults()
+
+    def end(self) -> None:
+        """The cycle is judged and written."""
+        waited, faults = _waited_ns(), _faults()
+        row = self.rows[-1]
+        row["wall_ms"] = (time.monotonic_ns() - self.source.sent_ns) / 1e6
+        row["waited_ms"] = (waited - self._waited) / 1e6
+        row["faults"] = float(faults - self._faults)
+        self._waited, self._faults = waited, faults
+
+
+def _waited_ns() -> int:
+    """Time that this thread was ready and had no processor; 0 where the system does not say."""
+    try:
+        return int(SCHEDULE.read_bytes().split()[1])
+    except (OSError, IndexError, ValueError):
+        return 0
+
+
+def _faults() -> int:
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    return usage.ru_majflt + usage.ru_minflt

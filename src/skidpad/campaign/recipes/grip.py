@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 from skidpad import __version__
 from skidpad.campaign.cells.grip import Cross, cross, scenario_of, template
-from skidpad.campaign.recipes.grip_shown import CELL, select_shown_runs, write_stopping
 from skidpad.campaign.recipes.recipe import Driven, Recipe
 from skidpad.campaign.runs.folder import (
     Stopwatch,
@@ -43,6 +42,13 @@ from skidpad.scenarios.variation import CutIn
 
 if TYPE_CHECKING:
     from skidpad.campaign.runs.run import Run
+import polars as pl
+
+from skidpad.core.vocabulary import GripModel
+from skidpad.core.weather import Weather
+from skidpad.physics.stopping import SPEEDS_KMH, grip_rows
+from skidpad.recording.campaign.grip import STOPPING
+from skidpad.recording.files import write_parquet
 
 
 def warm_up() -> None:
@@ -156,3 +162,27 @@ def recipe(keep_all: bool = False) -> Recipe[RunSpec, GripKey, GripMetrics]:
         success_means="completed",
         finish=finish,
     )
+
+
+# --- what a report shows besides results: a median and a worst run per cell, and full stops
+CELL = ("scenario", "cutin", "overlay", "weather", "friction")
+
+
+def select_shown_runs(results: pl.DataFrame) -> pl.DataFrame:
+    """Of each cell the run with the median and with the least distance; columns CELL, seed, role."""
+    finished = results.drop_nulls("min_cvip_m")
+    order = finished.sort("completion", "min_cvip_m", "seed").group_by(CELL, maintain_order=True)
+    middle = order.agg(pl.col("seed").get(pl.len() // 2)).with_columns(role=pl.lit("median"))
+    worst = order.agg(pl.col("seed").first()).with_columns(role=pl.lit("worst"))
+    return pl.concat([middle, worst]).sort(*CELL, "role")
+
+
+def write_stopping(out: Path, weathers: Sequence[Weather], mu_ref: float) -> None:
+    """Ratio, friction and stopping distances of each weather under both models (decision G-5)."""
+    models = [GripModel.STATISTICAL, GripModel.PHYSICAL]
+    rows = []
+    for row in grip_rows(weathers, models, mu_ref):
+        stops = {f"stop_{v:g}_m": s.distance for v, s in zip(SPEEDS_KMH, row.stops, strict=True)}
+        numbers = {"ratio": row.ratio, "mu_80": row.mu_80, **stops}
+        rows.append({"weather": row.weather, "model": row.model.value, **numbers})
+    write_parquet(out / STOPPING, pl.DataFrame(rows))

@@ -13,11 +13,10 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.channels import Cycle
+from skidpad.core.channels import ChannelFrame, Cycle
 from skidpad.core.errors import ConfigError, require_range
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.frames import Usable, usable
-from skidpad.evidence.channels.ghosts import GhostCue
 from skidpad.evidence.channels.hazards import (
     Profile,
     Rule,
@@ -265,3 +264,35 @@ def drive_events(
         monitor.violations.finish(), key=lambda e: (e.t_start, e.key[0].value, e.key[1])
     )
     return hazards, violations
+
+
+# --- a cue for ghosts: objects that one channel alone reports, and only for a moment (C-130)
+MOMENT = 0.5  # s
+
+
+class GhostCue:
+    """Counts brief objects per channel; only channels that give identities can be followed."""
+
+    def __init__(self, channels: Sequence[str]) -> None:
+        self.channels = tuple(channels)
+        self.brief: Counter[str] = Counter()
+        self._since: list[dict[int, float]] = [{} for _ in channels]  # id -> first seen, s
+        self._shared: list[set[int]] = [set() for _ in channels]  # ids that another channel knew
+
+    def update(self, frames: Sequence[ChannelFrame | None], shared: Sequence[set[int]]) -> None:
+        """One cycle; `shared` holds per channel the rows that were paired with another channel."""
+        for c, frame in enumerate(frames):
+            if frame is None:  # nobody can say what happened to its objects
+                self._since[c].clear()
+                self._shared[c].clear()
+                continue
+            ids = frame.ids.tolist()
+            since, known = self._since[c], self._shared[c]
+            known.update(ids[row] for row in shared[c])
+            present = {i for i in ids if i >= 0}
+            for i in since.keys() - present:
+                if frame.t - since.pop(i) <= MOMENT + 1e-6 and i not in known:
+                    self.brief[self.channels[c]] += 1
+                known.discard(i)
+            for i in present - since.keys():
+                since[i] = frame.t

@@ -9,9 +9,13 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 from sqlalchemy import ColumnElement, Connection, select
 
 from skidpad.core.errors import FileError
+from skidpad.evidence.channels.hazards import Signal
+from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
 from skidpad.fleet.identity import new_id
 from skidpad.fleet.insight.worklist import reopen_recurred
 from skidpad.fleet.patterns.clusters import (
@@ -23,13 +27,13 @@ from skidpad.fleet.patterns.clusters import (
     recurring,
 )
 from skidpad.fleet.patterns.recurrence import keep_subjects, name_subjects, read_subjects
-from skidpad.fleet.patterns.series import VERSION, from_plain, series_of, to_plain
 from skidpad.fleet.service import CAME, Fleet
 from skidpad.fleet.store.events import add_event
 from skidpad.fleet.store.reading import record_of
 from skidpad.fleet.store.rights import visible
 from skidpad.fleet.store.tables import analyses, clusters, hazards, series
 from skidpad.fleet.words import Principal, absent
+from skidpad.recording.hazards.records import HazardRecord
 
 HAZARDS_MAX = 20_000  # newest hazards that one analysis looks at
 SERVICE = "analysis"  # actor of what nobody asked for
@@ -177,3 +181,52 @@ def cluster_row(connection: Connection, who: Principal, cluster: str) -> dict[st
         raise absent()
     content: dict[str, Any] = json.loads(row.content)
     return {"id": row.id, "analysis": row.analysis} | content
+
+
+# --- how a hazard went: signals of the rules over its record, as one series of fixed length
+
+
+Floats = NDArray[np.float64]
+POINTS = 20  # of a series; records have 11 s, so one point stands for about half a second
+VERSION = 1  # of what a series means; another one is computed anew
+# signal, what it is divided by, and what stands where there is no conflict or no value
+SIGNALS: tuple[tuple[Signal, float, float], ...] = (
+    (Signal.TTC_AHEAD, 10.0, 1.0),
+    (Signal.TTC_BEHIND, 10.0, 1.0),
+    (Signal.SAFETY_SCORE, 1.0, 1.0),
+    (Signal.GAP, 1.0, 0.0),
+    (Signal.EGO_LOCATION, 1.0, 1.0),
+    (Signal.CROSS_PATH, 1.0, 1.0),
+)
+
+
+def series_of(record: HazardRecord) -> Floats:
+    """The signals of a record's worlds, (POINTS, len(SIGNALS)) within [0, 1]."""
+    monitor = Monitor(record.channels, MonitorSettings(keep_worlds=False))
+    rows = [monitor.update(cycle).signals.values for cycle in record.worlds]
+    if not rows:
+        return np.tile([neutral for _, _, neutral in SIGNALS], (POINTS, 1))
+    table = np.array([[_scale_value(row[s], by, rest) for s, by, rest in SIGNALS] for row in rows])
+    return _resample_table(table)
+
+
+def _scale_value(value: float, by: float, neutral: float) -> float:
+    return neutral if np.isnan(value) else float(np.clip(value / by, 0.0, 1.0))
+
+
+def _resample_table(table: Floats) -> Floats:
+    """Means of POINTS equal stretches of a table (n, k); a short one repeats its rows."""
+    edges = np.linspace(0.0, len(table), POINTS + 1)
+    first = np.floor(edges[:-1]).astype(int)
+    last = np.maximum(np.ceil(edges[1:]).astype(int), first + 1)
+    return np.array([table[a:b].mean(axis=0) for a, b in zip(first, last, strict=True)])
+
+
+def to_plain(series: Floats) -> list[list[float]]:
+    """For JSON, in the resolution that it is compared in."""
+    return [[round(v, 4) for v in row] for row in series.tolist()]
+
+
+def from_plain(plain: Sequence[Sequence[float]]) -> Floats:
+    """Returns the array of `to_plain`'s values."""
+    return np.array(plain, dtype=np.float64).reshape(POINTS, len(SIGNALS))

@@ -38,8 +38,7 @@ from skidpad.report.elements.verdicts import (
 from skidpad.report.grip import figures as grip_figures
 from skidpad.report.grip import tables as grip_tables
 from skidpad.report.grip.data import GripCampaign, load_grip, scenario_title
-from skidpad.report.grip.rain import rain_tables
-from skidpad.report.grip.weathers import weather_blocks
+from skidpad.report.grip.weathers import rain_tables, weather_blocks
 from skidpad.roads.bundled import kept_map
 
 ALPHA = 0.05

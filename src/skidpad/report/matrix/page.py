@@ -15,7 +15,6 @@ from skidpad.report.elements.verdicts import unjudged_text, verdict_blocks
 from skidpad.report.matrix import figures as matrix_figures
 from skidpad.report.matrix import tables as matrix_tables
 from skidpad.report.matrix.answers import answers
-from skidpad.report.matrix.baseline import baseline_text
 from skidpad.report.matrix.comparisons.factors import factors
 from skidpad.report.matrix.comparisons.parity import Parity, load_parity, parity_section
 from skidpad.report.matrix.comparisons.published import beside_published
@@ -24,7 +23,7 @@ from skidpad.report.matrix.comparisons.steps import step_blocks
 from skidpad.report.matrix.crashes import Cell, crash_sections, found_crashes, worst_of_each
 from skidpad.report.matrix.data import Matrix, load_matrix
 from skidpad.report.matrix.envelope import envelope_blocks
-from skidpad.report.matrix.headline import headline_numbers, headline_table
+from skidpad.report.matrix.headline import baseline_text, headline_numbers, headline_table
 from skidpad.report.matrix.readings import reading_blocks
 from skidpad.report.matrix.real_time import real_time_blocks
 from skidpad.report.matrix.ways import way_blocks

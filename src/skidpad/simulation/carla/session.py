@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Iterable
 from dataclasses import replace
 from types import MappingProxyType
@@ -26,7 +27,6 @@ from skidpad.simulation.carla.lights import Programme, TrafficLights
 from skidpad.simulation.carla.odometry import Odometry
 from skidpad.simulation.carla.options import Optimisation
 from skidpad.simulation.carla.pictures import Pictures
-from skidpad.simulation.carla.ports import free_port
 from skidpad.simulation.carla.reader import Reader
 from skidpad.simulation.carla.scene import load_scene, release, synchronise
 from skidpad.simulation.carla.sensors import Sensors
@@ -257,3 +257,13 @@ class Session:
         commands = [self.carla.command.DestroyActor(actor) for actor in leaving]
         self.connection.client.apply_batch_sync(commands, False)
         release(self.world)
+
+
+# --- a port for the wheel's Traffic Manager, which listens on one of its own
+
+
+def free_port() -> int:
+    """Returns a TCP port that no program listens on now."""
+    with socket.socket() as probe:
+        probe.bind(("", 0))
+        return int(probe.getsockname()[1])

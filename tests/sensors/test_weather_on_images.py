@@ -15,6 +15,7 @@ from skidpad.core.vocabulary import (
     GripModel,
     LightState,
     RangeModel,
+    Scenery,
     SemanticClass,
 )
 from skidpad.core.weather import Weather
@@ -203,7 +204,7 @@ def test_weather_noise_spares_the_mask_only_where_a_cockpit_is_shown():
     table, states = traffic(world)
     night, nobody = preset("rain-night"), np.zeros(len(table), dtype=np.bool_)
     outside = Outside(weather=night, grip=GripModel.NONE, range_model=RangeModel.NONE)
-    shown = Studio(world, table, outside, 1, NO_EXTRAS)
+    shown = Studio(world, table, outside, 1, NO_EXTRAS, Scenery.NONE)
     read = PixelSuite(world, table, twelve_sensors(), night)
     for view, id in SENSOR.items():
         if not id.startswith("rgb"):

@@ -58,7 +58,8 @@ def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
         }
         return Shown(desk.outside, told)
 
-    screen = Screen(feed, link, stage_of(spec).map, shown, spec.seed, spec.surface)
+    map = stage_of(spec).map
+    screen = Screen(feed, link, map, shown, spec.seed, spec.surface, spec.scenery)
     time = CockpitPacer(link, screen.show, own_gc=about["own_gc"])
     try:
         driven = drive_at_desk(spec, desk, folder, (screen, time))

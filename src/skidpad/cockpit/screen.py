@@ -20,6 +20,7 @@ from skidpad.core.inputs import Outside
 from skidpad.core.setup import DT
 from skidpad.core.states import ActorTable
 from skidpad.core.surface import SurfacePatch
+from skidpad.core.vocabulary import Scenery
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.surface_outlines import outline_patches
 from skidpad.sensors.finish.extras import Extra
@@ -52,10 +53,12 @@ class Screen(Sink):
         ask: Callable[[], Shown],
         seed: int = 0,
         surface: Sequence[SurfacePatch] = (),
+        scenery: Scenery = Scenery.FULL,
     ) -> None:
-        """surface: what lies on parts of the road."""
+        """surface: what lies on parts of the road; scenery: what stands beside it."""
         self.outlines = outline_patches(map, surface)
         self.feed, self.link, self.map, self.ask, self.seed = feed, link, map, ask, seed
+        self.scenery = scenery
         self.shown = self.dropped = self.collisions = 0
         self.events: deque[tuple[float, str]] = deque(maxlen=TOLD_EVENTS)
         self._at = 0.0
@@ -65,7 +68,8 @@ class Screen(Sink):
 
     def begin(self, table: ActorTable) -> None:
         """The run begins, with these actors."""
-        self.studio = Studio(self.map, table, self.ask().outside, self.seed)
+        outside = self.ask().outside
+        self.studio = Studio(self.map, table, outside, self.seed, scenery=self.scenery)
         self.cameras, self.light = self.studio.suite.cameras, LightAhead(self.map)
 
     def follow_readings(self, latest: Callable[[], list[tuple[str, str]]]) -> None:

@@ -20,8 +20,9 @@ from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Outside
 from skidpad.core.specs import CameraSpec, Modality, SensorSpec
 from skidpad.core.states import ActorStates, ActorTable
-from skidpad.core.vocabulary import LightState
+from skidpad.core.vocabulary import LightState, Scenery
 from skidpad.roads.queries import RoadMap
+from skidpad.scenery.dressing import dress_map
 from skidpad.sensors.finish.extras import ALL_EXTRAS, Extra
 from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.sensors.suite import PixelSettings, PixelSuite
@@ -85,11 +86,15 @@ class Studio:
         outside: Outside,
         seed: int,
         extras: frozenset[Extra] = ALL_EXTRAS,
+        scenery: Scenery = Scenery.FULL,
     ) -> None:
+        """scenery: what stands beside the roads in these pictures, whatever the run had."""
         settings = PixelSettings(
             range_model=outside.range_model, seed=seed, in_cockpit=False, extras=extras
         )
-        self.suite = PixelSuite(map, table, cameras(), outside.weather, settings)
+        self.suite = PixelSuite(
+            dress_map(map, scenery), table, cameras(), outside.weather, settings
+        )
         self.outside = outside
         self.suite.change(outside)
 

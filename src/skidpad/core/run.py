@@ -19,7 +19,7 @@ from skidpad.core.settings import Settings, load_profile
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.surface import SurfacePatch
 from skidpad.core.told import on_a_line
-from skidpad.core.vocabulary import Govern, GripModel, SensorLevel, Stratum, TrafficStart
+from skidpad.core.vocabulary import Govern, GripModel, Scenery, SensorLevel, Stratum, TrafficStart
 from skidpad.core.weather import Weather
 
 VERSION = 2  # of config.yaml; folders without the word were written before there was one value
@@ -276,6 +276,13 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Render, Meta(description="needed: images that something reads; all: every image.")
     ] = Render.NEEDED
     overlay: Annotated[bool, Meta(description="Rain drops on the cameras (pixels).")] = False
+    scenery: Annotated[
+        Scenery,
+        Meta(
+            description="full: buildings, trees, lamps and more beside the roads, for all sensors "
+            "and contacts; none: only what the map's file names."
+        ),
+    ] = Scenery.NONE
     govern: Annotated[
         Govern,
         Meta(
@@ -363,7 +370,7 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         for name, value in msgspec.to_builtins(self, order="deterministic").items():
             if name == "settings":  # flat, as in a profile
                 plain |= {"profile": self.settings.profile, name: self.settings.to_plain()}
-            elif name != "surface" or value:  # so that runs without one are described as before
+            elif value not in LEFT_OUT.get(name, ()):
                 plain[name] = value
         if isinstance(self.driver, AdasDriver) and not self.driver.added:  # as before, too
             del plain["driver"]["added"]
@@ -376,6 +383,8 @@ def _pack_on_carla(course: Course, backend: BackendChoice) -> bool:
     return (packed or risky) and backend.backend == BackendKind.CARLA
 
 
+# fields that a description leaves out while they have these values, so that it is as before
+LEFT_OUT: dict[str, tuple[Any, ...]] = {"surface": ((), []), "scenery": (Scenery.NONE.value,)}
 OURS = "skidpad."  # stacks of this package are no foreign code
 _DIGITS: dict[type[Struct], int] = {Roads: 3, Scenario: 6, Route: 5}  # of the seed in a name
 

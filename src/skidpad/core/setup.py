@@ -16,6 +16,7 @@ from skidpad.core.vocabulary import (
     LidarModel,
     RadarModel,
     RangeModel,
+    Scenery,
     SensorLevel,
     Stratum,
     TrafficStart,
@@ -97,6 +98,7 @@ class Setup:
     asked: frozenset[str] = frozenset()  # ids among specs whose readings go to `frame.extra` (L-3)
     render_all: bool = False  # every image every tick, read or not
     patches: tuple[SurfacePatch, ...] = ()
+    scenery: Scenery = Scenery.NONE  # beside the roads (embedded backend)
     localisation_noise: float = 0.0  # m, standard deviation of the ego's x and y; 0: exact (L-3)
     dt: float = DT
 

@@ -103,6 +103,13 @@ class RelocationReason(IntEnum):
     ROAD_END = 5  # the map ends there: no driver's fault
 
 
+class Scenery(str, Enum):
+    """What is generated beside the roads of a map (decision T-14)."""
+
+    NONE = "none"  # only what its file names
+    FULL = "full"  # buildings, trees, lamps, hedges, kerbs, by the type of the road
+
+
 class Outcome(str, Enum):
     """How a run ended; the last three leave every denominator, counted (decision L-7)."""
 

@@ -27,6 +27,23 @@ class Barrier:
     height: float  # m
 
 
+class Shape(IntEnum):
+    """What fills a box; a camera and a ray see the shape, contacts and object lists the box."""
+
+    BOX = 0
+    BLOCK = 1  # a building with rows of windows and a flat roof
+    HOUSE = 2  # one with windows and a gable roof along its length
+    POST = 3  # round
+    CROWN = 4  # of a broad-leaved tree
+    CONE = 5  # of a conifer
+    LAMP = 6  # a lantern, which shines at night
+    HEDGE = 7
+    WOOD = 8  # the edge of a wood
+    SHELTER = 9  # of a bus stop
+    CAR = 10  # parked
+    FENCE = 11
+
+
 @dataclass(frozen=True, slots=True)
 class Box:
     """A building, a gantry leg or beam, a pole, a sign plate: an upright box."""
@@ -41,6 +58,8 @@ class Box:
     height: float
     solid: bool = True  # hit by vehicles
     rgb: tuple[int, int, int] = (128, 128, 128)
+    shape: Shape = Shape.BOX  # of generated scenery; boxes of a file are boxes
+    variant: int = 0  # of the shape: which windows, which roof
 
 
 @dataclass(frozen=True, slots=True)

@@ -106,7 +106,8 @@ class PixelSuite:
         sight = Sight(depth_range(weather), labels) if limited else UNLIMITED
         light = lighting(weather, beam)
         snowed = Extra.SNOW in settings.extras
-        self.shading = Shading(self.scene.static.palette, self._table, light, snowed)
+        static = self.scene.static
+        self.shading = Shading(static.palette, self._table, light, snowed, static.grain)
         if settings.extras:
             self._finish.look_out(weather, light)
         self._passes: dict[tuple[object, Sight], Pass] = {}

@@ -277,6 +277,7 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
         level=spec.sensors,
         render_all=spec.render is Render.ALL or _foreign_on_carla(spec),
         patches=spec.surface,
+        scenery=spec.scenery,
     )
 
 

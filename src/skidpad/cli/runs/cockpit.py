@@ -15,6 +15,7 @@ from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.run import Roads, RunSpec, Scenario
 from skidpad.core.setup import VEHICLES_MAX
 from skidpad.core.simulator import BackendChoice, BackendKind
+from skidpad.core.vocabulary import Scenery
 
 if TYPE_CHECKING:
     from skidpad.pages.server import Place
@@ -40,7 +41,7 @@ class OnClose(str, Enum):
     PAUSE = "pause"
 
 
-@spread_fields(duration=3600.0)
+@spread_fields(duration=3600.0, scenery=Scenery.FULL)
 def drive(
     drivers: Drivers,
     run: RunSpec,

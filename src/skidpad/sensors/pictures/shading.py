@@ -1,4 +1,4 @@
-"""RGB from key and depth: no second raster pass, no textures, no shadows.
+"""RGB from key and depth: no second raster pass, no shadows; unevenness by `sensors.grain`.
 
 The normal of a surface is read off its inverse depth: on a plane, inverse depth is linear in the
 pixel, and its two slopes are the normal. Light is linear inside and leaves by a square root.
@@ -38,8 +38,10 @@ from skidpad.sensors.pictures.blocks import (
     slopes,
 )
 from skidpad.sensors.pictures.lighting import Lighting
+from skidpad.sensors.pictures.roughness import MORE_LANES, TILES, roughen
 from skidpad.sensors.pictures.sky import disc, sky
 from skidpad.sensors.raster.view import View
+from skidpad.sensors.scene.grain import NO_GRAIN
 from skidpad.sensors.scene.materials import ACTOR_PAINTED, EMISSIVE, MATERIALS, Material
 
 ROADLIKE = (Material.ASPHALT, Material.SHOULDER, Material.MARKING, Material.SIDEWALK)
@@ -58,13 +60,22 @@ class Shading:
     """Colours of all actors and materials in one weather; `paint` makes a picture."""
 
     def __init__(
-        self, palette: Float32, table: ActorTable, light: Lighting, snow_on_road: bool = False
+        self,
+        palette: Float32,
+        table: ActorTable,
+        light: Lighting,
+        snow_on_road: bool = False,
+        grain: Float32 = NO_GRAIN,
     ) -> None:
-        """snow_on_road: for people; what a stack reads has snow beside the road only."""
+        """snow_on_road: for people; what a stack reads has snow beside the road only.
+
+        grain: of the scene (`StaticScene.grain`).
+        """
+        self._grain = grain * np.float32(1.0 - 0.6 * light.snow)
         self.light = light
         self._table = _look_up(palette, table, light, snow_on_road)
         self._plain_tail = self._table.reshape(-1, MATERIALS, COLUMNS)[0, Material.TAIL_LAMP].copy()
-        self._work = np.zeros(LANES * BLOCK, dtype=np.float32)
+        self._work = np.zeros((LANES + MORE_LANES) * BLOCK, dtype=np.float32)
         self._braking = np.zeros(len(table), dtype=np.bool_)
 
     def set_braking(self, braking: NDArray[np.bool_]) -> None:
@@ -105,6 +116,8 @@ class Shading:
             np.ascontiguousarray(body.T @ r.T, dtype=np.float32),
             (body.T @ (view.centre - (ego.x, ego.y, ego.z))).astype(np.float32),
             self._table,
+            self._grain,
+            TILES,
             self._work,
             inverse,
             key,
@@ -130,6 +143,7 @@ def _look_up(palette: Float32, table: ActorTable, light: Lighting, snow_on_road:
             out[:, material, :3] += SNOW_LEFT * light.snow * (SNOW - out[:, material, :3])
     out[:, Material.HEADLAMP, GLOW] = 0.9 * light.lamps
     out[:, Material.TAIL_LAMP, GLOW] = 0.8 * light.lamps
+    out[:, Material.LIT_WINDOW, GLOW] = 1.6 * light.lamps  # of a dull pane, so about a third
     return out.reshape(-1, COLUMNS)
 
 
@@ -281,6 +295,8 @@ def shade(
     to_body: Float32,
     offset: Float32,
     table: Float32,
+    grain: Float32,
+    tiles: Float32,
     work: Float32,
     inverse: Float32,
     key: NDArray[np.int32],
@@ -299,6 +315,8 @@ def shade(
             solid, empty = slopes(inverse, y, first, count, view, work)
             if solid:
                 gather(key, y, first, count, table, work)
+                if grain.shape[0] > 0:
+                    roughen(view, v, count, key[y, first : first + count], grain, tiles, work)
                 if light.headlights > 0.0:
                     if behind_lamps(view, v, first, count, to_body, offset[0] - _LAMP_X):
                         work[H : H + BLOCK] = ZERO

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import SemanticClass
-from skidpad.roads.roadside import Barrier, BarrierKind, Box, Roadside, SignalHead
+from skidpad.roads.roadside import Barrier, BarrierKind, Box, Roadside, Shape, SignalHead
 from skidpad.sensors.scene.materials import Material
 from skidpad.sensors.scene.mesh import Mesh, Points, box, disc, merge, ribbon
 from skidpad.sensors.scene.road_mesh import CHORDS, CHUNK, LEVELS, MARKING_LIFT, ChunkKey
+from skidpad.sensors.scene.shapes import shape_levels
 
 RAIL_DEPTH = 0.31  # m, height of a W-beam's face, EN 1317 systems
 POST_SPACING = 4.0  # m
@@ -40,7 +41,7 @@ def furniture_pieces(roadside: Roadside, box_material: dict[tuple[int, int, int]
     for barrier in roadside.barriers:
         yield from _barrier(barrier)
     for thing in roadside.boxes:
-        yield cell(thing.x, thing.y), [_box(thing, box_material[thing.rgb])] * LEVELS
+        yield cell(thing.x, thing.y), _box(thing, box_material[thing.rgb])
     for head in roadside.heads:
         yield cell(head.x, head.y), [_housing(head)] * LEVELS
     for polygon in roadside.crosswalks:
@@ -102,11 +103,15 @@ def _post(foot: Points, height: float) -> Mesh:
     )
 
 
-def _box(thing: Box, material: int) -> Mesh:
-    a, b = thing.length / 2, thing.width / 2
-    upright = box((-a, a), (-b, b), (0.0, thing.height), thing.label, material)
-    pose = Pose(thing.x, thing.y, thing.z, yaw=thing.yaw)
-    return upright.moved(pose.rotation(), np.array([thing.x, thing.y, thing.z]))
+def _box(thing: Box, material: int) -> list[Mesh]:
+    """Returns one mesh per level."""
+    rotation = Pose(thing.x, thing.y, thing.z, yaw=thing.yaw).rotation()
+    place = np.array([thing.x, thing.y, thing.z])
+    if thing.shape is Shape.BOX:
+        a, b = thing.length / 2, thing.width / 2
+        upright = box((-a, a), (-b, b), (0.0, thing.height), thing.label, material)
+        return [upright.moved(rotation, place)] * LEVELS
+    return [mesh.moved(rotation, place) for mesh in shape_levels(thing, material)]
 
 
 def _facing(head: SignalHead, mesh: Mesh) -> Mesh:

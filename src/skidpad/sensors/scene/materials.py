@@ -46,6 +46,9 @@ class Material(IntEnum):
     CLOTH = 26  # coloured by the actor's own paint
     CARGO = 27
     MEDIAN = 28
+    LIT_WINDOW = 29  # shines at night
+    ROOF = 30
+    FRAME = 31  # of doors and windows
     FIRST_FREE = 32
 
 
@@ -79,6 +82,9 @@ BASE_COLOUR: dict[Material, tuple[int, int, int]] = {
     Material.CLOTH: (128, 128, 128),
     Material.CARGO: (214, 214, 210),
     Material.MEDIAN: (106, 124, 70),
+    Material.LIT_WINDOW: (122, 112, 88),
+    Material.ROOF: (126, 74, 58),
+    Material.FRAME: (196, 194, 188),
 }
 
 # Lamps shine of themselves: neither sun nor headlights change them.

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from skidpad.core.vocabulary import LightState
 from skidpad.roads.lanes import LaneSamples, LaneTable
-from skidpad.roads.roadside import Roadside
+from skidpad.roads.roadside import Roadside, Shape
 from skidpad.sensors.scene.clusters import Clusters, cluster
 from skidpad.sensors.scene.furniture import cell, furniture_pieces, lamp_mesh
+from skidpad.sensors.scene.grain import NO_GRAIN, grain_table
 from skidpad.sensors.scene.ground import ground_pieces
 from skidpad.sensors.scene.materials import MATERIALS, Material, base_palette
 from skidpad.sensors.scene.mesh import Mesh, merge
@@ -59,6 +60,7 @@ class StaticScene:
     chunks: Chunks
     lamps: Lamps
     palette: NDArray[np.float32]  # (256, 3) sRGB grey levels by material
+    grain: NDArray[np.float32]  # unevenness by material; of dressed maps only
 
     def lamp_keys(self, lights: Mapping[int, LightState]) -> NDArray[np.int32]:
         """(n,) keys of the lamp triangles while the lights show these states."""
@@ -92,7 +94,17 @@ def build_scene(samples: LaneSamples, lanes: LaneTable, roadside: Roadside) -> S
         for key, parts in grouped.items()
     }
     chunks = pack(blocks.values())
-    return StaticScene(chunks, _find_lamps(chunks, roadside, blocks, grouped), palette)
+    lamps_found = _find_lamps(chunks, roadside, blocks, grouped)
+    return StaticScene(chunks, lamps_found, palette, _grain_of(roadside, box_material))
+
+
+def _grain_of(
+    roadside: Roadside, box_material: Mapping[tuple[int, int, int], int]
+) -> NDArray[np.float32]:
+    """Returns how uneven materials look on a map with generated things; empty on any other."""
+    if all(b.shape is Shape.BOX for b in roadside.boxes):
+        return NO_GRAIN
+    return grain_table((b.label, box_material[b.rgb]) for b in roadside.boxes)
 
 
 def pack(blocks: Iterable[list[Mesh]]) -> Chunks:

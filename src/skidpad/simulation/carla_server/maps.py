@@ -11,10 +11,12 @@ from shapely.errors import ShapelyError
 from skidpad.core.errors import ConfigError, SkidpadError
 from skidpad.core.geodesy import client_geolocation
 from skidpad.core.geometry import Pose
+from skidpad.core.vocabulary import Scenery
 from skidpad.roads.bundled import bundled_maps, load_map, map_file
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.walkable import walk_mesh
+from skidpad.scenery.dressing import dress_map
 from skidpad.sensors.inertial import map_origin
 from skidpad.simulation.carla_server import navmesh
 from skidpad.simulation.carla_server.rpc import CallError
@@ -86,8 +88,9 @@ def _navigation(name: str, roads: RoadMap) -> tuple[str, bytes] | None:
 class MapStore:
     """Finds maps by name: built in, in a folder, or sent by a client."""
 
-    def __init__(self, folder: Path | None = None) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path | None = None, scenery: Scenery = Scenery.NONE) -> None:
+        """scenery: what is generated beside the roads of all maps."""
+        self.folder, self.scenery = folder, scenery
         self._text: str | None = None  # from copy_opendrive_to_file
 
     def names(self) -> list[str]:
@@ -111,13 +114,13 @@ class MapStore:
         if short == OPENDRIVE_MAP:
             if self._text is None:
                 raise CallError("no OpenDRIVE text was sent")
-            return _make_served_map(short, roads_from_text(self._text, short), self._text)
+            roads = dress_map(roads_from_text(self._text, short), self.scenery)
+            return _make_served_map(short, roads, self._text)
         path = self._path(short)
         if path is None:
             raise CallError(f"map not found: {name}")
-        return _make_served_map(
-            short, load_map(path), path.read_text(encoding="utf-8", errors="replace")
-        )
+        roads = dress_map(load_map(path), self.scenery)
+        return _make_served_map(short, roads, path.read_text(encoding="utf-8", errors="replace"))
 
     def _path(self, name: str) -> Path | None:
         names = self._plain_names()

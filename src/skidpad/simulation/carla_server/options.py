@@ -7,7 +7,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from skidpad.core.vocabulary import GripModel
+from skidpad.core.vocabulary import GripModel, Scenery
 
 MU_REF = 1.5  # of a tyre with tire_friction 3.5 on a dry road, near CARLA's (decision K-3)
 
@@ -21,6 +21,12 @@ class ServerOptions(Struct, frozen=True, kw_only=True):
     )
     map: Annotated[str, Meta(description="Map to begin with.")] = "figure8"
     maps: Annotated[Path | None, Meta(description="Folder of your own .xodr files.")] = None
+    scenery: Annotated[
+        Scenery,
+        Meta(
+            description="full: buildings, trees, lamps beside the roads; none: the file's objects."
+        ),
+    ] = Scenery.FULL
     weather_grip: Annotated[GripModel, Meta(description="How weather acts on tyres.")] = (
         GripModel.PHYSICAL
     )

@@ -29,7 +29,7 @@ class Served:
 
     def __init__(self, options: ServerOptions, hub: StreamHub) -> None:
         self.options, self.hub = options, hub
-        self.maps = MapStore(options.maps)
+        self.maps = MapStore(options.maps, options.scenery)
         self.stock = Stock(options, hub)
         self.clock = Clock()
         self.recorder = Recorder(options.data_dir)

@@ -7,6 +7,7 @@ from skidpad.core.setup import Setup, TrafficSetup
 from skidpad.core.vocabulary import Control
 from skidpad.physics.grip import road_of
 from skidpad.roads.bundled import load_map
+from skidpad.scenery.dressing import dress_map
 from skidpad.simulation.world.actors import Role, cast_of, place_of
 from skidpad.simulation.world.lights import Lights
 from skidpad.simulation.world.patches import LaneFrictions, Patches
@@ -18,7 +19,7 @@ from skidpad.simulation.world.world import EGO, Conditions, World
 
 def staged(setup: Setup, seed: int) -> World:
     """A world at the beginning of a run."""
-    map = load_map(setup.map)
+    map = dress_map(load_map(setup.map), setup.scenery)
     roles = cast_of(map, setup, seed)
     road = road_of(setup)
     grip = road.params()

@@ -47,7 +47,8 @@ class Pictured:
         """The light of this weather."""
         if self.weather is not weather:
             self.weather = weather
-            self.shading = Shading(self.live.static.palette, self.bodies, lighting(weather))
+            static, light = self.live.static, lighting(weather)
+            self.shading = Shading(static.palette, self.bodies, light, grain=static.grain)
 
 
 class Surroundings:

@@ -1,0 +1,1 @@
+"""What stands beside the roads where their file names nothing, drawn by the map's content (T-14)."""

@@ -1,0 +1,86 @@
+"""A map with its scenery: the same roads, and more beside them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from skidpad.core.geometry import footprint
+from skidpad.core.randomness import stream
+from skidpad.core.vocabulary import Scenery
+from skidpad.roads.lanes import LaneKind, LaneSamples, LaneTable, Marking
+from skidpad.roads.queries import RoadMap
+from skidpad.roads.roadside import Box
+from skidpad.roads.terrain import Terrain, terrain_of
+from skidpad.scenery.room import Room
+from skidpad.scenery.rows import backdrop_of, rows_of
+from skidpad.scenery.sides import sides_of
+from skidpad.scenery.things import Thing
+
+EDITION = 1  # of what is generated; raise it when the same map gets other things
+SUNK = 0.3  # m that things reach into the ground, whose triangles are coarse
+
+
+def dress_map(map: RoadMap, scenery: Scenery) -> RoadMap:
+    """Returns the map with this scenery; the map itself for none."""
+    return map if scenery is Scenery.NONE else _dress_fully(map)
+
+
+@lru_cache(maxsize=4)
+def _dress_fully(map: RoadMap) -> RoadMap:
+    dressed = copy(map)
+    boxes = boxes_of(things_of(map), terrain_of(map.samples))
+    dressed.roadside = replace(map.roadside, boxes=(*map.roadside.boxes, *boxes))
+    dressed.samples = name_kerbs(map.samples, map.lanes)
+    dressed.content_hash = f"{map.content_hash} with scenery {EDITION}"
+    return dressed
+
+
+def things_of(map: RoadMap) -> list[Thing]:
+    """Returns what stands beside the roads of a map; the same for the same content."""
+    seed = int(map.content_hash[:15], 16)
+    sides = sides_of(map.samples, map.lanes)
+    found: list[Thing] = []
+    for rows, name in ((rows_of, "rows"), (backdrop_of, "backdrop")):
+        for side in sides:
+            found += rows(side, stream(seed, "scenery", name, side.road, int(side.is_left)))
+    if not found:
+        return []
+    return Room(map.samples, map.lanes, map.roadside).place(found)
+
+
+def boxes_of(things: Sequence[Thing], terrain: Terrain) -> list[Box]:
+    """Returns the boxes of the things, each on the ground below it."""
+    corners = np.array([[*footprint(*t.outline), t.outline[:2]] for t in things]).reshape(-1, 5, 2)
+    ground = terrain.at(corners[..., 0].ravel(), corners[..., 1].ravel()).reshape(-1, 5)
+    foot = np.round(ground.min(axis=1), 3) - SUNK
+    slope = np.round(ground[:, 4], 3) - foot
+    found = []
+    for thing, z, rise in zip(things, foot.tolist(), slope.tolist(), strict=True):
+        for box in thing.boxes:
+            low = z if box.z == 0.0 else z + rise + box.z
+            height = box.height + (rise if box.z == 0.0 else 0.0)
+            found.append(replace(box, z=round(low, 3), height=round(height, 3)))
+    return found
+
+
+def count_things(things: Sequence[Thing]) -> dict[str, int]:
+    """Returns how many of each there are, by name."""
+    return dict(sorted(Counter(t.name for t in things).items()))
+
+
+def name_kerbs(samples: LaneSamples, lanes: LaneTable) -> LaneSamples:
+    """Returns the samples with kerbs where sidewalks begin; paint on the lane beside them stays."""
+    walks = np.isin(samples.lane, np.flatnonzero(lanes.kind == LaneKind.SIDEWALK))
+    ends = lanes.first + lanes.size - 1
+    is_along = samples.s_road[ends] >= samples.s_road[lanes.first]
+    road_is_left = ((lanes.lane_id < 0) == is_along)[samples.lane]
+    left, right = samples.marking_left.copy(), samples.marking_right.copy()
+    left[walks & road_is_left] = Marking.CURB
+    right[walks & ~road_is_left] = Marking.CURB
+    return samples._replace(marking_left=left, marking_right=right)

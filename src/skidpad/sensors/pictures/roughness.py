@@ -1,0 +1,120 @@
+"""Unevenness of surfaces in colour pictures: noise by place in the world, stronger on some materials.
+
+Only maps with generated scenery have it; on others the table is empty and nothing is computed.
+Depth and classes know nothing of it. Strengths are chosen by eye.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from skidpad.core.jit import inner_kernel
+from skidpad.sensors.pictures.blocks import (
+    BLOCK,
+    LANES,
+    ONE,
+    ZERO,
+    B,
+    Float32,
+    G,
+    R,
+    U,
+    W,
+    end_of_run,
+)
+from skidpad.sensors.raster.view import View
+
+MORE_LANES = 3  # of the array of a block, behind those of shading
+SIZE = 256  # texels of a tile's edge, a power of two
+FINE, COARSE = 0.04, 0.6  # m, a texel of grains and one of patches
+
+
+def _make_tiles() -> Float32:
+    """(3 * SIZE * SIZE,) grains, then patches and tints in turn: mean 0, deviation a third."""
+    rng = np.random.default_rng(20)
+    tiles = np.empty((3, SIZE, SIZE), dtype=np.float32)
+    coarse = (1.0, 3.5, 10.0)
+    for tile, widths in zip(tiles, ((0.0, 1.2, 3.0), coarse, coarse), strict=True):
+        total = np.zeros((SIZE, SIZE))
+        for width in widths:
+            noise = rng.standard_normal((SIZE, SIZE))
+            smooth = ndimage.gaussian_filter(noise, width, mode="wrap") if width else noise
+            total += smooth / smooth.std()
+        tile[:] = np.clip(total / (3.0 * total.std()), -1.0, 1.0)
+    return np.concatenate([tiles[0].ravel(), np.stack(list(tiles[1:]), axis=-1).ravel()])
+
+
+TILES = _make_tiles()
+
+A, C, F = (np.intp((LANES + n) * BLOCK) for n in range(MORE_LANES))
+_PATCHES, _TWO, _NEXT = np.uint64(SIZE * SIZE), np.uint64(2), np.uint64(1)
+_SIZE, _PER_SIZE = np.float32(SIZE), np.float32(1.0 / SIZE)
+_PER_FINE, _PER_COARSE = np.float32(1.0 / FINE), np.float32(1.0 / COARSE)
+_LEAN_X, _LEAN_Y = np.float32(0.37), np.float32(0.91)  # m per m of height, so that walls vary too
+_NEAR = np.float32(9.0)  # m beyond which grains fade
+_SPREAD = np.float32(0.7)  # m by which grains blur the edges of patches
+_FARTHEST = np.float32(1e-5)
+_LEAST = np.float32(0.25)
+_GREEN = np.float32(0.35)
+
+
+@inner_kernel
+def _texel(a: np.float32, b: np.float32) -> np.float32:
+    """Index of a place, in texels, in a tile that repeats; floats hold it exactly."""
+    i, j = np.floor(a), np.floor(b)
+    i -= _SIZE * np.floor(i * _PER_SIZE)
+    j -= _SIZE * np.floor(j * _PER_SIZE)
+    index: np.float32 = i * _SIZE + j
+    return index
+
+
+@inner_kernel
+def roughen(
+    view: View, v: np.float32, count: int, keys: NDArray[np.int32], grain: Float32, tiles: Float32,
+    work: Float32,
+) -> None:  # fmt: skip
+    """Change the colours of a block's surfaces by where in the world they lie."""
+    r = view.rotation
+    x_u, x_1 = np.float32(r[0, 0]), np.float32(r[1, 0]) * v + np.float32(r[2, 0])
+    y_u, y_1 = np.float32(r[0, 1]), np.float32(r[1, 1]) * v + np.float32(r[2, 1])
+    z_u, z_1 = np.float32(r[0, 2]), np.float32(r[1, 2]) * v + np.float32(r[2, 2])
+    a_u, a_1 = x_u + _LEAN_X * z_u, x_1 + _LEAN_X * z_1
+    b_u, b_1 = y_u + _LEAN_Y * z_u, y_1 + _LEAN_Y * z_1
+    height = np.float32(view.centre[2])
+    a_0 = np.float32(view.centre[0]) + _LEAN_X * height
+    b_0 = np.float32(view.centre[1]) + _LEAN_Y * height
+    x = 0
+    while x < count:
+        m, end = keys[x] & 255, end_of_run(keys, x)
+        grains, patches, tints = grain[m, 0], grain[m, 1], grain[m, 2]
+        run, size = work[x:], end - x
+        x = end
+        if patches == ZERO:
+            continue
+        for n in range(size):  # reading a tile may not stand in a loop that shall be vectorised
+            u, w = run[U + n], run[W + n]
+            z = ONE / (w if w > _FARTHEST else _FARTHEST)
+            run[A + n], run[C + n] = a_0 + z * (a_u * u + a_1), b_0 + z * (b_u * u + b_1)
+            run[F + n] = _texel(run[A + n] * _PER_FINE, run[C + n] * _PER_FINE)
+        for n in range(size):
+            run[F + n] = tiles[np.uint64(run[F + n])]
+        for n in range(size):
+            blur = run[F + n] * _SPREAD
+            run[A + n] = _texel(
+                (run[A + n] + blur) * _PER_COARSE, (run[C + n] - blur) * _PER_COARSE
+            )
+        for n in range(size):
+            at = _PATCHES + _TWO * np.uint64(run[A + n])
+            run[A + n] = tiles[at]
+            run[C + n] = tiles[at + _NEXT]
+        for n in range(size):
+            fade = _NEAR * run[W + n]
+            fade = fade if fade < ONE else ONE
+            share = ONE + grains * fade * run[F + n] + patches * run[A + n]
+            share = share if share > _LEAST else _LEAST
+            hue = tints * run[C + n]
+            run[R + n] *= share + hue
+            run[G + n] *= share + _GREEN * hue
+            run[B + n] *= share - hue

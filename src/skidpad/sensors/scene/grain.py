@@ -1,0 +1,41 @@
+"""How uneven materials look in colour pictures of maps with generated scenery, by eye."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.vocabulary import SemanticClass
+from skidpad.sensors.scene.materials import MATERIALS, Material
+
+Float32 = NDArray[np.float32]
+
+NO_GRAIN = np.zeros((0, 3), dtype=np.float32)
+
+# shares by which grains, patches and tints change a colour: about three standard deviations
+GRAIN: dict[Material, tuple[float, float, float]] = {
+    Material.ASPHALT: (0.16, 0.30, 0.04),
+    Material.SHOULDER: (0.18, 0.30, 0.05),
+    Material.MARKING: (0.10, 0.24, 0.03),
+    Material.GRASS: (0.34, 0.50, 0.20),
+    Material.EMBANKMENT: (0.34, 0.50, 0.22),
+    Material.MEDIAN: (0.34, 0.46, 0.18),
+    Material.SIDEWALK: (0.10, 0.22, 0.04),
+    Material.CONCRETE: (0.08, 0.20, 0.03),
+    Material.KERB: (0.10, 0.22, 0.03),
+    Material.FENCE: (0.12, 0.20, 0.05),
+    Material.ROOF: (0.16, 0.24, 0.07),
+}
+LEAVES, WALLS = (0.60, 0.46, 0.12), (0.07, 0.26, 0.05)
+
+
+def grain_table(boxes: Iterable[tuple[int, int]]) -> Float32:
+    """(256, 3) strengths by material; boxes: class and material of what stands beside the road."""
+    table = np.zeros((MATERIALS, 3), dtype=np.float32)
+    for material, strengths in GRAIN.items():
+        table[material] = strengths
+    for label, material in boxes:
+        table[material] = LEAVES if label == SemanticClass.VEGETATION else WALLS
+    return table

@@ -1,0 +1,167 @@
+"""Meshes of the shapes that fill boxes of generated scenery, at every level of detail.
+
+Frame of a box: x along its length, y across, z up from its foot. A mesh stays inside its box.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+
+import numpy as np
+
+from skidpad.core.vocabulary import ActorKind, SemanticClass
+from skidpad.roads.roadside import Box, Shape
+from skidpad.sensors.scene.bodies import body_mesh
+from skidpad.sensors.scene.facades import block_levels, house_levels
+from skidpad.sensors.scene.materials import Material
+from skidpad.sensors.scene.mesh import Mesh, Points, box, loft, merge, ribbon
+from skidpad.sensors.scene.road_mesh import LEVELS
+
+Rng = np.random.Generator
+SIDES = (8, 6, 5, 4)  # of round things, by level
+RINGS = (6, 5, 4, 3)  # of crowns
+
+
+def shape_levels(thing: Box, material: int) -> list[Mesh]:
+    """Returns one mesh per level of detail; the nearest comes first."""
+    return SHAPES[thing.shape](thing, material)
+
+
+def _post(thing: Box, material: int) -> list[Mesh]:
+    def one(level: int) -> Mesh:
+        rings = np.stack([_ring(thing, SIDES[level], z) for z in (0.0, thing.height)])
+        return loft(rings, thing.label, material)
+
+    return [one(max(level, 1)) for level in range(LEVELS)]
+
+
+def _ring(thing: Box, sides: int, z: float, share: float = 1.0) -> Points:
+    angle = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides
+    x = 0.5 * thing.length * share * np.cos(angle)
+    y = 0.5 * thing.width * share * np.sin(angle)
+    return np.stack([x, y, np.full(sides, z)], axis=1)
+
+
+def _crown(thing: Box, material: int) -> list[Mesh]:
+    """A lump of leaves: rings of uneven radius, most in the lower middle."""
+
+    def one(level: int) -> Mesh:
+        rng = np.random.default_rng(thing.variant)
+        heights = np.linspace(0.0, 1.0, RINGS[level])
+        rings = []
+        for h in heights:
+            share = (1.0 - abs(2.0 * h - 0.85) ** 2.2 / 2.6) * (0.35 if h in (0.0, 1.0) else 0.97)
+            uneven = rng.uniform(0.78, 1.0, SIDES[level])[:, None]
+            ring = _ring(thing, SIDES[level], h * thing.height, share)
+            ring[:, :2] *= uneven
+            rings.append(ring)
+        return loft(np.array(rings), thing.label, material)
+
+    return [one(level) for level in range(LEVELS)]
+
+
+def _cone(thing: Box, material: int) -> list[Mesh]:
+    """A conifer: skirts of branches one above the other."""
+
+    def one(level: int) -> Mesh:
+        tiers = 4 - level
+        steps = np.linspace(0.0, 1.0, tiers + 1)
+        rings = []
+        for low, high in itertools.pairwise(steps):
+            rings.append(_ring(thing, SIDES[level], low * thing.height, 1.0 - 0.86 * low))
+            share = max(0.55 * (1.0 - low) * (1.0 - 0.3 * high), 0.04) if high < 1.0 else 0.03
+            rings.append(_ring(thing, SIDES[level], high * thing.height, share))
+        return loft(np.array(rings), thing.label, material)
+
+    return [one(min(level, 3)) for level in range(LEVELS)]
+
+
+def _lamp(thing: Box, material: int) -> list[Mesh]:
+    a, b, h = thing.length / 2, thing.width / 2, thing.height
+    lid = box((-a, a), (-b, b), (0.4 * h, h), thing.label, material)
+    pane = box(
+        (-0.8 * a, 0.8 * a), (-0.8 * b, 0.8 * b), (0.0, 0.4 * h), thing.label, Material.HEADLAMP
+    )
+    return [merge([lid, pane])] * LEVELS
+
+
+def _lump(thing: Box, material: int, step: float, rough: float) -> list[Mesh]:
+    """A row of bushes or trees: cross-sections of uneven height, width and top."""
+
+    def one(level: int) -> Mesh:
+        rng = np.random.default_rng(thing.variant)
+        n = max(int(thing.length / (step * (1.0, 1.5, 2.0, 3.0)[level])), 2) + 1
+        x = np.linspace(-0.5, 0.5, n) * thing.length
+        high = rng.uniform(1.0 - rough, 1.0, n) * thing.height
+        wide = rng.uniform(1.0 - 0.5 * rough, 1.0, (n, 2)) * thing.width / 2.0
+        high[[0, -1]] *= 0.85
+        rings = np.empty((n, 6, 3))
+        rings[:, :, 0] = x[:, None]
+        rings[:, 0, 1:] = np.stack([wide[:, 0], np.zeros(n)], axis=1)
+        rings[:, 1, 1:] = np.stack([wide[:, 0] * 0.97, 0.62 * high], axis=1)
+        rings[:, 2, 1:] = np.stack([wide[:, 0] * 0.55, high * rng.uniform(0.9, 1.0, n)], axis=1)
+        rings[:, 3, 1:] = np.stack([-wide[:, 1] * 0.55, high], axis=1)
+        rings[:, 4, 1:] = np.stack([-wide[:, 1] * 0.97, 0.62 * high], axis=1)
+        rings[:, 5, 1:] = np.stack([-wide[:, 1], np.zeros(n)], axis=1)
+        return loft(rings, thing.label, material)
+
+    return [one(level) for level in range(LEVELS)]
+
+
+def _hedge(thing: Box, material: int) -> list[Mesh]:
+    return _lump(thing, material, 1.2, 0.18)
+
+
+def _wood(thing: Box, material: int) -> list[Mesh]:
+    return _lump(thing, material, 3.2, 0.5)
+
+
+def _shelter(thing: Box, material: int) -> list[Mesh]:
+    a, b, h = thing.length / 2, thing.width / 2, thing.height
+    roof = box((-a, a), (-b, b), (h - 0.12, h), thing.label, Material.TRIM)
+    back = box((-a, a), (-0.04, 0.04), (0.3, h - 0.2), thing.label, material)
+    posts = [
+        box((x - 0.05, x + 0.05), (y - 0.05, y + 0.05), (0.0, h - 0.1), thing.label, Material.STEEL)
+        for x in (-a + 0.06, a - 0.06) for y in (-b + 0.06, b - 0.06)
+    ]  # fmt: skip
+    bench = box((-0.7 * a, 0.7 * a), (0.08, 0.45), (0.72, 0.78), thing.label, Material.FENCE)
+    return [merge([roof, back, bench, *posts])] * LEVELS
+
+
+def _car(thing: Box, material: int) -> list[Mesh]:
+    body = body_mesh(ActorKind.CAR, thing.length, thing.width, thing.height)
+    painted = np.where(body.material == Material.PAINT, np.uint8(material), body.material)
+    return [body._replace(material=painted.astype(np.uint8))] * LEVELS
+
+
+def _fence(thing: Box, material: int) -> list[Mesh]:
+    a, h, label = thing.length / 2, thing.height, SemanticClass.FENCE
+    ends = np.array([[-a, 0.0, 0.0], [a, 0.0, 0.0]])
+
+    def rail(low: float, high: float) -> Mesh:
+        up, down = np.array([0.0, 0.0, high * h]), np.array([0.0, 0.0, low * h])
+        return ribbon(ends + up, ends + down, label, material)
+
+    posts = [
+        box((x - 0.05, x + 0.05), (-0.05, 0.05), (0.0, h), label, material)
+        for x in np.linspace(-a + 0.05, a - 0.05, max(int(thing.length / 2.5), 1) + 1).tolist()
+    ]
+    near = merge([rail(0.85, 0.98), rail(0.55, 0.68), rail(0.32, 0.42), *posts])
+    far = rail(0.35, 0.95)
+    return [near, near, far, far][:LEVELS]
+
+
+SHAPES: dict[Shape, Callable[[Box, int], list[Mesh]]] = {
+    Shape.BLOCK: block_levels,
+    Shape.HOUSE: house_levels,
+    Shape.POST: _post,
+    Shape.CROWN: _crown,
+    Shape.CONE: _cone,
+    Shape.LAMP: _lamp,
+    Shape.HEDGE: _hedge,
+    Shape.WOOD: _wood,
+    Shape.SHELTER: _shelter,
+    Shape.CAR: _car,
+    Shape.FENCE: _fence,
+}

@@ -1,0 +1,152 @@
+"""Generated scenery stands where nobody drives or walks, is drawn by content, and `none` adds nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+from skidpad.core.geometry import footprint
+from skidpad.core.run import Roads, RunSpec, run_from_plain
+from skidpad.core.vocabulary import Scenery, SemanticClass
+from skidpad.roads.bundled import bundled_maps, load_map
+from skidpad.roads.lanes import LaneKind, Marking
+from skidpad.roads.roadside import Shape
+from skidpad.roads.walkable import walk_mesh
+from skidpad.scenery.dressing import count_things, dress_map, name_kerbs, things_of
+from skidpad.scenery.room import outlines_of
+from skidpad.scenery.sides import RoadKind, sides_of
+from skidpad.scenery.sight import sight_triangles
+from skidpad.simulation.carla_server.maps import spawn_points
+
+MAPS = (*bundled_maps(), "Town01", "Town02", "Town04", "Town07", "Town10HD")
+
+
+@pytest.fixture(params=MAPS)
+def road_map(request: pytest.FixtureRequest):
+    if request.param in bundled_maps():
+        return load_map(request.param)
+    return load_map(request.getfixturevalue("towns") / f"{request.param}.xodr")
+
+
+def lane_quads(samples) -> np.ndarray:
+    """Returns one quad per step of every lane: another way than the package's hulls."""
+    left = np.stack([-np.sin(samples.heading), np.cos(samples.heading)], axis=1)
+    middle, half = np.stack([samples.x, samples.y], axis=1), 0.5 * samples.width[:, None]
+    a, b = middle + half * left, middle - half * left
+    step = np.flatnonzero(samples.lane[:-1] == samples.lane[1:])
+    rings = np.stack([a[step], a[step + 1], b[step + 1], b[step]], axis=1)
+    return shapely.convex_hull(shapely.multipoints(rings))
+
+
+def test_nothing_generated_stands_on_or_within_a_metre_of_lanes_crossings_or_ways(road_map) -> None:
+    dressed = dress_map(road_map, Scenery.FULL)
+    added = dressed.roadside.boxes[len(road_map.roadside.boxes) :]
+    assert added
+    corners = np.array([footprint(b.x, b.y, b.yaw, b.length, b.width) for b in added])
+    tree = shapely.STRtree(shapely.polygons(corners.reshape(-1, 4, 2)))
+    lanes = lane_quads(road_map.samples)
+    assert not tree.query(lanes, predicate="dwithin", distance=1.0).size
+    crossings = [shapely.Polygon(p[:, :2]) for p in road_map.roadside.crosswalks]
+    spawns = [shapely.Point(p.x, p.y) for p in spawn_points(road_map)]
+    assert not tree.query([*crossings, *spawns], predicate="dwithin", distance=1.0).size
+
+
+@pytest.mark.parametrize("name", ["town", "figure8"])
+def test_no_way_of_pedestrians_leads_through_anything(name: str) -> None:
+    road_map = load_map(name)
+    mesh = walk_mesh(road_map)
+    assert mesh is not None
+    ways = [shapely.Polygon(mesh.vertices[list(ring), :2]) for ring in mesh.polygons]
+    added = outlines_of(things_of(road_map))
+    assert not shapely.STRtree(added).query(ways, predicate="dwithin", distance=1.0).size
+
+
+def test_sight_triangles_of_junctions_are_free_of_what_is_tall() -> None:
+    road_map = load_map("town")
+    triangles = sight_triangles(road_map.samples, road_map.lanes)
+    assert len(triangles) > 20
+    tall = outlines_of([t for t in things_of(road_map) if t.is_tall])
+    assert not shapely.STRtree(tall).query(triangles, predicate="intersects").size
+
+
+def test_things_do_not_stand_in_each_other_or_in_what_the_file_names() -> None:
+    road_map = load_map("town")
+    outlines = outlines_of(things_of(road_map))
+    first, second = shapely.STRtree(outlines).query(outlines, predicate="intersects")
+    assert (first == second).all()
+    own = [
+        shapely.Polygon(footprint(b.x, b.y, b.yaw, b.length, b.width))
+        for b in road_map.roadside.boxes
+    ]
+    assert not shapely.STRtree(outlines).query(own, predicate="intersects").size
+
+
+def test_none_is_the_map_itself_and_full_leaves_the_roads_as_they_are() -> None:
+    road_map = load_map("town")
+    assert dress_map(road_map, Scenery.NONE) is road_map
+    dressed = dress_map(road_map, Scenery.FULL)
+    assert dressed.arrays is road_map.arrays
+    assert dressed.lanes is road_map.lanes
+    assert dressed.signals is road_map.signals
+    assert dressed.roadside.boxes[: len(road_map.roadside.boxes)] == road_map.roadside.boxes
+    assert dressed.content_hash != road_map.content_hash
+    changed = [
+        name
+        for name, a, b in zip(
+            road_map.samples._fields, road_map.samples, dressed.samples, strict=True
+        )
+        if not np.array_equal(a, b, equal_nan=True)
+    ]
+    assert set(changed) <= {"marking_left", "marking_right"}
+
+
+def test_the_same_content_gives_the_same_things_and_another_map_others() -> None:
+    town = load_map("town")
+    assert things_of(town) == things_of(load_map(str(town.name)))
+    assert count_things(things_of(town)) != count_things(things_of(load_map("straight")))
+
+
+def test_streets_have_houses_and_lamps_and_country_roads_trees() -> None:
+    road_map = load_map("town")
+    kinds = {s.kind for s in sides_of(road_map.samples, road_map.lanes)}
+    assert kinds == {RoadKind.TOWN, RoadKind.RURAL}
+    found = count_things(things_of(road_map))
+    assert found["block"] + found["house"] > 80
+    assert found["lamp"] > 80
+    assert found["tree"] > 200
+    motorway = load_map("motorway")
+    assert {s.kind for s in sides_of(motorway.samples, motorway.lanes)} >= {RoadKind.MOTORWAY}
+    assert "block" not in count_things(things_of(motorway))
+
+
+def test_boxes_have_classes_shapes_and_stand_on_the_ground() -> None:
+    road_map = load_map("town")
+    dressed = dress_map(road_map, Scenery.FULL)
+    added = dressed.roadside.boxes[len(road_map.roadside.boxes) :]
+    labels = {SemanticClass(b.label) for b in added}
+    assert labels >= {SemanticClass.BUILDING, SemanticClass.VEGETATION, SemanticClass.POLE}
+    assert min(b.height for b in added) > 0.0
+    low = road_map.samples.z.min() - 1.5
+    assert all(b.z > low for b in added)
+    crowns = [b for b in added if b.shape is Shape.CROWN]
+    assert crowns
+    assert not any(b.solid for b in crowns)  # a car passes below them
+
+
+def test_a_sidewalk_of_a_file_without_kerbs_begins_with_one() -> None:
+    road_map = load_map("town")
+    samples = name_kerbs(road_map.samples, road_map.lanes)
+    walks = np.isin(samples.lane, np.flatnonzero(road_map.lanes.kind == LaneKind.SIDEWALK))
+    kerbs = (samples.marking_left == Marking.CURB) | (samples.marking_right == Marking.CURB)
+    assert kerbs[walks].mean() > 0.9
+    assert not kerbs[~walks].any()
+
+
+def test_a_run_says_its_scenery_and_one_without_is_described_as_before() -> None:
+    plain = RunSpec(course=Roads(map="town"))
+    assert "scenery" not in plain.to_plain()
+    dressed = RunSpec(course=Roads(map="town"), scenery=Scenery.FULL)
+    assert dressed.to_plain()["scenery"] == "full"
+    assert run_from_plain(dressed.to_plain(), "here") == dressed
+    assert run_from_plain(plain.to_plain(), "here") == plain

@@ -1,0 +1,105 @@
+"""Pictures of a map with generated scenery: what they show, how even they are, what grain may change."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+from worlds import states_at, table_of
+
+from skidpad.core.geometry import Pose
+from skidpad.core.specs import CameraSpec, Modality
+from skidpad.core.vocabulary import Scenery, SemanticClass
+from skidpad.physics.presets import preset
+from skidpad.roads.bundled import load_map
+from skidpad.scenery.dressing import dress_map
+from skidpad.sensors.finish.extras import ALL_EXTRAS
+from skidpad.sensors.scene.grain import NO_GRAIN
+from skidpad.sensors.scene.shapes import shape_levels
+from skidpad.sensors.scene.static import build_scene
+from skidpad.sensors.suite import PixelSettings, PixelSuite
+
+EYE = Pose(0.5, 0.0, 1.5)
+
+
+def look(scenery: Scenery, lane: int, share: float, weather: str = "clear-noon"):
+    """Returns colours, classes and inverse depth from a place on a lane of the town."""
+    road_map = dress_map(load_map("town"), scenery)
+    cameras = [CameraSpec(m.value, m, 400, 300, 90.0, EYE) for m in list(Modality)[:3]]
+    settings = PixelSettings(extras=ALL_EXTRAS, in_cockpit=False)
+    suite = PixelSuite(road_map, table_of([]), cameras, preset(weather), settings)
+    row = int(road_map.lanes.first[lane] + share * (road_map.lanes.size[lane] - 1))
+    x, y, z, yaw = (
+        float(v[row])
+        for v in (
+            road_map.samples.x,
+            road_map.samples.y,
+            road_map.samples.z,
+            road_map.samples.heading,
+        )
+    )
+    images = suite.observe(0, states_at([(x, y, z, yaw)]), {}).images
+    return (
+        suite,
+        images["rgb"].rgb.copy(),
+        images["semantic"].labels.copy(),
+        images["depth"].inverse_depth.copy(),
+    )
+
+
+def share_of_commonest(rgb: np.ndarray) -> float:
+    """Returns the share of pixels in the 8 commonest colours: 5 x 5 median, 5 bits a channel."""
+    few = cv2.medianBlur(np.ascontiguousarray(rgb), 5).astype(int) >> 3
+    counts = np.bincount(((few[..., 0] << 10) | (few[..., 1] << 5) | few[..., 2]).ravel())
+    return float(np.sort(counts)[-8:].sum() / counts.sum())
+
+
+def test_a_street_shows_buildings_trees_and_posts_that_it_did_not_have() -> None:
+    _, _, before, _ = look(Scenery.NONE, 3, 0.5)
+    _, _, after, _ = look(Scenery.FULL, 3, 0.5)
+    for kind in (SemanticClass.VEGETATION, SemanticClass.POLE):  # it has buildings of its own
+        assert (after == kind).mean() > 1.2 * (before == kind).mean(), kind
+
+
+def test_grain_changes_colours_only() -> None:
+    suite, rgb, labels, depth = look(Scenery.FULL, 3, 0.5)
+    assert suite.shading._grain.shape == (256, 3)
+    suite.shading._grain = NO_GRAIN
+    ego = suite._ego
+    plain = suite.observe(1, states_at([(ego.x, ego.y, ego.z, ego.yaw)]), {}).images
+    assert np.array_equal(plain["semantic"].labels, labels)
+    assert np.array_equal(plain["depth"].inverse_depth, depth)
+    changed = (plain["rgb"].rgb != rgb).any(axis=2)
+    assert changed[labels == SemanticClass.ROAD].mean() > 0.8
+
+
+def test_without_scenery_there_is_no_grain() -> None:
+    road_map = load_map("town")
+    scene = build_scene(road_map.samples, road_map.lanes, road_map.roadside)
+    assert scene.grain.shape == (0, 3)
+
+
+def test_every_shape_stays_in_its_box_and_farther_levels_have_no_more_triangles() -> None:
+    road_map = dress_map(load_map("town"), Scenery.FULL)
+    seen = set()
+    for box in road_map.roadside.boxes:
+        if box.shape.name == "BOX" or (box.shape in seen and len(seen) < 9):
+            continue
+        seen.add(box.shape)
+        levels = shape_levels(box, 40)
+        sizes = [len(m.triangles) for m in levels]
+        assert sizes == sorted(sizes, reverse=True)
+        half = np.array([box.length / 2, box.width / 2])
+        for mesh in levels:
+            assert (np.abs(mesh.vertices[:, :2]).max(axis=0) <= half + 0.07).all(), box
+            assert mesh.vertices[:, 2].min() >= -1e-9
+            assert mesh.vertices[:, 2].max() <= box.height + 1e-9, box
+            assert set(mesh.label.tolist()) == {box.label}
+    assert len(seen) >= 9
+
+
+@pytest.mark.parametrize(("lane", "share"), [(3, 0.5), (0, 0.4)])
+def test_colours_are_spread_more_evenly_than_without(lane: int, share: float) -> None:
+    plain = share_of_commonest(look(Scenery.NONE, lane, share)[1])
+    full = share_of_commonest(look(Scenery.FULL, lane, share)[1])
+    assert full < 0.75 * plain

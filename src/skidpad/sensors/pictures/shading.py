@@ -1,4 +1,4 @@
-"""RGB from key and depth: no second raster pass, no shadows; unevenness by `sensors.grain`.
+"""RGB from key and depth: no second raster pass, no shadows; unevenness by `sensors.pictures.roughness`.
 
 The normal of a surface is read off its inverse depth: on a plane, inverse depth is linear in the
 pixel, and its two slopes are the normal. Light is linear inside and leaves by a square root.

@@ -36,6 +36,6 @@ def grain_table(boxes: Iterable[tuple[int, int]]) -> Float32:
     table = np.zeros((MATERIALS, 3), dtype=np.float32)
     for material, strengths in GRAIN.items():
         table[material] = strengths
-    for label, material in boxes:
-        table[material] = LEAVES if label == SemanticClass.VEGETATION else WALLS
+    for label, number in boxes:
+        table[number] = LEAVES if label == SemanticClass.VEGETATION else WALLS
     return table

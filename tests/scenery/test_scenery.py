@@ -14,7 +14,7 @@ from skidpad.roads.lanes import LaneKind, Marking
 from skidpad.roads.roadside import Shape
 from skidpad.roads.walkable import walk_mesh
 from skidpad.scenery.dressing import count_things, dress_map, name_kerbs, things_of
-from skidpad.scenery.room import outlines_of
+from skidpad.scenery.free_ground import outlines_of
 from skidpad.scenery.sides import RoadKind, sides_of
 from skidpad.scenery.sight import sight_triangles
 from skidpad.simulation.carla_server.maps import spawn_points

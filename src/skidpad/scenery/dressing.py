@@ -17,7 +17,7 @@ from skidpad.roads.lanes import LaneKind, LaneSamples, LaneTable, Marking
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.roadside import Box
 from skidpad.roads.terrain import Terrain, terrain_of
-from skidpad.scenery.room import Room
+from skidpad.scenery.free_ground import FreeGround
 from skidpad.scenery.rows import backdrop_of, rows_of
 from skidpad.scenery.sides import sides_of
 from skidpad.scenery.things import Thing
@@ -51,7 +51,7 @@ def things_of(map: RoadMap) -> list[Thing]:
             found += rows(side, stream(seed, "scenery", name, side.road, int(side.is_left)))
     if not found:
         return []
-    return Room(map.samples, map.lanes, map.roadside).place(found)
+    return FreeGround(map.samples, map.lanes, map.roadside).place(found)
 
 
 def boxes_of(things: Sequence[Thing], terrain: Terrain) -> list[Box]:

@@ -94,7 +94,7 @@ def _rural(side: Side, rng: Rng) -> Iterator[Thing]:
     for s in _walk(side, rng, 160.0, 420.0):
         at = _place(side, s, float(rng.uniform(18.0, 34.0)))
         yield things.make_building(at, 13.0, 9.0, int(rng.integers(1, 3)), True, rng)
-        barn = at.shifted(float(rng.choice([-22.0, 22.0])), 0.0)
+        barn = at.move(float(rng.choice([-22.0, 22.0])), 0.0)
         yield things.make_building(barn, 18.0, 11.0, 1, True, rng)
     for s in _walk(side, rng, 30.0, 120.0):
         yield things.make_hedge(_place(side, s, float(rng.uniform(3.0, 6.0))), 16.0, rng)

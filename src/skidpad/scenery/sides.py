@@ -40,7 +40,7 @@ class Side:
 
     @property
     def length(self) -> float:
-        """m along the border."""
+        """Length of the border in m."""
         return float(self.s[-1])
 
     def at(self, s: float, offset: float) -> tuple[float, float, float]:

@@ -40,7 +40,7 @@ class Thing:
         name: What it is, in one word.
         boxes: Its parts.
         outline: Centre, direction, length and width of the ground that it covers.
-        is_tall: Nobody sees over it from a car.
+        is_tall: Drivers of cars do not see over it.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Place:
     y: float
     along: float
 
-    def shifted(self, ahead: float, left: float) -> Place:
+    def move(self, ahead: float, left: float) -> Place:
         """Returns the place so many metres along the road and to the left of it."""
         c, s = cos(self.along), sin(self.along)
         return Place(self.x + c * ahead - s * left, self.y + s * ahead + c * left, self.along)
@@ -115,7 +115,7 @@ def make_tree(at: Place, crown: float, is_conifer: bool, rng: np.random.Generato
 def make_lamp(at: Place, to_road: float) -> Thing:
     """Returns a lamp post; to_road: 1 where the road lies to the left of `at.along`, else -1."""
     pole = _part(at, SemanticClass.POLE, (0.16, 0.16, 7.0), GREY, Shape.POST)
-    tip = at.shifted(0.0, 0.35 * to_road)
+    tip = at.move(0.0, 0.35 * to_road)
     lamp = _part(tip, SemanticClass.POLE, (0.28, 0.8, 0.16), GREY, Shape.LAMP, 6.95, False)
     return _thing("lamp", at, 0.3, 1.5, pole, lamp, tall=False)
 
@@ -150,12 +150,12 @@ def make_wood(at: Place, length: float, depth: float, rng: np.random.Generator) 
 def make_bus_stop(at: Place) -> Thing:
     """Returns a shelter whose open side looks at the road."""
     box = _part(at, SemanticClass.STATIC, (4.0, 1.5, 2.5), GLASS, Shape.SHELTER)
-    pole = _part(at.shifted(2.6, 0.0), SemanticClass.POLE, (0.08, 0.08, 2.6), GREY, Shape.POST)
-    return _thing("bus stop", at.shifted(0.4, 0.0), 5.0, 1.6, box, pole)
+    pole = _part(at.move(2.6, 0.0), SemanticClass.POLE, (0.08, 0.08, 2.6), GREY, Shape.POST)
+    return _thing("bus stop", at.move(0.4, 0.0), 5.0, 1.6, box, pole)
 
 
 def make_marker_post(at: Place) -> Thing:
-    """Returns a delineator post."""
+    """Returns a delineator post beside a road."""
     box = _part(at, SemanticClass.POLE, (0.12, 0.12, 1.0), (226, 226, 222), Shape.POST)
     return _thing("marker post", at, 0.12, 0.12, box, tall=False)
 

@@ -38,7 +38,7 @@ def storeys_of(thing: Box) -> int:
     return max(thing.variant % 16, 1)
 
 
-def block_levels(thing: Box, material: int) -> list[Mesh]:
+def flat_roofed_levels(thing: Box, material: int) -> list[Mesh]:
     """Returns a building with a flat roof, one mesh per level."""
     a, b, h = thing.length / 2, thing.width / 2, thing.height
     rng = np.random.default_rng(thing.variant)
@@ -55,7 +55,7 @@ def block_levels(thing: Box, material: int) -> list[Mesh]:
     return [merge([far, windows]), merge([far, windows]), merge([far, bands]), far]
 
 
-def house_levels(thing: Box, material: int) -> list[Mesh]:
+def gabled_levels(thing: Box, material: int) -> list[Mesh]:
     """Returns a building with a gable roof along its length, one mesh per level."""
     eaves = 0.35
     a, b, h = thing.length / 2 - eaves, thing.width / 2 - eaves, thing.height

@@ -13,7 +13,7 @@ import numpy as np
 from skidpad.core.vocabulary import ActorKind, SemanticClass
 from skidpad.roads.roadside import Box, Shape
 from skidpad.sensors.scene.bodies import body_mesh
-from skidpad.sensors.scene.facades import block_levels, house_levels
+from skidpad.sensors.scene.facades import flat_roofed_levels, gabled_levels
 from skidpad.sensors.scene.materials import Material
 from skidpad.sensors.scene.mesh import Mesh, Points, box, loft, merge, ribbon
 from skidpad.sensors.scene.road_mesh import LEVELS
@@ -153,8 +153,8 @@ def _fence(thing: Box, material: int) -> list[Mesh]:
 
 
 SHAPES: dict[Shape, Callable[[Box, int], list[Mesh]]] = {
-    Shape.BLOCK: block_levels,
-    Shape.HOUSE: house_levels,
+    Shape.BLOCK: flat_roofed_levels,
+    Shape.HOUSE: gabled_levels,
     Shape.POST: _post,
     Shape.CROWN: _crown,
     Shape.CONE: _cone,

@@ -20,7 +20,7 @@ OWN = 0.5  # m between a thing and what the file names
 PIECE = 12  # samples of a lane in one polygon
 
 
-class Room:
+class FreeGround:
     """The ground of a map that is free."""
 
     def __init__(self, samples: LaneSamples, lanes: LaneTable, roadside: Roadside) -> None:
@@ -28,14 +28,14 @@ class Room:
         zebras = [shapely.MultiPoint(p[:, :2]).convex_hull for p in roadside.crosswalks]
         self._lanes = shapely.STRtree([*own, *zebras])
         self._corners = shapely.STRtree(corners)
-        self._named = shapely.STRtree(_named(roadside))
+        self._objects = shapely.STRtree(_find_named_objects(roadside))
         self._sight = shapely.STRtree(sight_triangles(samples, lanes))
 
     def place(self, things: Sequence[Thing]) -> list[Thing]:
         """Returns those things that have room; of two that meet, the first one."""
         outlines = outlines_of(things)
         free = np.ones(len(things), dtype=np.bool_)
-        for tree, distance in ((self._lanes, CLEAR), (self._corners, CORNER), (self._named, OWN)):
+        for tree, distance in ((self._lanes, CLEAR), (self._corners, CORNER), (self._objects, OWN)):
             if len(tree.geometries):
                 rows, _ = tree.query(outlines, predicate="dwithin", distance=distance)
                 free[rows] = False
@@ -85,7 +85,7 @@ def _lane_polygons(
     return [*found, *corners], corners
 
 
-def _named(roadside: Roadside) -> list[shapely.Geometry]:
+def _find_named_objects(roadside: Roadside) -> list[shapely.Geometry]:
     boxes = [shapely.Polygon(footprint(b.x, b.y, b.yaw, b.length, b.width)) for b in roadside.boxes]
     lines = [shapely.LineString(b.points[:, :2]) for b in roadside.barriers]
     heads = [shapely.Point(h.x, h.y) for h in roadside.heads]

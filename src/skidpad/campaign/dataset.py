@@ -63,7 +63,7 @@ class DatasetSink(Sink):
         self.rows: list[dict[str, Any]] = []
 
     def see(self, moment: Moment) -> None:
-        """One frame of `every`, unless nothing can be said of the lane."""
+        """Writes one frame of `every`, unless nothing can be said of the lane."""
         frame, command = moment.frame, moment.command
         if frame.tick % self.every:
             return
@@ -181,7 +181,7 @@ def _in_ego(states: ActorStates, x: float, y: float) -> tuple[float, float]:
 
 
 def _gap(map: RoadMap, table: ActorTable, states: ActorStates, place: LanePoint) -> float | None:
-    """From the ego's front along the lane to the first body that reaches into its way."""
+    """Returns the way in m from the ego's front along the lane to the first body that reaches into it."""
     way = _way(map, place, float(states.yaw[EGO]))
     half = 0.5 * float(table.width[EGO]) + SPARE
     front = 0.5 * float(table.length[EGO])

@@ -351,7 +351,7 @@ def weather_of(context: dict[str, str]) -> Weather:
 
 
 class MonitoredRun(NamedTuple):
-    """Of one recording; empty where no monitor looked at it."""
+    """What the monitor found in one recording; empty where none looked at it."""
 
     hazards: list[tuple[int, int, str]]  # first and last tick, and what it was
     violated: list[int]  # indicators beyond their bounds, the most up to the next shown moment

@@ -59,7 +59,7 @@ class Feed:
 
     @property
     def name(self) -> str:
-        """By which another process finds it."""
+        """Returns the name by which another process finds the feed."""
         return self._memory.name
 
     @property

@@ -169,7 +169,7 @@ class LightAhead:
         return LightMark(frames, state, f"{state} {report.light_distance:.0f} m{seen}")
 
     def _reported_heads(self, moment: Moment, distance: float) -> list[SignalHead]:
-        """By the stack's own walk along the lane, from where it believes to be."""
+        """Returns the heads that the stack meets along the lane, from where it believes to be."""
         ego = moment.frame.ego
         here = self.map.project(ego.pose.x, ego.pose.y, ego.pose.z)
         view = LaneView(here, None, 0.0, 0.0)

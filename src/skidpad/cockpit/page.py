@@ -201,7 +201,7 @@ def drive_controls(panel: Panel) -> None:
 
 
 def function_switch(panel: Panel, name: str, title: str) -> None:
-    """One function of our stack."""
+    """Draws the switch of one function of our stack."""
     switch = ui.switch(title, on_change=lambda e: panel.changed(name, e.value, "toggle", name))
     panel.follow(name, switch.props("dense"), lambda seat: _has(seat.get("functions"), name))
 
@@ -240,7 +240,7 @@ def acting_select(panel: Panel, word: str, kinds: type[Enum]) -> None:
 
 
 def weather_slider(panel: Panel, field: str, title: str) -> None:
-    """One field of the weather, which acts while it is moved."""
+    """Draws the slider of one field of the weather, which acts while it is moved."""
     low, high = SHOWN_RANGES.get(field, RANGES[field])
     ui.label(title)
     slider = ui.slider(min=low, max=high, step=1).props("label dense")

@@ -60,7 +60,7 @@ class Replayer:
         self._shown_k, self._shown_at = -1, 0.0
 
     def run(self) -> None:
-        """Until the page ends it."""
+        """Shows the replay until the page ends it."""
         self.show()
         while not self.link.ended:
             heard = self.link.drain(PATIENCE)

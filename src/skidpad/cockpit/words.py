@@ -40,13 +40,13 @@ class Pause(Struct, frozen=True, tag="pause"):
 
 
 class Step(Struct, frozen=True, tag="step"):
-    """So many ticks further, while it stands."""
+    """Asks for some ticks more while the replay stands."""
 
     ticks: int = 1
 
 
 class Seek(Struct, frozen=True, tag="seek"):
-    """To a tick of a replay."""
+    """Asks for a tick of the replay."""
 
     tick: int
 
@@ -75,7 +75,7 @@ Word = Do | Pace | Pause | Step | Seek | Show | Film | End
 
 
 def encode(word: Word) -> bytes:
-    """As it goes through the pipe."""
+    """Encodes a word for the pipe."""
     return msgspec.json.encode(word)
 
 

@@ -18,7 +18,7 @@ from skidpad.core.weather import Weather
 
 
 class Method(str, Enum):
-    """By what a person drives (A-274)."""
+    """The device by which a person drives (A-274)."""
 
     KEYBOARD = "keyboard"
     GAMEPAD = "gamepad"

@@ -34,7 +34,7 @@ class AnySpec(Protocol):
 
     @property
     def mount(self) -> Pose:
-        """Its pose relative to the vehicle's origin."""
+        """The pose relative to the vehicle's origin."""
 
 
 Measure = Callable[[], Any]  # returns the reading of the present tick

@@ -76,5 +76,5 @@ class SurfacePatch(
 
     @property
     def stretch(self) -> tuple[float, float]:
-        """From and to along its road, m; without `s` the whole road."""
+        """Returns where the patch begins and ends along its road, m; without `s` it covers the whole road."""
         return (0.0, inf) if self.s is None else self.s

@@ -135,7 +135,7 @@ class Paired:
         }[self.claim]
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:
-        """From the differences of pairs."""
+        """Computes the contrast from the differences of pairs."""
         needed = (pl.col(self.column), self.more.are, self.less.are)
         if not has_columns(table, *needed, *([self.where.are] if self.where else [])):
             return None
@@ -175,7 +175,7 @@ class Outweighs:
         return (self.margin,)
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:
-        """From the differences of two effects per pair."""
+        """Computes the contrast from the differences of two effects per pair."""
         if not {self.column, self.factor, self.other} <= set(table.columns):
             return None
         first, second = (
@@ -223,7 +223,7 @@ class Mean:
         return (self.margin,)
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:
-        """From the values of all rows; sums within `value` are over the whole table."""
+        """Computes the contrast from the values of all rows; sums within `value` are over the whole table."""
         where = pl.lit(True) if self.where is None else self.where
         if not has_columns(table, self.value, where):
             return None
@@ -249,7 +249,7 @@ class Never:
 
     @property
     def amounts(self) -> tuple[Amount, ...]:
-        """None."""
+        """Returns no amount."""
         return ()
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:
@@ -266,7 +266,7 @@ class Never:
 
 
 def drop_unfinished(table: pl.DataFrame) -> pl.DataFrame:
-    """Without the runs that leave every denominator (L-7)."""
+    """Drops the runs that leave every denominator (L-7)."""
     return table.filter(~pl.col("outcome").is_in(NOT_RUN)) if "outcome" in table.columns else table
 
 

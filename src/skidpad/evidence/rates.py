@@ -32,11 +32,11 @@ class RateBelow:
 
     @property
     def amounts(self) -> tuple[Amount, ...]:
-        """None: the limit is the claim."""
+        """Returns no amount: the limit is the claim."""
         return ()
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:
-        """From sums over the rows."""
+        """Computes the contrast from sums over the rows."""
         given = pl.lit(1) if self.given is None else self.given
         where = pl.lit(True) if self.where is None else self.where
         if not has_columns(table, self.events, self.exposure, given, where):

@@ -151,7 +151,7 @@ class Aboard:
             self._waiting.popleft()
 
     def _request(self, method: str, path: str, **rest: Any) -> httpx.Response | None:
-        """None: off line."""
+        """Sends a request; None: off line."""
         try:
             return self.client.request(method, path, **rest)
         except httpx.TransportError:

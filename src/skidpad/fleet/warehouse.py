@@ -134,11 +134,11 @@ class Warehouse:
                 raise
 
     def complete(self) -> None:
-        """Every batch there was has been taken; call under the lock."""
+        """Whether every batch has been taken; call under the lock."""
         self._whole = False
 
     def moments(self, column: str | None, tenant: str, days: int) -> list[Moments]:
-        """By indicator and stretch of days; column: which must be the tenant's, None: all."""
+        """Lists moments by indicator and stretch of days; column: which must be the tenant's, None: all."""
         told: dict[str, object] = {"days": days}
         right = "true"
         if column is not None:

@@ -120,5 +120,5 @@ NOT_THERE = "there is no such thing here"  # also of what is another tenant's
 
 
 def absent() -> Refused:
-    """Nothing of that id is visible: it is absent, or another tenant's; nobody learns which."""
+    """Returns the refusal of an id that is absent or another tenant's; it does not say which."""
     return Refused(404, NOT_THERE)

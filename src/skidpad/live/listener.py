@@ -11,11 +11,11 @@ class Listener(Protocol):
     """Told every item in the order of the recording, and when a cycle has been said in full."""
 
     def hear(self, channel: int | None, item: Item) -> None:
-        """One item; `channel` is the index of the channel that said it."""
+        """Takes in one item; `channel` is the index of the channel that said it."""
         ...
 
     def cycle_over(self, k: int, t: float) -> None:
-        """Everything of cycle k at t s has been said."""
+        """Takes in that everything of cycle k at t s has been said."""
         ...
 
     def close(self) -> None:

@@ -173,7 +173,7 @@ class _Queue:
         return True
 
     def close(self) -> None:
-        """Everything that waits has been taken on return."""
+        """Ends the queue; on return everything that waited has been taken."""
         with self.changed:
             self.closing = True
             self.changed.notify()

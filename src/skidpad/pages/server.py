@@ -137,7 +137,7 @@ def host_headers(host: str, port: int, names: tuple[str, ...]) -> frozenset[str]
 
 
 def is_local(host: str) -> bool:
-    """Only this machine reaches it."""
+    """Whether only this machine reaches a host."""
     if host == "localhost":
         return True
     try:

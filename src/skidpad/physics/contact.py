@@ -104,7 +104,7 @@ def _point_velocity(states: ActorStates, i: int, x: float, y: float) -> tuple[fl
 
 @inner_kernel
 def _arm(states: ActorStates, b: Bodies, i: int, x: float, y: float) -> tuple[float, float]:
-    """From actor i's centre of gravity to a world point."""
+    """Returns the arm from actor i's centre of gravity to a world point."""
     x_cog = b.x_cog[i]
     return (
         x - states.x[i] - x_cog * cos(states.yaw[i]),

@@ -70,7 +70,7 @@ class Crowd:
         self.riders = _riders(map, cyclists, stream(seed, "crowd", "cyclists"))
 
     def actors(self) -> tuple[ActorSetup, ...]:
-        """Where they begin."""
+        """Returns the actors as they begin."""
         walkers = [
             ActorSetup(
                 name=w.name, type="pedestrian", place=Pose(w.x, w.y), driver=Control.SCRIPTED

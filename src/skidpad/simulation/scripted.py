@@ -51,7 +51,7 @@ class Motion:
 
     @property
     def speed(self) -> float:
-        """Along the body, m/s."""
+        """Returns the speed along the body, m/s."""
         return self.vx * cos(self.yaw) + self.vy * sin(self.yaw)
 
 

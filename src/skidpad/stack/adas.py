@@ -71,7 +71,7 @@ class AdasConfig:
 
     @classmethod
     def from_mapping(cls, plain: Mapping[str, Any]) -> AdasConfig:
-        """From plain data; every key is optional, see KEYS.
+        """Makes a configuration from plain data; every key is optional, see KEYS.
 
         `functions` (names) takes the place of `configuration` (0 to 4, default 4); `set` holds
         single settings on top of `profile`.

@@ -115,7 +115,7 @@ class AgentStack:
         return self.specs
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
-        """One `run_step`."""
+        """Calls the agent's `run_step` once."""
         if not self.planned:
             self._plan(frame.ego.pose)
             self.planned = True

@@ -248,7 +248,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _check_report(name: str, report: StackReport, tick: int) -> None:
-    """Its values can be recorded."""
+    """Raises an error where a report's values cannot be recorded."""
     for field in REPORTED:
         value: Any = getattr(report, field)
         if value is None:

@@ -20,7 +20,7 @@ TARGET = 9.0  # min, without installation and compilation (decision M-16)
 
 
 def estimated_minutes(seconds: float = SECONDS) -> float:
-    """From the mean tick of every configuration, in clear weather and in rain at night."""
+    """Estimates the minutes of the matrix from each configuration's mean tick, clear and in rain at night."""
     costs = [
         warm_cost(bench_run(n, weather, SensorLevel.PIXELS), seconds).mean
         for n in CONFIGURATIONS

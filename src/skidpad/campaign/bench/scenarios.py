@@ -111,7 +111,7 @@ def _by_itself(file: Path, seconds: float) -> float:
 
 
 def _drive_spec(spec: RunSpec) -> float:
-    """From the first moment to the last, with the backend and the log in memory."""
+    """Times a run from its first moment to its last, with the backend and the log in memory."""
     clock = Spans(Meter(), 0)
     run(spec, stage=stage_of(spec), sinks=(clock,))
     return float(len(clock.spans) * DT / (clock.spans.sum() * NS))

@@ -43,12 +43,12 @@ class TrafficRow:
 
     @property
     def interval(self) -> Interval:
-        """Of the contacts per 100 km, exact, 95 %."""
+        """Returns the exact 95 % interval of contacts per 100 km."""
         return poisson_interval(self.contacts, self.km / 100.0)
 
     @property
     def mean_speed_kmh(self) -> float:
-        """Of all vehicles over time; at a given density the flow is in proportion."""
+        """Returns the mean speed over vehicles and time; at a given density the flow is in proportion."""
         return self.km / self.hours if self.hours else 0.0
 
 

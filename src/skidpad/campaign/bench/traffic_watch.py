@@ -64,7 +64,7 @@ class TrafficCounts:
     stands: list[Stand] = field(default_factory=list)
 
     def summary(self) -> dict[str, Any]:
-        """For JSON: headways as quantiles, everything else as it is."""
+        """Returns plain data for JSON: headways as quantiles, everything else as it is."""
         return {
             "overlaps": self.overlaps,
             "moved": self.moved,

@@ -257,7 +257,7 @@ def jumps_of(spec: RunSpec) -> float:
 
 
 def weights_of(spec: RunSpec, table: ActorTable) -> dict[str, str]:
-    """Of the stratum of risky drivers: by which each counts, by his row in the true world; and jumps."""
+    """Returns how much each risky driver counts, by his row in the true world, and each jump."""
     if route_of(spec).stratum is not Stratum.RISKY:
         return {}
     drivers = [i for i, name in enumerate(table.names) if name.startswith(TRAFFIC)]
@@ -287,7 +287,7 @@ def _about(spec: RunSpec, segment: Segment) -> dict[str, str]:
 
 
 def _variant(spec: RunSpec) -> dict[str, str]:
-    """In what it differs from the route as published, where it does."""
+    """Returns in what a run differs from the route as published."""
     course = route_of(spec)
     if not course.base:
         return {}

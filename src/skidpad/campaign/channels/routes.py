@@ -21,7 +21,7 @@ PACK = 20  # vehicles at least that stay around the ego in the stratum of risky 
 
 
 class Condition(str, Enum):
-    """In which weather and light a route is driven."""
+    """The weather and light in which a route is driven."""
 
     OWN = "own"  # of the route, as published (C-210)
     DAY = "day"

@@ -19,7 +19,7 @@ _KEEPERS: dict[BackendChoice, ServerKeeper] = {}  # of this process; a worker li
 
 
 def keep_server(choice: BackendChoice) -> None:
-    """Where the campaign starts its own CARLA server: it is up, and not older than asked for."""
+    """Starts the campaign's own CARLA server where it is down or older than asked for."""
     if choice.backend != BackendKind.CARLA or not choice.server_command:
         return
     if choice not in _KEEPERS:

@@ -45,7 +45,7 @@ NO_IMAGES: Mapping[str, Any] = {}
 
 @dataclass(frozen=True, slots=True)
 class PilotConditions:
-    """In what the stacks of actors drive. setup: of the run, None for a clear noon."""
+    """The conditions in which stacks of actors drive. setup: of the run, None for a clear noon."""
 
     setup: Setup | None = None
     seed: int = 0

@@ -94,7 +94,7 @@ class Sink:
         """Further sensors or functions are recorded; `latest` says what they said last, in words."""
 
     def see(self, moment: Moment) -> None:
-        """One moment."""
+        """Takes in one moment."""
         raise NotImplementedError
 
 
@@ -124,7 +124,7 @@ class Timer:
         return self.left <= 0 or (self.script is not None and self.script.ended)
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
-        """One tick less."""
+        """Counts one tick down."""
         self.left -= 1
         return () if self.script is None else self.script.step(truth)
 

@@ -20,7 +20,7 @@ class Pace(Sink):
         self.last = perf_counter()
 
     def see(self, moment: Moment) -> None:
-        """One tick is over."""
+        """Waits until the wall clock has caught up with the tick that is over."""
         del moment
         now = perf_counter()
         self.slow += self.dt < SLOW * (now - self.last)

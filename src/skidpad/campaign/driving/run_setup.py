@@ -73,11 +73,11 @@ class StackAtWheel:
 
     @property
     def mode(self) -> str:
-        """Its mode in its own words."""
+        """Returns the stack's mode in its own words."""
         return self.stack.mode
 
     def begin(self, table: ActorTable) -> None:
-        """Nothing: a stack does not know the cast."""
+        """Does nothing: a stack does not know the cast."""
 
     def act(self, frame: SensorFrame) -> VehicleCommand:
         """Returns the stack's answer to the frame."""

@@ -65,7 +65,7 @@ def segments(routes: Sequence[RunSpec], hours: float, template: RunSpec) -> list
 def drive_one(
     out: Path, spec: RunSpec, links: Links | None = None
 ) -> Driven[DriveKey, DriveMetrics]:
-    """In a worker: drive one segment and write both files."""
+    """Drives one segment in a worker and writes both files."""
     watch = Stopwatch()
     folder = out / spec.cell
     folder.mkdir(parents=True, exist_ok=True)

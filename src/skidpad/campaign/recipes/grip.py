@@ -72,7 +72,7 @@ class GripDrive:
 
 
 def drive_and_judge(out: Path, cell: RunSpec, keep: bool = False) -> GripDrive:
-    """In a worker: drive a run of the catalogue; with `keep`, or when it failed, into its folder."""
+    """Drives a run of the catalogue in a worker; with `keep`, or when it failed, into its folder."""
     from skidpad.campaign.driving.backends import WATCHDOG, keep_server, make_backend
     from skidpad.campaign.runs.run import run
     from skidpad.evidence.grip.scores import grip_metrics
@@ -99,7 +99,7 @@ def drive_and_judge(out: Path, cell: RunSpec, keep: bool = False) -> GripDrive:
 
 
 def drive_one(out: Path, cell: RunSpec, *, keep: bool = False) -> Driven[GripKey, GripMetrics]:
-    """In a worker: drive a cell and write its series, with `keep` its log too."""
+    """Drives a cell in a worker and writes its series, with `keep` its log too."""
     from skidpad.evidence.grip.scores import grip_series
 
     found = drive_and_judge(out, cell, keep)

@@ -54,7 +54,7 @@ def see_all() -> None:
 
 
 def drive_one(out: Path, cell: RunSpec) -> Driven[RunKey, Metrics]:
-    """In a worker: drive a cell and write its folder."""
+    """Drives a cell in a worker and writes its folder."""
     # numba and friends are imported only where they are needed, not in the parent.
     from skidpad.campaign.driving.backends import WATCHDOG, keep_server, make_backend
     from skidpad.campaign.runs.run import run

@@ -53,7 +53,7 @@ def warm_up() -> None:
 
 
 def drive_one(out: Path, task: Task, *, keep: bool = False) -> Driven[ThresholdKey, GripMetrics]:
-    """In a worker: drive a run, with `keep` into a folder of its own."""
+    """Drives a run in a worker, with `keep` into a folder of its own."""
     found = drive_and_judge(out, task.run, keep)
     return Driven(
         key=threshold_key(task, found.driven.outcome, found.log_hash),

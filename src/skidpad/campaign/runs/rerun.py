@@ -178,7 +178,7 @@ class Film:
             raise OutputError(f"cannot write the film {path}")
 
     def write(self, picture: NDArray[np.uint8]) -> None:
-        """One more picture (H, W, 3), blue first."""
+        """Appends a picture (H, W, 3), blue first."""
         self._writer.write(picture)
 
     def finish(self) -> None:

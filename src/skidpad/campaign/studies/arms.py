@@ -33,7 +33,7 @@ class Variant:
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """Its arms with these seeds, and the claims that are judged on their runs."""
+    """Arms of a study with their seeds, and the claims that are judged on their runs."""
 
     arms: Callable[[Sequence[int]], list[Variant]]
     claims: tuple[str, ...]

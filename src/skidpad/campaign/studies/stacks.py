@@ -106,7 +106,7 @@ SIGMA_PER_MEAN = sqrt(pi / 2.0)  # of a normal deviate: standard deviation over 
 
 
 class Noisy(Changed):
-    """Its cameras err as measured at night or in rain; for the object level (A-230, F-12, F-13)."""
+    """Our stack with camera errors as measured at night or in rain; object level only (A-230, F-12, F-13)."""
 
     def __init__(
         self, specs: Sequence[SensorSpec], map: RoadMap, settings: Mapping[str, Any]

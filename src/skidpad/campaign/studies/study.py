@@ -48,7 +48,7 @@ def stage_for(variant: Variant) -> Stage:
 
 
 def drive_variant(variant: Variant) -> dict[str, Any]:
-    """In a worker: drive one arm and return its row."""
+    """Drives one arm in a worker and returns its row."""
     spec = variant.run
     sinks = [Brake(variant.slow_s)] if variant.slow_s else []
     driven = run(spec, stage=stage_for(variant), sinks=sinks)

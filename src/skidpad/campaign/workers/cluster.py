@@ -33,7 +33,7 @@ _warmed: list[Callable[[], None]] = []
 
 
 def work(job: Job, warm_up: Callable[[], None] | None) -> Finished:
-    """On a machine of the cluster: do a job, and kill what does it at the deadline."""
+    """Does a job on a machine of the cluster, and kills its process at the deadline."""
     # Dask starts its workers as daemons, which may not have children; ours end with their parent.
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     os.environ.update(dict.fromkeys(SINGLE_THREADED, "1"))

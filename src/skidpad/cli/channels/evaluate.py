@@ -131,7 +131,7 @@ class _Task:
 
 
 def judge_one(task: _Task) -> Segment:
-    """In a worker: one recording judged, or what was found of it before by the same code.
+    """Judges one recording in a worker, or reads what the same code found of it before.
 
     The file beside the recording (.judged) keeps what was found.
     """

@@ -69,7 +69,7 @@ class Job:
 
 
 def drive(job: Job) -> tuple[int, int]:
-    """In a worker: drive, monitor under the active rules, and count errors under both."""
+    """Drives in a worker, monitors under the active rules, and counts errors under both."""
     from skidpad.campaign.channels.drive import drive_segment
     from skidpad.campaign.channels.routes import driven_routes
     from skidpad.fleet.loop.judging import errors_of
@@ -221,7 +221,7 @@ class Demo:
         return next(r for r in self.releases() if r["release"] == release)
 
     def signed(self, content: bytes) -> bytes:
-        """Off line: two of the three keys sign the list with the new update."""
+        """Signs the list with the new update by two of the three keys, as off line."""
         import time
 
         from skidpad.fleet.updates import signing

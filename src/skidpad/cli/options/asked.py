@@ -207,7 +207,7 @@ class PlayCross(Struct, frozen=True):
         return values
 
     def frictions(self) -> tuple[list[Friction], str]:
-        """Without and with the weather's grip, as asked for, and the model of the latter."""
+        """Returns the chosen frictions, with or without the weather's grip, and the model of the latter."""
         allowed = [model.value for model in GripModel]
         words = [require_choice("--grip", word.strip(), allowed) for word in self.grip.split(",")]
         models = [word for word in words if word != GripModel.NONE.value]

@@ -19,7 +19,7 @@ TAGS = {
 
 
 def write_junit(path: Path, suite: str, failures: Mapping[str, Sequence[str]]) -> None:
-    """One case per name; a sentence for everything that is wrong in it."""
+    """Writes one case per name, with a sentence for everything that is wrong in it."""
     cases = [(name, [("failure", said) for said in by]) for name, by in failures.items()]
     _write(path, suite, cases)
 

@@ -165,7 +165,7 @@ def _against(rule: Rule, judged: list[RuleJudgement], undecided: Undecided) -> l
 
 
 def _say(rule: Rule, judged: list[RuleJudgement], undecided: Undecided) -> None:
-    """One line per judgement: to stderr those that fail the gate."""
+    """Prints a line per judgement, to stderr for those that fail the gate."""
     against = _against(rule, judged, undecided)
     for j in judged:
         if j.rule is rule:

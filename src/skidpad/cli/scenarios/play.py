@@ -155,7 +155,7 @@ def play_template(
 def _campaign(
     template: RunSpec, cross: PlayCross, folder: Path, seeds: int, left_out: list[LeftOut]
 ) -> Campaign[RunSpec, GripKey, GripMetrics]:
-    """Of all that can be played; the others are added to `left_out`."""
+    """Returns the campaign of all files that can be played; the others are added to `left_out`."""
     from skidpad.campaign.campaign import Campaign
     from skidpad.campaign.recipes.files import RECIPE, scenario_files
     from skidpad.cli.options.carla_backend import drives_alone

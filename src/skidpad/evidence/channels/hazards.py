@@ -116,7 +116,7 @@ class Clause:
 
     @classmethod
     def parse(cls, text: str) -> Clause:
-        """From text as "gap > 0.3"; ConfigError says what is wrong."""
+        """Reads a clause such as "gap > 0.3"; ConfigError says what is wrong."""
         try:
             signal, symbol, value = text.split()
             if symbol not in _OPERATORS:
@@ -156,7 +156,7 @@ class _RuleText(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """When a hazard is present: all clauses of any alternative."""
+    """The rule of a hazard, which is present when all clauses of any alternative hold."""
 
     hazard: HazardType
     alternatives: tuple[tuple[Clause, ...], ...]

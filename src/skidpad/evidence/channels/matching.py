@@ -41,7 +41,7 @@ class Matching:
 
 
 def match(detected: Sequence[Span], true: Sequence[Span], tolerance: float = 1.0) -> Matching:
-    """As many pairs as possible of the same hazard and object that overlap within `tolerance` s.
+    """Pairs as many as possible of the same hazard and object that overlap within `tolerance` s.
 
     Every detection and every truth is in at most one pair; the surplus is false or missed.
     """
@@ -185,7 +185,7 @@ def _interval(counts: Sequence[tuple[int, int]]) -> Interval | None:
 
 
 def _share_limits(hits: Sequence[float], cases: Sequence[float]) -> Interval | None:
-    """Of a share of sums over segments; None as for `ratio_limits`."""
+    """Returns the interval of a share of sums over segments; None as for `ratio_limits`."""
     limits = ratio_limits(hits, cases)
     return None if limits is None else Interval(max(limits.low, 0.0), min(limits.high, 1.0))
 

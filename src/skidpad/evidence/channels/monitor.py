@@ -280,7 +280,7 @@ class GhostCue:
         self._shared: list[set[int]] = [set() for _ in channels]  # ids that another channel knew
 
     def update(self, frames: Sequence[ChannelFrame | None], shared: Sequence[set[int]]) -> None:
-        """One cycle; `shared` holds per channel the rows that were paired with another channel."""
+        """Takes in one cycle; `shared` holds per channel the rows that were paired with another channel."""
         for c, frame in enumerate(frames):
             if frame is None:  # nobody can say what happened to its objects
                 self._since[c].clear()

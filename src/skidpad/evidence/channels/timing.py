@@ -30,7 +30,7 @@ class Stopwatch(Protocol):
         """The part `name` of the cycle is done."""
 
     def table(self) -> pl.DataFrame:
-        """One row per cycle: TIMES."""
+        """Returns a row of TIMES per cycle."""
 
 
 def timing_statistics(timing: pl.DataFrame) -> pl.DataFrame:

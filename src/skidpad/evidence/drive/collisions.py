@@ -145,7 +145,7 @@ def _is_bend_exit(drive: Drive, at: int) -> bool:
 
 
 def _follows(drive: Drive, at: int) -> bool:
-    """Within 8 s and 100 m of where the ego was last put."""
+    """Whether a crash comes within 8 s and 100 m of where the ego was last put."""
     log = drive.log
     tick = int(log.tick[at])
     before = [r for r in log.relocations if r.tick < tick]

@@ -29,7 +29,7 @@ class Conflicts(NamedTuple):
 
 
 class TrueConflicts(NamedTuple):
-    """From the boxes of ego and lead, along the lane (decision M-8)."""
+    """True conflicts from the boxes of ego and lead, along the lane (decision M-8)."""
 
     min_ttc: float | None  # s
     max_drac: float | None  # m/s^2

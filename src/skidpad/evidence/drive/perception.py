@@ -38,7 +38,7 @@ class Confusion(NamedTuple):
 
 
 class Errors(NamedTuple):
-    """Of the measured distance against truth (A-240, A-241, A-254)."""
+    """Errors of the measured distance against truth (A-240, A-241, A-254)."""
 
     mean: float | None  # m
     max: float | None  # m
@@ -65,7 +65,7 @@ def confusion(reported: Mask, present: Mask, where: Mask) -> Confusion:
 
 
 def radar_levels(drive: Drive, where: Mask) -> tuple[Confusion, Confusion, Confusion]:
-    """At the pre-filter, after the lane check, and of the final decision (A-239)."""
+    """Counts at the pre-filter, after the lane check, and of the final decision (A-239)."""
     report, present = drive.log.report, vehicle_present(drive)
     use = where & drive.sample
     levels = (~np.isnan(report.radar_pre), ~np.isnan(report.radar_lane), report.detected == 1.0)

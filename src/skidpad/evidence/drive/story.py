@@ -206,7 +206,7 @@ class _Box(NamedTuple):
         return dx * c + dy * s, dy * c - dx * s
 
     def corners(self) -> Iterator[tuple[Floats, Floats]]:
-        """Its four corners in the world."""
+        """Yields the four corners of the box in the world."""
         c, s = np.cos(self.yaw), np.sin(self.yaw)
         for side, end in product((-1.0, 1.0), repeat=2):
             along, across = end * self.half_length, side * self.half_width
@@ -310,7 +310,7 @@ def _find_worst_error(way: _Way) -> Sighting | None:
 
 
 def _find_braking(way: _Way) -> Moment | None:
-    """Since when the pedal was pressed without a break until the contact."""
+    """Finds since when the pedal was pressed without a break until the contact."""
     pressed = way.drive.log.applied.brake[: way.at] > BRAKES
     if not pressed.size or not pressed[-1]:
         return None
@@ -320,7 +320,7 @@ def _find_braking(way: _Way) -> Moment | None:
 
 
 def _find_slowing(way: _Way, actor: int) -> Moment | None:
-    """When the other car was fastest in the last 5 s, if it lost much speed since."""
+    """Finds when the other car was fastest in the last 5 s, if it lost much speed since."""
     begin, a = rows_before(way.drive, way.at, ERROR_LOOK_BACK), way.drive.log.actors
     v = np.hypot(a.vx[begin : way.at, actor], a.vy[begin : way.at, actor]).astype(np.float64)
     if not v.size or v.max() - v[-1] < SLOWED_BY:

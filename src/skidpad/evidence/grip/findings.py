@@ -58,7 +58,7 @@ def weathers(
     scenario: str, more: str, less: str, column: str = "completion", amount: Amount = SHARE,
     claim: Claim = Claim.MORE,
 ) -> Paired:  # fmt: skip
-    """With reduced friction `column` is larger in one weather than in another."""
+    """States that with reduced friction `column` is larger in one weather than in another."""
     return Paired(
         column=column, more=rows_of("weather", more), less=rows_of("weather", less),
         by=("seed",), amount=amount, claim=claim,
@@ -67,7 +67,7 @@ def weathers(
 
 
 def cut_ins(more: str, less: str) -> Paired:
-    """More runs complete in one variant of the cut-in than in another, friction untouched."""
+    """States that more runs complete in one variant of the cut-in than in another, friction untouched."""
     return Paired(
         column="completion", more=rows_of("cutin", more), less=rows_of("cutin", less),
         by=("weather", "seed"), amount=SHARE,

@@ -37,7 +37,7 @@ class FourCells:
 
 
 def four_cells(results: pl.DataFrame, quantity: str) -> Iterator[FourCells]:
-    """Of every scenario and weather; results: both overlays, both frictions."""
+    """Yields the cells of every scenario and weather; results: both overlays, both frictions."""
     finished = results.filter(~pl.col("outcome").is_in(NOT_RUN)).drop_nulls(quantity)
     wide: pl.DataFrame | None = None
     for name, (drops, friction) in CELLS.items():

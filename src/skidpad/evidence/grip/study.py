@@ -80,7 +80,7 @@ class Pair:
 
     @property
     def identical(self) -> bool:
-        """Every pair is the same drive."""
+        """Whether every pair is the same drive."""
         both = self.common
         return len(both) > 0 and bool((both["log_hash"] == both["log_hash_reduced"]).all())
 
@@ -166,7 +166,7 @@ class Distance:
 def distances(
     original: CellSeries, reduced: CellSeries, identical: bool, resample: bool = True
 ) -> Iterator[Distance]:
-    """Of every metric (B-107, B-108, G-4); identical drives need no resampling."""
+    """Yields the distance of every metric (B-107, B-108, G-4); identical drives need no resampling."""
     for metric in METRICS:
         a, b = original.values[metric], reduced.values[metric]
         if identical:

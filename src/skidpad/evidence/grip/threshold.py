@@ -92,7 +92,7 @@ class Situation:
 
     @property
     def recovered(self) -> Share:
-        """Of the drives below their seed's critical friction, those that were completed again."""
+        """Returns the share of drives below their seed's critical friction that were completed again."""
         failed = np.logical_not(self.outcomes)
         below = np.cumsum(failed, axis=1) - failed > 0
         return Share(int(np.sum(below & ~failed)), int(np.sum(below)))

@@ -85,7 +85,7 @@ class Alert:
 
     @property
     def closed(self) -> bool:
-        """Nothing more is to be done."""
+        """Whether nothing more is to be done."""
         return any(e.what == What.CLOSED.value for e in self.events)
 
     @property

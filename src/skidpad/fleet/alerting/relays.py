@@ -49,11 +49,11 @@ class Webhook:
         self.name = f"webhook {host} {digest(url.encode())[:8]}"  # a host may have several
 
     def wants(self, operator: str) -> bool:
-        """Only its own operator's alerts."""
+        """Whether an operator's alerts go this way: its own operator's only."""
         return operator == self.operator
 
     def send(self, alert: dict[str, Any]) -> None:
-        """One POST of JSON; who answers drop by drop is given up like who does not answer."""
+        """Posts an alert as JSON; an answer that comes drop by drop is given up like none."""
         try:
             status = asyncio.run(asyncio.wait_for(self._post(alert), self.timeout_s))
         except (httpx.HTTPError, asyncio.TimeoutError) as error:
@@ -81,7 +81,7 @@ class Mqtt:
         self.name = "mqtt"
 
     def wants(self, operator: str) -> bool:
-        """Every operator has a topic."""
+        """Whether an operator's alerts go this way: each has a topic."""
         return bool(operator)
 
     def send(self, alert: dict[str, Any]) -> None:

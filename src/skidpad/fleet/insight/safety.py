@@ -49,7 +49,7 @@ def claims(trends: list[Trend]) -> list[Claim]:
 
 
 def _verdict(worst: Trend | None) -> str:
-    """By the interval, so that few vehicles say `open` and not `supported`."""
+    """Judges by the interval, so that few vehicles say `open` and not `supported`."""
     if worst is None:
         return "no evidence"
     if worst.interval.high <= SUPPORTED_BELOW and worst.vehicles >= 10:

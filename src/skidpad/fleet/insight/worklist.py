@@ -170,7 +170,7 @@ def reopen_recurred(
 
 
 def _first_drives(connection: Connection, who: Principal) -> dict[str, float]:
-    """When the first drive with each release came in, s; "": what vehicles came with is left out."""
+    """Returns when the first drive with each release came in, s, without what vehicles came with."""
     query = select(drives.c.release, func.min(drives.c.at)).where(visible(who, drives))
     rows = connection.execute(query.group_by(drives.c.release))
     return {release: at for release, at in rows if release}

@@ -56,7 +56,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
     @property
     def alpha_of_look(self) -> float:
-        """Of one question of one look."""
+        """Returns the alpha of one question of one look."""
         return self.alpha / (self.looks * len(self.stages))
 
 

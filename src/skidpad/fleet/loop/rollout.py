@@ -43,7 +43,7 @@ class Rollout:
 
     @property
     def share(self) -> float:
-        """Of vehicles that run it."""
+        """Returns the share of vehicles that run it."""
         return self.plan.stages[self.stage]
 
     def plain(self) -> dict[str, Any]:

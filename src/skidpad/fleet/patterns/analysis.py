@@ -223,7 +223,7 @@ def _resample_table(table: Floats) -> Floats:
 
 
 def to_plain(series: Floats) -> list[list[float]]:
-    """For JSON, in the resolution that it is compared in."""
+    """Returns a series for JSON, in the resolution that it is compared in."""
     return [[round(v, 4) for v in row] for row in series.tolist()]
 
 

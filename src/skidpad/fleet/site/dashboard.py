@@ -190,7 +190,7 @@ def read_replay(
 
 
 def draw_replay(ui: Any, found: tuple[dict[str, Any], HazardRecord, Sequence[Line]]) -> None:
-    """One hazard, cycle by cycle, as every channel saw it."""
+    """Draws one hazard, cycle by cycle, as every channel saw it."""
     row, record, roads = found
     ui.label(f"{row['type'].replace('_', ' ')}, {row['map']}, {row['weather']}")
     if not record.worlds:

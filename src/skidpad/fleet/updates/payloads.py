@@ -58,7 +58,7 @@ def read_payload(kind: PayloadKind, path: Path) -> MonitorSettings:
 
 
 def read_payload_content(kind: PayloadKind, content: bytes) -> MonitorSettings:
-    """As `read_payload`; Refused (422) for anything that the vehicle's reader would not take."""
+    """Reads content as `read_payload` does; Refused (422) for what the vehicle's reader would not take."""
     if len(content) > PAYLOAD_MAX:
         raise Refused(413, f"an update may have {PAYLOAD_MAX} bytes")
     if kind is not PayloadKind.MODEL and b"&" in content:

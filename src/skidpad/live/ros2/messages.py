@@ -116,7 +116,7 @@ class Messages:
         return self._make("geometry_msgs", "Pose", place, turn)
 
     def _twist(self, vx: float, vy: float, h: float) -> Any:
-        """In the body's own frame, as ROS gives it."""
+        """Returns a twist in the body's own frame, as ROS gives it."""
         c, s = cos(h), sin(h)
         forward = self._vector(c * vx + s * vy, c * vy - s * vx)
         return self._make("geometry_msgs", "Twist", forward, self._vector(0.0, 0.0))

@@ -227,7 +227,7 @@ def latest(entries: Iterable[E]) -> list[E]:
 
 
 def fingerprints(entries: Sequence[Entry[Any, Any]]) -> frozenset[str]:
-    """More than one: byte equality is not promised across this campaign (decision X-2)."""
+    """Returns all fingerprints; of several, equal bytes are not promised (decision X-2)."""
     return frozenset(e.fingerprint for e in entries)
 
 

@@ -141,7 +141,7 @@ def _still(osi3: Any, world: World) -> GroundTruth:
 
 
 def _write_actor(object: Any, log: RunLog, k: int, i: int, tilt: Tilting | None) -> None:
-    """One actor: the place is its box's centre; roll and pitch are those of the road under it."""
+    """Writes an actor: its box's centre is its place; roll and pitch are those of the road under it."""
     a, table, base = log.actors, log.table, object.base
     yaw, height = float(a.yaw[k, i]), float(table.height[i])
     object.id.value = i
@@ -199,7 +199,7 @@ class _Lamps:
         self.states: dict[int, LightState] = {}
 
     def at(self, tick: int) -> Mapping[int, LightState]:
-        """By signal id."""
+        """Returns the states of lamps by signal id."""
         while self.done < len(self.changes) and self.changes[self.done].tick <= tick:
             change = self.changes[self.done]
             self.states[change.signal] = change.state

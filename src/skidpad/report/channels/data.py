@@ -51,7 +51,7 @@ class MonitoredDrive:
 
     @property
     def channels(self) -> Sequence[str]:
-        """In the order of the recording."""
+        """Returns the channels in the order of the recording."""
         names: list[str] = self.summary["channels"]
         return names
 

@@ -56,7 +56,7 @@ def _describe_sideways(story: Story) -> list[str]:
 
 
 def _describe_offset(crash: Crash) -> str:
-    """Where in its lane the ego was, when that is worth a word."""
+    """Says where in its lane the ego was, when that is worth a word."""
     if crash.lane_offset is None or abs(crash.lane_offset) <= ASIDE:
         return ""
     side = "left" if crash.lane_offset > 0.0 else "right"
@@ -139,7 +139,7 @@ def _describe_report(wrong: Sighting, hit: str) -> str:
 
 
 def _describe_braking(story: Story) -> str:
-    """When the ego braked, and whether that could have been enough."""
+    """Says when the ego braked, and whether that could have been enough."""
     crash, braked = story.crash, story.braked
     if braked is None:
         return f"the ego did not brake and drove at {format_speed(crash.v_ego)}"

@@ -47,7 +47,7 @@ class Metric:
 
     @property
     def title(self) -> str:
-        """Its name in words, without the unit."""
+        """Returns the metric's name in words, without the unit."""
         ending = next((end for end in ENDINGS if self.name.endswith(end)), "")
         return re.sub(r"(\d) (\d)", r"\1.\2", words(self.name.removesuffix(ending)))
 

@@ -74,7 +74,7 @@ def unjudged_text(judged: Sequence[Judgement]) -> str:
 
 
 def least_seeds_text(judged: Sequence[Judgement]) -> str:
-    """With how many seeds any claim of this report can be judged at all; empty: none is tested."""
+    """Says with how many seeds any claim of this report can be judged at all; empty: none is tested."""
     tested = sum(j.p is not None for j in judged)
     if not tested:
         return ""

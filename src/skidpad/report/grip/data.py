@@ -51,7 +51,7 @@ class GripCampaign(CampaignView[GripEntry]):
 
     @cached_property
     def four_cells(self) -> bool:
-        """Each run was driven with and without drops on the cameras (B-161)."""
+        """Whether each run was driven with and without drops on the cameras (B-161)."""
         return self.results["overlay"].n_unique() > 1
 
     @cached_property
@@ -89,7 +89,7 @@ class GripCampaign(CampaignView[GripEntry]):
         return list(dict.fromkeys(s for s, _ in self.pairs))
 
     def of(self, scenario: str) -> list[Pair]:
-        """Its cells, in the order of weathers."""
+        """Returns the cells of a scenario, in the order of weathers."""
         return [pair for pair in self.pairs.values() if pair.scenario == scenario]
 
     @property
@@ -129,7 +129,7 @@ class GripCampaign(CampaignView[GripEntry]):
 
     @cached_property
     def variant_distances(self) -> dict[str, dict[str, Distance]]:
-        """Each variant of the cut-in against `original`, friction untouched (B-077)."""
+        """Compares each variant of the cut-in with `original`, friction untouched (B-077)."""
         base = self.variants.get("original")
         start = self.series(base, ORIGINAL) if base is not None else None
         found = {}

@@ -157,7 +157,7 @@ def distance_tables(campaign: GripCampaign) -> list[Block]:
 
 
 def metric_columns(of: Callable[[str, R], Quantity], definition: str = "") -> list[Column[R]]:
-    """One column per compared series."""
+    """Returns a column per compared series."""
     return [
         Column(m, partial(of, m), definition, UNITS.get(m, ""), format=DISTANCE) for m in METRICS
     ]

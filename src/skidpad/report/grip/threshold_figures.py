@@ -19,7 +19,7 @@ COLUMNS = 3  # charts beside each other
 
 
 def map_figure(groups: Mapping[str, Sequence[Situation]]) -> str:
-    """One panel per group: starts against decelerations, coloured by the threshold."""
+    """Draws a panel per group: starts against decelerations, coloured by the threshold."""
     columns = min(2, len(groups))
     rows = -(-len(groups) // columns)
     with canvas(9.6, 2.9 * rows, columns, rows) as (figure, all_axes):
@@ -66,7 +66,7 @@ def _order(s: Situation) -> tuple[float, float]:
 
 
 def curve_figures(groups: Mapping[str, Sequence[Situation]]) -> dict[str, str]:
-    """By group: a chart per start, a curve per deceleration; only what tells."""
+    """Draws by group a chart per start and a curve per deceleration; only those that tell something."""
     found = {}
     for name, all_of in groups.items():
         telling = sorted((s for s in all_of if s.tells), key=_order)

@@ -209,7 +209,7 @@ def ends(interval: Interval | None) -> tuple[float | None, float | None]:
 
 
 def _weather(matrix: Matrix) -> Answer:
-    """Every climate against the first one, per configuration."""
+    """Answers what the weather changes: every climate against the first one, per configuration."""
     question = "What does the weather change?"
     first, *rest = matrix.climates
     if not rest:

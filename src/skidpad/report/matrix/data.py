@@ -74,7 +74,7 @@ class WeatherGroup:
 
     @property
     def name(self) -> str:
-        """Within a sentence: `clear sky`, `icy_30`."""
+        """Returns its name within a sentence: `clear sky`, `icy_30`."""
         return (
             self.title.partition(" - ")[0].partition(":")[0].lower()
             if self.is_published
@@ -88,7 +88,7 @@ class WeatherGroup:
 
     @property
     def short(self) -> str:
-        """Its label on an axis."""
+        """Returns its label on an axis."""
         kind, dash, first = self.weathers[0].partition("-")
         if not dash or not self.is_published:
             return "\n".join(self.weathers)
@@ -263,7 +263,7 @@ class Matrix(CampaignView[MatrixEntry]):
 
     @property
     def subtitle(self) -> str:
-        """One sentence: what was driven."""
+        """Says in a sentence or two what was driven."""
         levels = " and ".join(
             SENSOR_LEVELS.get(level, f"sensors as {level}")
             for level in sorted(self.results["sensors"].unique().to_list())

@@ -38,7 +38,7 @@ GREY = 5  # of the palette
 
 
 def collisions(matrix: Matrix) -> list[Block]:
-    """By weather and configuration, and by configuration."""
+    """Draws crashes by weather and configuration, and by configuration."""
     label = f"{EVENTS} per run"
     by_weather = [
         _rates(

@@ -54,7 +54,7 @@ def add_rails(text: bytes, name: str) -> bytes:
 
 
 def _rails(document: Document, edge: RoadEdge) -> Iterator[tuple[RoadRecord, list[Corners]]]:
-    """Each road with the rails beside it."""
+    """Yields each road with the rails beside it."""
     outer: dict[tuple[int, int, bool], LaneShape] = {}
     for shape in lane_shapes(document):
         key = (shape.key.road, shape.key.section, shape.key.lane > 0)

@@ -56,7 +56,7 @@ LABELS = {
 
 
 def roadside(document: Document, signals: SignalTable, shapes: Sequence[LaneShape]) -> Roadside:
-    """Only what the file says; nothing is made up for files without objects."""
+    """Reads what stands beside the roads; nothing is made up for files without objects."""
     read = Reader(document.file)
     barriers: list[Barrier] = []
     boxes: list[Box] = []
@@ -104,7 +104,7 @@ def _amount(read: Reader, road: RoadRecord, node: Node, barrier: bool) -> float:
 
 
 def _barrier_kind(node: Node) -> BarrierKind | None:
-    """By subtype or name (which say guardRail or wall), else by type."""
+    """Tells the kind by subtype or name (which say guardRail or wall), else by type."""
     type_ = node.get("type", "").lower()
     if type_ not in BARRIERS:
         return None

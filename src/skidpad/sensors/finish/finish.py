@@ -62,7 +62,7 @@ class Finish:
         lights: Mapping[int, LightState],
         braking: NDArray[np.bool_],
     ) -> None:
-        """Where everybody is now, and what shines."""
+        """Takes in where all actors are now, and what shines."""
         self._tick, self._ego = tick, states.pose(0)
         self._bodies = bodies_of(self._table, states)
         self._near = _within(self._furniture, self._ego, STANDING_REACH)

@@ -35,7 +35,7 @@ GAIN[:, Material.PLATE] = PLATE_GAIN
 
 
 def gains(light: Lighting) -> NDArray[np.float32]:
-    """By class and material, in one weather."""
+    """Returns gains by class and material, in one weather."""
     found: NDArray[np.float32] = GAIN.copy()
     found[SemanticClass.ROAD_LINE] *= 1.0 - (1.0 - WET_SHARE) * light.wet
     found[SemanticClass.ROAD_LINE] *= 1.0 - light.snow

@@ -115,7 +115,7 @@ def _box(thing: Box, material: int) -> list[Mesh]:
 
 
 def _facing(head: SignalHead, mesh: Mesh) -> Mesh:
-    """From a frame whose x looks back at the traffic to the world."""
+    """Turns a mesh from a frame whose x looks back at the traffic to the world."""
     c, s = -cos(head.heading), -sin(head.heading)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     return mesh.moved(turn, np.array([head.x, head.y, head.z]))

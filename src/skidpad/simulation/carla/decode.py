@@ -51,7 +51,7 @@ def hide_beyond(
 
 @kernel
 def cut_depth(sight: float, focal: float, cx: float, cy: float, inverse: Float32) -> None:
-    """Nothing is measured along rays longer than `sight`."""
+    """Removes depths along rays longer than `sight`, where nothing is measured."""
     for y in range(inverse.shape[0]):
         v = (y + 0.5 - cy) / focal
         for x in range(inverse.shape[1]):

@@ -56,7 +56,7 @@ class Grip:
         return self.setup.mu_ref * self.ratio
 
     def scale(self, actor: int) -> float:
-        """Of a vehicle's own tyres against the reference; 1 where its wheels were never read."""
+        """Returns a vehicle's tyres over the reference; 1 where its wheels were never read."""
         wheels = self.original.get(actor)
         return sum(wheels) / len(wheels) / TIRE_FRICTION_REFERENCE if wheels else 1.0
 

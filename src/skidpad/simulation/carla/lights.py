@@ -18,7 +18,7 @@ class TrafficLights:
         self._known = find_lights(world) if cached else None
 
     def read(self) -> dict[int, LightState]:
-        """By signal id, from the client's newest snapshot."""
+        """Returns states by signal id, from the client's newest snapshot."""
         known = find_lights(self._world) if self._known is None else self._known
         return {id: LightState(int(light.get_state())) for id, light in known}
 

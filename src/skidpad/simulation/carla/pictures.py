@@ -63,7 +63,7 @@ class Pictures:
         return images
 
     def decode(self, camera: CameraSpec, messages: Mapping[str, Any]) -> CameraImage:
-        """One image from its message."""
+        """Returns an image from its message."""
         out = self._buffers[camera.id]
         bgra = _bytes(messages[camera.id], camera)
         if camera.modality is Modality.DEPTH:
@@ -166,6 +166,6 @@ def _bytes(message: Any, camera: CameraSpec) -> NDArray[np.uint8]:
 
 
 def _depth_twins(cameras: Any) -> dict[str, CameraSpec]:
-    """For each camera that classifies, the depth camera with the same view, if there is one."""
+    """Finds for each camera that classifies the depth camera with the same view, if there is one."""
     depth = {c.view: c for c in cameras if c.modality is Modality.DEPTH}
     return {c.id: depth[c.view] for c in cameras if c.view in depth}

@@ -108,7 +108,7 @@ def spawn_fixed(
 def spawn_random(
     carla: Any, world: Any, ego: Pose, setup: TrafficSetup, seed: int
 ) -> list[ActorRow]:
-    """Up to 80 vehicles on recommended spawn points around the ego; some may have to wait."""
+    """Spawns up to 80 vehicles on recommended points around the ego; some may have to wait."""
     kinds = blueprints.traffic_blueprints(world.get_blueprint_library())
     points = places_around(world, ego, stream(seed, "traffic", "places"))
     players = []

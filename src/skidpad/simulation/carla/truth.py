@@ -29,7 +29,7 @@ def read_states(players: Sequence[ActorRow], source: Any, out: ActorStates) -> N
 
 
 def put_row(out: ActorStates, i: int, player: ActorRow, seen: Any) -> None:
-    """One actor: the motion of its footprint's centre is taken to be that of its origin."""
+    """Writes one actor; the motion of its footprint's centre is taken to be that of its origin."""
     pose = player.footprint(from_transform(seen.get_transform()))
     yaw = wrap_angle(pose.yaw)
     out.x[i], out.y[i], out.z[i], out.yaw[i] = pose.x, pose.y, pose.z, yaw

@@ -30,7 +30,7 @@ class Watchdog:
             self._timer.start()
 
     def stop(self) -> None:
-        """Nothing is awaited any more."""
+        """Awaits nothing any more."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None

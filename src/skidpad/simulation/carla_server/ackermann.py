@@ -53,7 +53,7 @@ class AckermannTarget:
 
 
 def parse_target(value: Any) -> AckermannTarget:
-    """From a call; newer clients send a time stamp, which is not used."""
+    """Reads a target from a call; newer clients send a time stamp, which is not used."""
     v = wire.items(value, "ackermann control")[:5]
     steer, steer_speed, speed, acceleration, jerk = wire.numbers(v, "ackermann control", 5)
     return AckermannTarget(wire.iso_steer(steer), abs(steer_speed), speed, abs(acceleration), jerk)

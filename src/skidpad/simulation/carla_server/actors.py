@@ -68,7 +68,7 @@ class Actor:
         return self.half[2] if self.family is Family.WALKER else 0.0
 
     def box(self) -> list[list[float]]:
-        """Its BoundingBox as it travels."""
+        """Returns its BoundingBox as it travels."""
         return wire.box(wire.iso_to_wire(self.centre), self.half)
 
     def description(self) -> list[Any]:
@@ -170,7 +170,7 @@ class ActorTable:
         return float(s.vx[i]), float(s.vy[i]), self.rising.get(actor.id, 0.0)
 
     def box(self, actor: Actor) -> Box:
-        """Its box in the world."""
+        """Returns an actor's box in the world."""
         x, y, z = actor.centre
         return Box(self.pose(actor).moved(forward=x, left=y, up=z), actor.half)
 

@@ -25,7 +25,7 @@ class Boxes:
 
     @classmethod
     def of(cls, found: Iterable[tuple[int, Box]]) -> Boxes:
-        """From pairs of owner and box."""
+        """Makes boxes from pairs of owner and box."""
         pairs = list(found)
         pose = [(p.x, p.y, p.z, p.yaw) for _, (p, _) in pairs]
         half = [h for _, (_, h) in pairs]

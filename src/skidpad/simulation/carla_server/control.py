@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(slots=True)
 class Control:
-    """As last applied, until the next one; ISO steer."""
+    """A vehicle's control as last applied, until the next one; ISO steer."""
 
     throttle: float = 0.0
     steer: float = 0.0

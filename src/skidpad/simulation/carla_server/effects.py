@@ -24,7 +24,7 @@ class Acting:
 
 @cache
 def load_acting() -> Acting:
-    """As listed beside the blueprints."""
+    """Reads what acts, as listed beside the blueprints."""
     data = load_data()["acting"]
     return Acting(
         always=frozenset(data["always"]),

@@ -72,7 +72,7 @@ class Engine:
 
 
 def parse_engine(value: Sequence[Any]) -> Engine:
-    """From the members of a call; WireError names what is not possible."""
+    """Reads an engine from the members of a call; WireError names what is not possible."""
     name = "physics control"
     curve = [wire.numbers(p, f"{name}.torque_curve", 2) for p in wire.items(value[0], "curve")]
     gears = [wire.numbers(g, f"{name}.forward_gears", 3) for g in wire.items(value[10], "gears")]
@@ -129,7 +129,7 @@ class Traction(NamedTuple):
 
 
 def at_wheels(engine: Engine, radius: float) -> Traction:
-    """Of wheels of this radius in m. Without a ratio or revolutions nothing is driven."""
+    """Returns the traction at wheels of this radius in m; without a ratio or revolutions there is none."""
     ratios = [g[0] * engine.final_ratio for g in engine.gears if g[0] > 0.0]
     if not ratios or not engine.is_told or engine.max_rpm * engine.final_ratio <= 0.0:
         return Traction(0.0, 0.0, 0.0)

@@ -87,7 +87,7 @@ class Episode:
     def __init__(
         self, map: ServedMap, stock: Stock, clock: Clock, layers: int = ALL_LAYERS
     ) -> None:
-        """Everything that takes long is made here, so that a failure leaves the old episode."""
+        """Makes everything that takes long, so that a failure leaves the old episode."""
         self.map, self.stock = map, stock
         map.prepare()
         self.landscape = Landscape(map.roads, map.has_layers, layers)
@@ -267,7 +267,7 @@ class Episode:
             self.falling.start_fall(actor)
 
     def simulate(self, actor: Actor, on: bool) -> None:
-        """Off: it stays where clients put it."""
+        """Switches an actor's physics; off, it stays where clients put it."""
         if actor.body is not None and actor.family is not Family.PROP:
             self.moving.set_simulated(actor.body, on)
             self.moving.set_grounded(actor.body, on)
@@ -278,7 +278,7 @@ class Episode:
         self.moving.stand_among(obstacles(self.landscape.roads))
 
     def move(self, dt: float) -> None:
-        """One tick of driving and walking."""
+        """Drives and walks all actors by one tick."""
         self.moving.grip = self.sky.grip
         self.vehicles.command(dt)
         self.moving.step()

@@ -29,7 +29,7 @@ BY_COLUMNS = (Family.VEHICLE, Family.TRAFFIC_LIGHT, Family.TRAFFIC_SIGN)
 
 
 def fill_actor(rows: Rows, actors: ActorTable, actor: Actor) -> None:
-    """Where an actor is that is no vehicle."""
+    """Writes where an actor is that is no vehicle."""
     (x, y, z), (pitch, yaw, roll) = wire.transform(actors.pose(actor))
     rows.vehicles["pose"][actor.row] = (x, y, z, pitch, yaw, roll)
 

@@ -77,7 +77,7 @@ def _bodies(placed: Places) -> list[tuple[int, float, float]]:
 
 
 def _lines(roads: RoadMap) -> Iterator[tuple[int, Line]]:
-    """By the lane on which one waits."""
+    """Yields lines by the lane on which one waits."""
     entry = priority_of(roads)[0]
     for lane in np.flatnonzero(np.isin(entry["control"], (STOP, YIELD))).tolist():
         least = STOPPED if entry["control"][lane] == STOP else 0.0

@@ -89,7 +89,7 @@ def _polygons(mesh: WalkMesh) -> NDArray[np.void]:
 
 
 def _details(sizes: list[int]) -> tuple[NDArray[np.void], NDArray[np.uint8]]:
-    """Each polygon's surface for heights: a fan around its first corner.
+    """Triangulates each polygon for heights: a fan around its first corner.
 
     A triangle's last byte says which of its edges lie on the polygon's outline, two bits for each.
     """

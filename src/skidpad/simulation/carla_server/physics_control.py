@@ -33,7 +33,7 @@ DRAG_PER_AREA = 0.3 / 0.7  # CARLA's coefficient for a car of 0.7 m^2 drag area;
 
 @dataclass(frozen=True, slots=True)
 class PhysicsControl:
-    """As last set, in the wire's order and units; wheels FL, FR, RL, RR."""
+    """A vehicle's physics as last set, in the wire's order and units; wheels FL, FR, RL, RR."""
 
     engine: Engine
     mass: float
@@ -87,7 +87,7 @@ class PhysicsControl:
 
 
 def parse_physics(value: Any) -> PhysicsControl:
-    """From a call; two wheels of a two-wheeler count for both sides."""
+    """Reads physics from a call; two wheels of a two-wheeler count for both sides."""
     v = wire.items(value, "physics control", MEMBERS)
     wheels = [wire.items(w, "wheel", 10) for w in wire.items(v[15], "wheels")]
     if len(wheels) == 2:

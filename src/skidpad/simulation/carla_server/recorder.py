@@ -77,7 +77,7 @@ class Recorder:
             self._file = None
 
     def tick(self, clock: Clock, actors: ActorTable, moving: World, vehicles: Vehicles) -> None:
-        """One line: frame, time, poses of what moves, contacts, new actors, controls of vehicles."""
+        """Writes a line: frame, time, poses of what moves, contacts, new actors, controls of vehicles."""
         if self._file is None:
             return
         poses, born = [], []

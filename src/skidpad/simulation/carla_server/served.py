@@ -66,7 +66,7 @@ class Served:
         self._publish_snapshot()
 
     def apply(self, settings: EpisodeSettings) -> None:
-        """From the next tick on."""
+        """Applies settings from the next tick on."""
         self.clock.settings = settings
         self.episode.moving.set_step(settings.step)
 

@@ -149,7 +149,7 @@ def header(kind: SensorType, frame: int, time: float, pose: tuple[float, ...] | 
 
 
 def message(clock: Clock, rows: Rows, platform_time: float, bits: int) -> bytes:
-    """One snapshot, ready to send."""
+    """Encodes one snapshot, ready to send."""
     return b"".join(
         (
             header(SensorType.WORLD, clock.frame, clock.elapsed, None),

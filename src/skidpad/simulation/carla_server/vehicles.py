@@ -127,7 +127,7 @@ class Vehicles:
         return self._by_actor[actor]
 
     def row(self, actor: int) -> int:
-        """Its row in the moving world."""
+        """Returns an actor's row in the moving world."""
         return self.moving.row(self._by_actor[actor].body)
 
     def add(self, actor: int, blueprint: Blueprint, pose: Pose) -> Vehicle:

@@ -139,7 +139,7 @@ class Lights:
         return changed
 
     def set_state(self, light: Light, state: LightState) -> None:
-        """One lamp is set; its group's clock goes on from there."""
+        """Sets one lamp; its group's clock goes on from there."""
         light.show(state)
         group = self.groups[light.group]
         for i, phase in enumerate(group.phases):

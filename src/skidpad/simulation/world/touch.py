@@ -85,7 +85,7 @@ class Markings(NamedTuple):
 
 
 def markings_of(map: RoadMap) -> Markings:
-    """Nothing crossed yet."""
+    """Returns the markings of a map; nothing is crossed yet."""
     return Markings(
         map.samples.marking_left, map.samples.marking_right, np.array([-1, 0, 0], dtype=np.int64)
     )

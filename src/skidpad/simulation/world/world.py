@@ -191,7 +191,7 @@ class World:
         self.arena = hold(arena)
 
     def let_drive(self, traffic: Traffic) -> None:
-        """From now on actors can have drivers."""
+        """Lets actors have drivers from now on."""
         self.traffic = traffic
         self._arrange(self.members)
 
@@ -209,7 +209,7 @@ class World:
             self._fill_grips()
 
     def lay(self, road: Road) -> None:
-        """From now on the weather does this to the road, in patches too."""
+        """Sets what the weather does to the road from now on, in patches too."""
         self._grip, self._road = road.params(), road
         self._fill_grips()
         if self.patches is not None:
@@ -222,7 +222,7 @@ class World:
             self.on_wheels.grips[i] = self._grip if own is None else own
 
     def stand_among(self, found: Obstacles) -> None:
-        """From now on these are what stands beside the road."""
+        """Sets what stands beside the road from now on."""
         self.obstacles = found
         self._outfit()
 
@@ -285,7 +285,7 @@ class World:
         self.rows.held[self.row(id)] = np.nan if velocity is None else velocity
 
     def set_simulated(self, id: int, on: bool) -> None:
-        """Off: it stays where it is put, and nothing pushes it."""
+        """Switches an actor's physics; off, it stays where it is put, and nothing pushes it."""
         self.rows.simulated[self.row(id)] = on
         self._weigh()
 
@@ -297,11 +297,11 @@ class World:
         self.bodies.inverse_inertia[~self.rows.simulated] = 0.0
 
     def set_collides(self, id: int, on: bool) -> None:
-        """Off: it passes through everything."""
+        """Switches an actor's contacts; off, it passes through everything."""
         self.rows.collides[self.row(id)] = on
 
     def set_grounded(self, id: int, on: bool) -> None:
-        """Off: its height does not follow the road."""
+        """Switches whether an actor's height follows the road."""
         self.rows.grounded[self.row(id)] = on
 
     def set_tyres(self, id: int, friction: Sequence[float]) -> None:

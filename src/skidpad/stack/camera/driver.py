@@ -68,7 +68,7 @@ class CameraDriver:
         return "" if self.report.tier is None else self.report.tier.name.lower()
 
     def sensors(self) -> tuple[SensorSpec, ...]:
-        """Its three cameras."""
+        """Returns the driver's three cameras."""
         return CAMERAS
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:

@@ -55,7 +55,7 @@ class Channel:
         self.reset()
 
     def reset(self) -> None:
-        """At the start of the route."""
+        """Begins anew at the start of the route."""
         self.tracker.reset()
         self.controller.reset()
         self.at = 0  # point of the route beside the ego
@@ -173,7 +173,7 @@ class Channel:
         return not self._may_pass(line, gap, objects, v, view.ego[:2])
 
     def _may_pass(self, line: Line, gap: float, objects: Floats, v: float, ego: Floats) -> bool:
-        """At a stop line after a stop, at a yield line when slow, and when nobody is coming."""
+        """Whether to pass a stop line after a stop, or a yield line when slow, when nothing comes."""
         if self.halted == line.s and gap > HALT_REACH:
             self.halted = None
         near = gap < HALT_REACH

@@ -60,7 +60,7 @@ class Tracker:
         self.reset()
 
     def reset(self) -> None:
-        """Nothing seen yet; odometry at its origin."""
+        """Forgets all tracks and puts odometry to its origin."""
         self._all = np.zeros(MAX_TRACKS, dtype=TRACK)
         self.count = 0
         self.next_id = 0

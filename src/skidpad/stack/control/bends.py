@@ -41,7 +41,7 @@ class BendSpeed:
         self.reset()
 
     def reset(self) -> None:
-        """Nothing was looked at yet."""
+        """Forgets what was looked at."""
         self.allowed, self.wait = inf, 0
 
     def update(self, v: float, curvature: CurvatureAhead) -> float:

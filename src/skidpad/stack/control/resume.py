@@ -43,7 +43,7 @@ class ResumeProtocol:
         return self.end is ResumeEnd.FIRST_CURVE and not self.past_curve
 
     def update(self, stop_requested: bool, v_kmh: float, curvature: float) -> None:
-        """One tick; curvature of the ego's lane in 1/m."""
+        """Takes in one tick; curvature of the ego's lane in 1/m."""
         if stop_requested and v_kmh < STOPPED_BELOW_KMH:
             self.ticks, self.in_curve, self.past_curve = 0, False, False
         elif self.ticks is not None:
@@ -72,7 +72,7 @@ class SpeedCaps:
         return min(self.v_cruise_kmh, self._resume(resume_active))
 
     def following_kmh(self, resume_active: bool) -> float:
-        """Above this, following gives no throttle; inf: no cap (A-129, A-178)."""
+        """Returns the speed above which following gives no throttle; inf: no cap (A-129, A-178)."""
         if self.scope is CapScope.CRUISE:
             return inf
         return min(self.limiter, self._resume(resume_active))

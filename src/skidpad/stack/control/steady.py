@@ -22,7 +22,7 @@ class SteadySpeed:
         self.reset()
 
     def reset(self) -> None:
-        """Nothing is known about wind and grade."""
+        """Forgets what was learnt about wind and grade."""
         self.integral = 0.0
 
     def update(self, error: float) -> float:

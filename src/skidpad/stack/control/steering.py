@@ -76,7 +76,7 @@ class LazyDriver:
         self.lookahead, self.dead_band, self.gain = lookahead, dead_band, gain
 
     def steer(self, pose: Pose, v: float, path: PathAhead) -> float:
-        """As `LaneCentring.steer`."""
+        """Steers as `LaneCentring.steer` does."""
         command = steer_towards(pose, kmh_from_mps(v), path(self.lookahead, pose.yaw))
         return 0.0 if abs(command) < self.dead_band else self.gain * command
 
@@ -120,7 +120,7 @@ class NoSmoothing(NamedTuple):
     """The command as it is."""
 
     def reset(self) -> None:
-        """Nothing to forget."""
+        """Does nothing, as nothing is remembered."""
 
     def update(self, command: float) -> float:
         """The command."""

@@ -27,7 +27,7 @@ BY_LIGHT = frozenset({Tier.APPROACH, Tier.LIGHT_STOP, Tier.HOLDING_AT_LINE})
 
 
 def mode_text(report: StackReport, lca_on: bool, verified_by: str = "") -> str:
-    """For example `ACC CLOSE 1.9 s [LCA on]`.
+    """Writes the mode in words, for example `ACC CLOSE 1.9 s [LCA on]`.
 
     verified_by: the camera pair that confirmed a target at standstill, shown in brackets.
     """

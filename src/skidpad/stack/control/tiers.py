@@ -342,13 +342,13 @@ class Hierarchy:
         )
 
     def reset_pids(self) -> None:
-        """After tiers 1 and 3 and after a relocation (A-109)."""
+        """Resets the controllers after tiers 1 and 3 and after a relocation (A-109)."""
         self.speed_pid.reset()
         self.speed_hold.reset()
         self.distance_pid.reset()
 
     def reset(self) -> None:
-        """After a relocation: nothing of the old place counts."""
+        """Forgets everything of the old place after a relocation."""
         self.reset_pids()
         self.lead_at_light.reset()
         self.cruise.reset()

@@ -89,7 +89,7 @@ class CameraPair:
     def read_through(
         self, keep: Corridor, frame: SensorFrame, yaw_error: float, kappa: float
     ) -> float | None:
-        """As `read`, through another corridor of the same rows."""
+        """Reads as `read` does, through another corridor of the same rows."""
         segments = frame.segments.get(self.depth_id)
         if segments is not None:
             distance = corridor.read_segments(*segments, keep, PERCENTILE, sin(yaw_error), kappa)

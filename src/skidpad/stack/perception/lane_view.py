@@ -58,12 +58,12 @@ class HighwayRoute:
     def ahead(
         self, map: RoadMap, point: LanePoint, distance: float, heading: float
     ) -> LanePoint | None:
-        """Along the branch that turns least from `heading`."""
+        """Goes ahead along the branch that turns least from `heading`."""
         return map.ahead(point, distance, heading)
 
 
 class FirstBranchRoute:
-    """As printed: stay in the lane and take whichever branch comes first."""
+    """A route as printed: stay in the lane and take whichever branch comes first."""
 
     def reference(self, map: RoadMap, point: LanePoint, highway: frozenset[int]) -> LanePoint:  # noqa: ARG002
         """The lane itself."""
@@ -76,7 +76,7 @@ class FirstBranchRoute:
         distance: float,
         heading: float,  # noqa: ARG002
     ) -> LanePoint | None:
-        """Along the first branch of the map."""
+        """Goes ahead along the first branch of the map."""
         places = map.all_ahead(point, distance)
         return places[0] if places else None
 

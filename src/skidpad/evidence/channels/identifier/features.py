@@ -55,7 +55,7 @@ _UPPER = np.array([i in GREATEST for i in PAIR_INDICATORS])
 
 
 def feature_row(readings: IndicatorReadings, risk: RiskMatrix, signals: SignalReadings) -> Floats:
-    """One cycle as (len(ROW_NAMES),)."""
+    """Returns the features of one cycle, (len(ROW_NAMES),)."""
     pairs = np.where(_UPPER, _greatest(readings.by_pair()), _least(readings.by_pair()))
     ahead, behind = risk.risk_ahead.reshape(1, -1), risk.risk_behind.reshape(1, -1)
     times = np.minimum(

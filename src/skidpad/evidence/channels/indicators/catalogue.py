@@ -38,7 +38,7 @@ class Category(str, Enum):
 
 
 class Bound(str, Enum):
-    """On which side of its threshold an indicator raises an alarm."""
+    """The side of its threshold on which an indicator raises an alarm."""
 
     LOWER = "lower"
     UPPER = "upper"

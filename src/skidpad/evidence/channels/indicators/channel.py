@@ -87,7 +87,7 @@ class ChannelIndicators:
         return comfort.path_comfort(times, xs, ys, headings, settings.steepness, printed)
 
     def _fitted_comfort(self, t: float, poses: Floats) -> float:
-        """From accelerations fitted to `poses` (k, 4) now and a second ago."""
+        """Returns comfort from accelerations fitted to `poses` (k, 4) now and a second ago."""
         times, x, y, heading = np.ascontiguousarray(poses.T)
         along, across = comfort.fitted_acceleration(times, x, y, float(heading[len(heading) // 2]))
         drop_repeat(self._fits, t)

@@ -19,7 +19,7 @@ Lap = Callable[[str], None]
 
 
 def no_lap(_: str) -> None:
-    """For who does not measure."""
+    """Does nothing, where nothing is timed."""
 
 
 class IndicatorPanel:

@@ -154,7 +154,7 @@ class Looked(NamedTuple):
 
 
 def look(channels: Sequence[str], cycles: Sequence[Cycle]) -> list[Looked]:
-    """Each cycle in path coordinates."""
+    """Transforms each cycle into path coordinates."""
     lookouts = [Lookout() for _ in channels]
     rows = ((c.t, [None if f is None else usable(f).frame for f in c.frames]) for c in cycles)
     return [
@@ -166,7 +166,7 @@ def look(channels: Sequence[str], cycles: Sequence[Cycle]) -> list[Looked]:
 def _short(
     tracked: Tracked, looked: Sequence[Looked], begin: float
 ) -> dict[HazardType, tuple[Span, ...]]:
-    """Where its gaps are short."""
+    """Returns the stretches in which gaps are short."""
     rows = [tracked.distances(*cycle) for cycle in looked]
     t = np.array([cycle.t for cycle in looked])
     short = {

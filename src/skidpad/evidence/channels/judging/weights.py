@@ -41,7 +41,7 @@ class Weights(NamedTuple):
 
 
 def weights_from(context: Mapping[str, str]) -> Weights:
-    """Of a recording's words; FileError for those that are none."""
+    """Reads weights from a recording's context; FileError where they are damaged."""
     text, jumps = context.get("weights", "{}"), context.get("weight_of_jumps", "1")
     try:
         drivers = {f"actor {i}": (float(a), float(b)) for i, (a, b) in json.loads(text).items()}

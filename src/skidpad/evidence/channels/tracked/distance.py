@@ -28,7 +28,7 @@ class SafeDistance:
 
     @classmethod
     def on(cls, grip: float) -> SafeDistance:
-        """With this coefficient of friction for both; ConfigError out of range."""
+        """Returns distances with one coefficient of friction for both; ConfigError out of range."""
         require_range("grip", grip, *GRIPS)
         return cls(b_follower=grip * G, b_leader=min(HARD_BRAKING, grip * G))
 

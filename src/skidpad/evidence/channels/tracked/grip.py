@@ -91,7 +91,7 @@ def planned_acceleration(frame: ChannelFrame) -> float | None:
 
 
 def slope(t: Floats, values: Floats) -> float:
-    """Of the straight line through the values (k,) at times (k,)."""
+    """Returns the slope of the straight line through the values (k,) at times (k,)."""
     dt = t - t.mean()
     return float(dt @ values / (dt @ dt))
 

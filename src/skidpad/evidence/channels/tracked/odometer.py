@@ -22,7 +22,7 @@ class Odometer:
         self.errors: deque[tuple[float, float, float]] = deque()  # t, position less odometry
 
     def update(self, t: float, frame: ChannelFrame | None) -> None:
-        """One cycle; None: no message."""
+        """Takes in one cycle; None: no message."""
         if frame is None or not np.isfinite(frame.ego).all():
             self.before = None
             self.errors.clear()

@@ -121,7 +121,7 @@ class Lookout:
         self.way = Way()
 
     def see(self, frame: ChannelFrame | None) -> Seen | None:
-        """One cycle; None: no message, or one without a place of the ego."""
+        """Looks at one cycle; None: no message, or one without a place of the ego."""
         if frame is None or not Way.usable(frame):
             return None
         self.way.update(frame)
@@ -155,7 +155,7 @@ class Tracks:
         return iter(self.tracks.values())
 
     def update(self, t: float, seen: Seen | None) -> None:
-        """One cycle; without a message tracks wait for their end."""
+        """Takes in one cycle; without a message tracks wait for their end."""
         self.observe(t, seen)
         if seen is not None:
             for track in self:

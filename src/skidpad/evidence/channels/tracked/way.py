@@ -31,7 +31,7 @@ class Way:
         return len(frame.ego_polygon) > 2 and abs(x) + abs(y) < FAR and all(map(isfinite, rest))
 
     def update(self, frame: ChannelFrame) -> None:
-        """Where the ego is in this cycle."""
+        """Appends where the ego is in this cycle."""
         place = (float(frame.ego[0]), float(frame.ego[1]))
         moved = dist(place, self.past[-1]) if self.past else STEP
         if moved > LEAP:
@@ -87,7 +87,7 @@ class Line:
         self.heading = np.arctan2(ways[:, 1], ways[:, 0])
 
     def places(self, states: Floats) -> list[Placed]:
-        """Of n > 0 states (n, 5)."""
+        """Places n > 0 states (n, 5) on the line."""
         apart = states[:, None, :2] - self.points[None]
         k = np.argmin(apart[:, :, 0] ** 2 + apart[:, :, 1] ** 2, axis=1)
         h = self.heading[k]

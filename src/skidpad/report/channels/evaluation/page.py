@@ -61,7 +61,7 @@ def write_evaluation_report(folder: Path) -> Path:
 
 
 class _Result(msgspec.Struct):
-    """Of one identifier against one truth."""
+    """The result of one identifier against one truth."""
 
     rules: str
     truth: Literal["sim", "world", "labels"]

@@ -216,7 +216,7 @@ def _module_table(segments: pl.DataFrame, modules: list[str]) -> list[Block]:
 
 
 def _merge_segments(segments: pl.DataFrame, module: str) -> Row:
-    """Of all cycles of several segments, from the figures of each."""
+    """Merges the figures of several segments into those of all their cycles."""
     hours, mean, std = (segments[c].to_numpy() for c in ("hours", module + MEAN, module + STD))
     weight = hours / hours.sum()
     centre = float(weight @ mean)

@@ -39,7 +39,7 @@ def headline(evaluation: Row) -> list[Row]:
 
 
 def ratio_text(ratio: float | None) -> str:
-    """In percent, without its sign."""
+    """Writes a ratio in percent, without the sign."""
     return "-" if ratio is None else percent(ratio)
 
 

@@ -22,7 +22,7 @@ COUNTS = (
 
 
 def factors(matrix: Matrix) -> list[Block]:
-    """Nothing when only published configurations at their own targets were driven."""
+    """Returns tables of functions and targets, none when only published configurations were driven."""
     if all(config in CONFIGS for config in matrix.configs):
         return []
     levels = sorted(set(_known_runs(matrix).select("functions", "cruise_kmh").rows()))

@@ -37,7 +37,7 @@ PUBLISHED = {  # column of results: what the published experiment had, in words
 
 
 def differences(matrix: Matrix) -> list[str]:
-    """In what these runs are not the published experiment; every one has another simulator."""
+    """Lists in what these runs differ from the published experiment; all have another simulator."""
     found = []
     for column, (values, words) in PUBLISHED.items():
         here = {str(v) for v in matrix.results[column].unique()}

@@ -80,7 +80,7 @@ def destroy_actor(served: Served, id: Any) -> bool:
 
 @TABLE.method("get_actor_bounding_box")
 def get_actor_bounding_box(served: Served, id: Any) -> list[Any]:
-    """Of the living and the dead: an error would abort a client's Traffic Manager."""
+    """Returns boxes of living and dead actors: an error would abort a client's Traffic Manager."""
     actor = served.episode.actors.find(id)
     return wire.box((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)) if actor is None else actor.box()
 

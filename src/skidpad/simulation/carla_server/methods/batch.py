@@ -54,7 +54,7 @@ SPAWN = 0
 
 @TABLE.method("apply_batch", Shape.PLAIN)
 def apply_batch(served: Served, commands: Any, do_tick: Any) -> list[Any]:
-    """Each command's actor id, or its error."""
+    """Applies the commands; each gives its actor's id or its error."""
     outcomes = [_outcome(served, c) for c in wire.items(commands, "commands")]
     if wire.flag(do_tick, "do_tick") and served.clock.settings.synchronous:
         served.tick()

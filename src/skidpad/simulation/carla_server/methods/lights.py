@@ -67,7 +67,7 @@ def set_traffic_light_red_time(served: Served, id: Any, seconds: Any) -> None:
 
 @TABLE.method("freeze_traffic_light", Shape.VOID)
 def freeze_traffic_light(served: Served, id: Any, frozen: Any) -> None:
-    """Its whole group stands still."""
+    """Stops or starts the light's whole group."""
     _group(served, id).frozen = wire.flag(frozen, "freeze")
 
 
@@ -79,7 +79,7 @@ def freeze_all_traffic_lights(served: Served, frozen: Any) -> None:
 
 @TABLE.method("reset_traffic_light_group", Shape.VOID)
 def reset_traffic_light_group(served: Served, id: Any) -> None:
-    """Its group from the beginning."""
+    """Starts the light's group from the beginning."""
     _lights(served).reset(_group(served, id))
 
 

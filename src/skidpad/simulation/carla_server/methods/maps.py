@@ -78,7 +78,7 @@ def request_file(served: Served, name: Any) -> bytes:
 
 @TABLE.method("get_navigation_mesh")
 def get_navigation_mesh(served: Served) -> bytes:
-    """Its content; empty where the map has none, and the client then says so."""
+    """Returns the mesh's content; empty where the map has none, and the client then says so."""
     navigation = served.episode.map.navigation
     return b"" if navigation is None else navigation[1]
 

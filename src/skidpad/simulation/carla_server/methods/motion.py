@@ -127,7 +127,7 @@ def add_actor_angular_impulse(served: Served, id: Any, impulse: Any) -> None:
 
 @TABLE.method("add_actor_torque", Shape.VOID)
 def add_actor_torque(served: Served, id: Any, torque: Any) -> None:
-    """For one tick; only the part about the vertical acts."""
+    """Applies a torque for one tick; only the part about the vertical acts."""
     twist(served, id, torque, served.clock.step)
 
 
@@ -152,14 +152,14 @@ def twist(served: Served, id: Any, amount: Any, seconds: float) -> None:
 
 @TABLE.method("set_actor_simulate_physics", Shape.VOID)
 def set_actor_simulate_physics(served: Served, id: Any, enabled: Any) -> None:
-    """Off: it stays where clients put it."""
+    """Switches an actor's physics; off, it stays where clients put it."""
     on = wire.flag(enabled, "enabled")
     served.episode.simulate(served.episode.actors.get(id), on)
 
 
 @TABLE.method("set_actor_collisions", Shape.VOID)
 def set_actor_collisions(served: Served, id: Any, enabled: Any) -> None:
-    """Off: it passes through everything; clients switch it off for all walkers that they guide."""
+    """Switches contacts; off, it passes through everything, as clients do with the walkers they guide."""
     on = wire.flag(enabled, "enabled")
     vehicle = _vehicle(served, served.episode.actors.get(id).id)
     if vehicle is not None:
@@ -168,7 +168,7 @@ def set_actor_collisions(served: Served, id: Any, enabled: Any) -> None:
 
 @TABLE.method("set_actor_enable_gravity", Shape.VOID)
 def set_actor_enable_gravity(served: Served, id: Any, enabled: Any) -> None:
-    """Off: a vehicle or walker keeps its height."""
+    """Switches gravity; off, a vehicle or walker keeps its height."""
     actor = served.episode.actors.get(id)
     served.episode.falling.weigh(actor, wire.flag(enabled, "enabled"))
 

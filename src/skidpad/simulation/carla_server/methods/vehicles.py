@@ -81,7 +81,7 @@ def apply_ackermann_controller_settings(served: Served, id: Any, settings: Any) 
 
 @TABLE.method("get_physics_control")
 def get_physics_control(served: Served, id: Any) -> list[Any]:
-    """As last set, with the wheels' present places."""
+    """Returns the physics as last set, with the wheels' present places."""
     actor = served.episode.actors.get(id, Family.VEHICLE)
     vehicle = served.episode.vehicles.of(actor.id)
     pose = served.episode.actors.pose(actor)

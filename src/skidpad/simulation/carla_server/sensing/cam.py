@@ -109,7 +109,7 @@ class Motion:
 
 @dataclass(slots=True)
 class Rhythm:
-    """When the next message is due."""
+    """Decides when the next message is due."""
 
     shortest: float  # s
     longest: float

@@ -128,7 +128,7 @@ def srgb(linear: Floats) -> Floats:
 
 
 def _normal(_: Pictured, view: View, camera: Camera, out: Bytes) -> None:
-    """Of the world, in CARLA's axes, as the camera of normals sends them."""
+    """Writes normals of the world, in CARLA's axes, as the camera of normals sends them."""
     bgra_from_normals(world_normals(view, camera.drawn.inverse), out)
 
 
@@ -145,7 +145,7 @@ def _material(scene: Pictured, _: View, camera: Camera, out: Bytes) -> None:
 
 
 def _base_colour(scene: Pictured, _: View, camera: Camera, out: Bytes) -> None:
-    """Of the surface, without light: as sRGB."""
+    """Writes colours of the surface without light, as sRGB."""
     colours = scene.shading.surfaces(camera.drawn.key)[..., :3]
     solid = (camera.drawn.inverse > 0.0)[..., None]
     out[..., 2::-1] = np.rint(WHITE * np.sqrt(np.minimum(colours, 1.0)) * solid)

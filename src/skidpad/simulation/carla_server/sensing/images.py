@@ -65,7 +65,7 @@ class Camera:
 
 
 def make_camera(actor: Actor, _: int) -> Camera:
-    """From an actor's attributes; WireError or ConfigError when they cannot be used."""
+    """Makes a camera from an actor's attributes; WireError or ConfigError when they cannot be used."""
     width = wire.integer(int(actor.attributes["image_size_x"]), "image_size_x", 1, WIDEST)
     height = wire.integer(int(actor.attributes["image_size_y"]), "image_size_y", 1, WIDEST)
     if width * height > MAX_PIXELS:

@@ -68,7 +68,7 @@ class Radio:
 
 
 def make_radio(actor: Actor) -> Radio:
-    """From an actor's attributes; WireError when they cannot be used."""
+    """Makes a radio from an actor's attributes; WireError when they cannot be used."""
     a = actor.attributes
     frequency, d_ref = float(a["frequency_ghz"]), float(a["d_ref"])
     for name, value in (("frequency_ghz", frequency), ("d_ref", d_ref)):

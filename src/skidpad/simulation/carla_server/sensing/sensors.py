@@ -53,7 +53,7 @@ class SensorSet:
         return any(_is_heard(sensor, hub) for sensor in self._sensors.values())
 
     def produce(self, around: Surroundings, clock: Clock, hub: StreamHub) -> None:
-        """One tick of every sensor that is due and listened to."""
+        """Measures one tick of every sensor that is due and listened to."""
         time = clock.elapsed
         for sensor in self._sensors.values():
             speak = self._producers[sensor.actor.blueprint.id].speak

@@ -148,7 +148,7 @@ def _place(around: Surroundings, sensor: Sensor, pose: Pose) -> cam.Motion:
 def _motion(
     around: Surroundings, sensor: Sensor, carrier: Actor, place: cam.Motion, speed: float
 ) -> cam.Motion:
-    """Of a vehicle, felt at its origin, with the sensor's noise."""
+    """Returns the motion of a vehicle, felt at its origin, with the sensor's noise."""
     assert carrier.body is not None
     row, moving = around.moving.row(carrier.body), around.moving
     felt = inertial.imu(Pose(0.0, 0.0), moving.states, row, around.gravity)

@@ -76,7 +76,7 @@ def streets_of(map: RoadMap) -> Streets:
 
 
 def no_streets() -> Streets:
-    """Of a world without drivers."""
+    """Returns the streets of a world without drivers."""
     lanes = np.empty(0, dtype=np.int32)
     net = Network(np.empty(0, POINT), np.empty(0, LANE), np.empty(0, STOP), lanes, lanes)
     rows = np.empty(0, ENTRY), np.empty(0, CONFLICT), np.empty(0, ZEBRA)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 import typer
 
@@ -11,14 +12,15 @@ channels = typer.Typer(
 )
 
 
-FILE = typer.Argument(help="A channel recording (.mcap), or a ROS 2 bag with --mapping.")
-MAPPING = typer.Option(None, help="YAML that says which topics of a ROS 2 bag are what.")
-A = typer.Argument(help="Output folder of `skidpad monitor`, or one of many.")
-B = typer.Argument(help="The other one.")
-
-
 @channels.command()
-def info(file: Path = FILE, mapping: Path | None = MAPPING) -> None:
+def info(
+    file: Annotated[
+        Path, typer.Argument(help="A channel recording (.mcap), or a ROS 2 bag with --mapping.")
+    ],
+    mapping: Annotated[
+        Path | None, typer.Option(help="YAML that says which topics of a ROS 2 bag are what.")
+    ] = None,
+) -> None:
     """Say what a recording holds and what is wrong with it."""
     from skidpad.recording.channels.cycles import cycles
     from skidpad.recording.channels.mcap_files import McapRecording
@@ -55,7 +57,10 @@ def info(file: Path = FILE, mapping: Path | None = MAPPING) -> None:
 
 
 @channels.command()
-def compare(a: Path = A, b: Path = B) -> None:
+def compare(
+    a: Annotated[Path, typer.Argument(help="Output folder of `skidpad monitor`, or one of many.")],
+    b: Annotated[Path, typer.Argument(help="The other one.")],
+) -> None:
     """Compare two monitored drives cycle by cycle, B less A."""
     from skidpad.evidence.channels.comparison import compare_drives
     from skidpad.recording.channels.indicators import read_indicators

@@ -14,8 +14,6 @@ from skidpad.core.run import ChannelCrew
 from skidpad.core.simulator import BackendChoice
 from skidpad.live.settings import Links
 
-FOLDERS = typer.Argument(help="Folders of `skidpad channels drive`.")
-
 
 @spread_fields()
 def drive(
@@ -123,7 +121,9 @@ def _describe_monitor(folder: Path) -> str:
     return f"{folder.name}: {read_outcome(folder).sentence}{delay}"
 
 
-def outcomes(folders: list[Path] = FOLDERS) -> None:
+def outcomes(
+    folders: Annotated[list[Path], typer.Argument(help="Folders of `skidpad channels drive`.")],
+) -> None:
     """Compare drivers over the seeds that all have driven: does redundancy pay?"""
     from skidpad.core.errors import FileError
     from skidpad.recording.channels.drives import read_outcomes

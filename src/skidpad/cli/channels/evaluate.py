@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -25,26 +25,26 @@ class Truth(str, Enum):
     world = "world"
 
 
-DIR = typer.Argument(help="Folder with .mcap recordings, at any depth.")
-LABELS = typer.Option(None, help="Human labels (CSV).")
-TRUTH = typer.Option(Truth.both, help="Which truth to judge by.")
-CURVE = typer.Option(
-    None, help="Also vary the thresholds on this signal, such as gap, from half to double."
-)
-MODEL = typer.Option(None, help="Also judge this learned identifier (.npz; `bundled`: ours).")
-OUT = typer.Option(None, help="Folder for the results; default: DIR.")
-MODEL_OUT = typer.Option(..., "--out", help="Model file to write (.npz).")
-WORKERS = typer.Option(0, help="Processes; 0: one per core.")
+Dir = Annotated[Path, typer.Argument(help="Folder with .mcap recordings, at any depth.")]
+Workers = Annotated[int, typer.Option(help="Processes; 0: one per core.")]
 
 
 def evaluate(
-    folder: Path = DIR,
-    labels: Path | None = LABELS,
-    truth: Truth = TRUTH,
-    curve: str | None = CURVE,
-    model: Path | None = MODEL,
-    out: Path | None = OUT,
-    workers: int = WORKERS,
+    folder: Dir,
+    labels: Annotated[Path | None, typer.Option(help="Human labels (CSV).")] = None,
+    truth: Annotated[Truth, typer.Option(help="Which truth to judge by.")] = Truth.both,
+    curve: Annotated[
+        str | None,
+        typer.Option(
+            help="Also vary the thresholds on this signal, such as gap, from half to double."
+        ),
+    ] = None,
+    model: Annotated[
+        Path | None,
+        typer.Option(help="Also judge this learned identifier (.npz; `bundled`: ours)."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for the results; default: DIR.")] = None,
+    workers: Workers = 0,
 ) -> None:
     """Judge who finds hazards by precision and recall; writes evaluation.json and report.html."""
     import json
@@ -78,7 +78,11 @@ def evaluate(
     _print_results(table)
 
 
-def train(folder: Path = DIR, out: Path = MODEL_OUT, workers: int = WORKERS) -> None:
+def train(
+    folder: Dir,
+    out: Annotated[Path, typer.Option("--out", help="Model file to write (.npz).")],
+    workers: Workers = 0,
+) -> None:
     """Train the learned identifier on recordings with truth; writes the model and its card."""
     from skidpad.recording.sources import recordings_below
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from enum import Enum
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import typer
 
 hazards = typer.Typer(
     name="hazards", help="Hazardous scenes that a monitor found.", no_args_is_help=True
 )
-DIR = typer.Argument(help="Output folder of `skidpad monitor`.")
-ID = typer.Option(None, "--id", help="Only this hazard; may be repeated.")
+Dir = Annotated[Path, typer.Argument(help="Output folder of `skidpad monitor`.")]
+Id = Annotated[list[str] | None, typer.Option("--id", help="Only this hazard; may be repeated.")]
 
 
 class Osc(str, Enum):
@@ -23,13 +23,13 @@ class Osc(str, Enum):
     v1_0 = "1.0"
 
 
-OSC = typer.Option(Osc.v1_2, help="1.2 for all channels; 1.0 for CARLA ScenarioRunner.")
 T = TypeVar("T")
-WORLD = typer.Option(None, help="Only this channel's world; 1.0: the driving one by default.")
 
 
 @hazards.command("list")
-def list_(folder: Path = DIR) -> None:
+def list_(
+    folder: Dir,
+) -> None:
     """One line per hazard."""
     from skidpad.recording.hazards.records import read_index
 
@@ -50,7 +50,10 @@ def lines(rows: list[dict[str, Any]]) -> Iterator[str]:
 
 
 @hazards.command()
-def show(folder: Path = DIR, id: list[str] = ID) -> None:
+def show(
+    folder: Dir,
+    id: Id = None,
+) -> None:
     """Everything that a record says, without its worlds."""
     import json
 
@@ -63,10 +66,14 @@ def show(folder: Path = DIR, id: list[str] = ID) -> None:
 
 @hazards.command()
 def export(
-    folder: Path = DIR,
-    id: list[str] = ID,
-    osc: Osc = OSC,
-    world: str | None = WORLD,
+    folder: Dir,
+    id: Id = None,
+    osc: Annotated[
+        Osc, typer.Option(help="1.2 for all channels; 1.0 for CARLA ScenarioRunner.")
+    ] = Osc.v1_2,
+    world: Annotated[
+        str | None, typer.Option(help="Only this channel's world; 1.0: the driving one by default.")
+    ] = None,
 ) -> None:
     """Write each hazard as .xosc and .xodr into DIR/scenarios."""
     from skidpad.recording.hazards.records import read_hazards

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -47,53 +47,69 @@ class Wire(str, Enum):
     ros2 = "ros2"
 
 
-FILE = typer.Argument(None, help="A channel recording (.mcap), or a ROS 2 bag with --mapping.")
-OUT = typer.Option(..., help="Folder for indicators, hazards and the summary.")
-MAPPING = typer.Option(None, help="YAML that says which topics of a ROS 2 bag are what.")
-RULES = typer.Option(
-    Rules.tracked,
-    help="Hazard rules: safe distances of tracked objects, the published rules corrected, or as printed.",
-)
-FORMS = typer.Option(
-    None, help="Formulas of the indicators; default: corrected, with as_printed rules completed."
-)
-RULES_FILE = typer.Option(None, help="Own hazard rules (YAML).")
-THRESHOLDS = typer.Option(None, help="Own thresholds (YAML).")
-IDENTIFIER = typer.Option(
-    Identifier.rules, help="Who finds the three scored hazards: the rules, the trained model, both."
-)
-MODEL = typer.Option(None, help="Trained model (.npz) of `skidpad channels train`; default: ours.")
-GRIP = typer.Option(
-    None, help="Friction of the road (0.05 to 1.5) that the rules tracked are told; 0.9: dry."
-)
-TIMING = typer.Option(False, "--timing", help="Measure each module and print the table.")
-FAIL_IF = typer.Option(
-    None, help="Exit with 1 when this hazard or indicator violation occurs; may be repeated."
-)
-JUNIT = typer.Option(None, help="Also write the verdicts of --fail-if as JUnit XML.")
-LISTEN = typer.Option(None, help="ros2: watch topics over DDS as they come, named by --mapping.")
-DOMAIN = typer.Option(0, min=0, max=232, help="DDS domain of --listen (ROS_DOMAIN_ID).")
-WAIT = typer.Option(60.0, min=0.0, help="Seconds that --listen waits for writers, and in silence.")
-DIR = typer.Argument(help="Output folder of `skidpad monitor`.")
-
-
 def monitor(
-    file: Path | None = FILE,
-    out: Path = OUT,
-    mapping: Path | None = MAPPING,
-    rules: Rules = RULES,
-    forms: Forms | None = FORMS,
-    rules_file: Path | None = RULES_FILE,
-    thresholds: Path | None = THRESHOLDS,
-    identifier: Identifier = IDENTIFIER,
-    model: Path | None = MODEL,
-    grip: float | None = GRIP,
-    timing: bool = TIMING,
-    fail_if: list[str] = FAIL_IF,
-    junit: Path | None = JUNIT,
-    listen: Wire | None = LISTEN,
-    domain: int = DOMAIN,
-    wait: float = WAIT,
+    out: Annotated[Path, typer.Option(help="Folder for indicators, hazards and the summary.")],
+    file: Annotated[
+        Path | None,
+        typer.Argument(help="A channel recording (.mcap), or a ROS 2 bag with --mapping."),
+    ] = None,
+    mapping: Annotated[
+        Path | None, typer.Option(help="YAML that says which topics of a ROS 2 bag are what.")
+    ] = None,
+    rules: Annotated[
+        Rules,
+        typer.Option(
+            help="Hazard rules: safe distances of tracked objects, the published rules corrected, "
+            "or as printed."
+        ),
+    ] = Rules.tracked,
+    forms: Annotated[
+        Forms | None,
+        typer.Option(
+            help="Formulas of the indicators; default: corrected, with as_printed rules completed."
+        ),
+    ] = None,
+    rules_file: Annotated[Path | None, typer.Option(help="Own hazard rules (YAML).")] = None,
+    thresholds: Annotated[Path | None, typer.Option(help="Own thresholds (YAML).")] = None,
+    identifier: Annotated[
+        Identifier,
+        typer.Option(
+            help="Who finds the three scored hazards: the rules, the trained model, both."
+        ),
+    ] = Identifier.rules,
+    model: Annotated[
+        Path | None,
+        typer.Option(help="Trained model (.npz) of `skidpad channels train`; default: ours."),
+    ] = None,
+    grip: Annotated[
+        float | None,
+        typer.Option(
+            help="Friction of the road (0.05 to 1.5) that the rules tracked are told; 0.9: dry."
+        ),
+    ] = None,
+    timing: Annotated[
+        bool, typer.Option("--timing", help="Measure each module and print the table.")
+    ] = False,
+    fail_if: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Exit with 1 when this hazard or indicator violation occurs; may be repeated."
+        ),
+    ] = None,
+    junit: Annotated[
+        Path | None, typer.Option(help="Also write the verdicts of --fail-if as JUnit XML.")
+    ] = None,
+    listen: Annotated[
+        Wire | None,
+        typer.Option(help="ros2: watch topics over DDS as they come, named by --mapping."),
+    ] = None,
+    domain: Annotated[
+        int, typer.Option(min=0, max=232, help="DDS domain of --listen (ROS_DOMAIN_ID).")
+    ] = 0,
+    wait: Annotated[
+        float,
+        typer.Option(min=0.0, help="Seconds that --listen waits for writers, and in silence."),
+    ] = 60.0,
 ) -> None:
     """Watch what driving channels say: indicators, violations, hazardous scenes."""
     import sys
@@ -243,7 +259,9 @@ def _gate(counts: dict[str, int], junit: Path | None) -> None:
         raise typer.Exit(1)
 
 
-def safety_case(folder: Path = DIR) -> None:
+def safety_case(
+    folder: Annotated[Path, typer.Argument(help="Output folder of `skidpad monitor`.")],
+) -> None:
     """Print the safety case with what the drive says for and against each claim."""
     from skidpad.evidence.channels.case import evidence_lines
     from skidpad.recording.channels.indicators import read_indicators

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 import typer
 
-FILE = typer.Argument(help="A channel recording (.mcap), or a ROS 2 bag with --mapping.")
-MAPPING = typer.Option(None, help="YAML that says which topics of a ROS 2 bag are what.")
-SAVE = typer.Option(None, help="Write an .rrd file instead of opening the viewer.")
 
-
-def view(file: Path = FILE, mapping: Path | None = MAPPING, save: Path | None = SAVE) -> None:
+def view(
+    file: Annotated[
+        Path, typer.Argument(help="A channel recording (.mcap), or a ROS 2 bag with --mapping.")
+    ],
+    mapping: Annotated[
+        Path | None, typer.Option(help="YAML that says which topics of a ROS 2 bag are what.")
+    ] = None,
+    save: Annotated[
+        Path | None, typer.Option(help="Write an .rrd file instead of opening the viewer.")
+    ] = None,
+) -> None:
     """Look at the worlds of all channels and at their indicators over time (extra `view`)."""
     from skidpad.core.errors import FileError
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,10 +16,6 @@ maps = typer.Typer(name="map", help="Bundled and own maps.", no_args_is_help=Tru
 
 SPEEDS_KMH = (80.0, 150.0)  # the matrix drives at 80, its limiter ends at 150
 BENDS_SHOWN, IDS_SHOWN = 20, 40
-MAP = typer.Argument(help="Name of a map (skidpad map list), or an OpenDRIVE file.")
-FILE = typer.Argument(help="An OpenDRIVE file.")
-PNG = typer.Option(None, help="Also write a picture from above.")
-OUT = typer.Option(None, help="Where to write; default: beside it, as .npz.")
 
 
 @maps.command("list")
@@ -39,8 +35,10 @@ def list_() -> None:
 
 @maps.command()
 def info(
-    map: str = MAP,
-    png: Path | None = PNG,
+    map: Annotated[
+        str, typer.Argument(help="Name of a map (skidpad map list), or an OpenDRIVE file.")
+    ],
+    png: Annotated[Path | None, typer.Option(help="Also write a picture from above.")] = None,
 ) -> None:
     """Print roads, lanes, signals, limits, and the grip that bends ask for."""
     from skidpad.cli.output.pictures import format_of, write_picture
@@ -71,8 +69,10 @@ def info(
 
 @maps.command()
 def bake(
-    file: Path = FILE,
-    out: Path | None = OUT,
+    file: Annotated[Path, typer.Argument(help="An OpenDRIVE file.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Where to write; default: beside it, as .npz.")
+    ] = None,
 ) -> None:
     """Turn an OpenDRIVE file into a baked map, which loads in milliseconds."""
     from skidpad.recording.files import write_atomically

@@ -15,6 +15,7 @@ from tests.scenarios.files import (
     condition,
     event,
     init,
+    on_lane,
     private,
     speed,
     story,
@@ -106,6 +107,17 @@ def test_an_event_of_a_partner_that_never_begins_makes_the_run_void(tmp_path):
     assert (found["verdict"], found["reasons"]) == ("void", "event 'stops' of other never began")
     staging = read_staging(tmp_path / "out")
     assert staging.partners == ("other",)
+
+
+@pytest.mark.parametrize(("driver", "verdict"), [(BLIND, "void"), (("--stack", "ideal"), "passed")])
+def test_a_file_that_lets_the_ego_reverse_is_void_where_it_did_not(tmp_path, driver, verdict):
+    """As in Euro NCAP's CPRA: a car reverses to somebody behind it, and no stack of ours does that."""
+    begins = init("ego", teleport(on_lane(-3, 150)), speed(to(-1.1))) + at("other", -3, 135, 0)
+    file = write(tmp_path, init=begins, end=4.0)
+    done = play(file, "--out", tmp_path / "out", *driver, *NO_HIT)
+    found = verdict_of(tmp_path / "out")
+    assert found["verdict"] == verdict, done.output
+    assert ("never went backwards" in found["reasons"]) == (verdict == "void")
 
 
 def test_an_event_that_waits_for_a_collision_is_no_part_of_the_interaction(tmp_path):

@@ -136,6 +136,8 @@ def void_reasons(staging: Staging, others: Sequence[Counterpart]) -> list[str]:
         f"event {event.name.rpartition('::')[2]!r} of {', '.join(event.actors)} never began"
         for event in staging.missing
     ]
+    if staging.unreversed:
+        reasons.append("the file lets the ego reverse, and it never went backwards")
     partners = [c for c in others if c.staged] or ([] if staging.partners else list(others))
     if not partners:
         gone = ", ".join(staging.partners)

@@ -28,6 +28,7 @@ from skidpad.scenarios.trailers import connect_at_begin, tow_command, tractors_f
 from skidpad.simulation.scripted import ActorDriver, Motion
 
 DURATION_MAX = 3600.0  # s, for files that never end
+WAY_BACK = 1.0  # m, less is no reversing; assumption
 ASIDE = Place(Pose(0.0, 0.0))  # of what is not in the world yet
 
 
@@ -101,6 +102,7 @@ class Player:
         self.ended = False
         self.going: list[Running] = []  # what <Init> began and is under way
         self.hit = False  # the ego has touched something
+        self.way_back = 0.0  # m that the ego has gone backwards
 
     @property
     def triggered(self) -> bool:
@@ -118,7 +120,7 @@ class Player:
         boxes = {name: entity.box for name, entity in self.scenario.entities.items()}
         story = tuple(self.scene.story)
         driven_by_file = self.modes.get(self.scenario.ego, ActorMode.PHYSICAL) is not None
-        staging = staging_of(self.scenario, story, driven_by_file)
+        staging = staging_of(self.scenario, story, driven_by_file, self.way_back > WAY_BACK)
         return Played(story, boxes, staging, tuple(self.scene.lamps))
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
@@ -132,6 +134,8 @@ class Player:
         if first:
             self._begin()
         self.hit = self.hit or bool(truth.contacts)
+        v = self.actors[self.scenario.ego].motion.speed
+        self.way_back += max(-v, 0.0) * self.scene.dt
         self.signals.step(self.scene)
         self.telling.look(self.scene)
         self.going = [action for action in self.going if not action.step(self.scene)]

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from skidpad.recording.run.staging import StagedEvent, Staging
 from skidpad.scenarios.actions.base import NoEffect
+from skidpad.scenarios.actions.speed import Speed
 from skidpad.scenarios.conditions.by_entity import Collision
 from skidpad.scenarios.scenario import Scenario
 from skidpad.scenarios.scene import Happening, Move
@@ -13,8 +14,13 @@ from skidpad.scenarios.storyboard import Event, Group
 from skidpad.scenarios.triggers import AnyEntity
 
 
-def staging_of(scenario: Scenario, story: Iterable[Happening], driven_by_file: bool) -> Staging:
-    """Return what the file stages, with the times at which its events began in this story."""
+def staging_of(
+    scenario: Scenario, story: Iterable[Happening], driven_by_file: bool, went_back: bool = False
+) -> Staging:
+    """Return what the file stages, with the times at which its events began in this story.
+
+    went_back: the ego has gone backwards.
+    """
     began: dict[tuple[str, ...], float] = {}
     for happening in story:
         if happening.what == Move.START.value:
@@ -40,6 +46,21 @@ def staging_of(scenario: Scenario, story: Iterable[Happening], driven_by_file: b
             for event, actors in staged
         ),
         criteria=scenario.criteria,
+        unreversed=not went_back and _lets_ego_reverse(scenario),
+    )
+
+
+def _lets_ego_reverse(scenario: Scenario) -> bool:
+    """Tells whether the file asks a speed below zero of the ego, at the begin or in an event."""
+    if scenario.start.entities[scenario.ego].speed < 0.0:
+        return True
+    return any(
+        isinstance(action.private, Speed)
+        and action.private.target.other is None
+        and action.private.target.value < 0.0
+        for group, event in _events(scenario)
+        if scenario.ego in group.actors
+        for action in event.actions
     )
 
 

@@ -40,6 +40,7 @@ class Staging(Struct, frozen=True, kw_only=True):
     partners: tuple[str, ...] = ()
     events: tuple[StagedEvent, ...] = ()
     criteria: tuple[FileCriterion, ...] = ()
+    unreversed: bool = False  # the file lets the ego go backwards, and it never did
 
     @property
     def missing(self) -> list[StagedEvent]:

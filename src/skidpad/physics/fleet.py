@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.core.states import ActorStates
+from skidpad.physics.antilock import MEMORY, PRESSURE
 from skidpad.physics.params import FEEL, STIFFNESS, WATER, WheelStates, vehicle_params
 from skidpad.physics.types import TIRE_FRICTION_REFERENCE, VehicleType
 from skidpad.physics.vehicle import step_vehicles
@@ -36,13 +37,14 @@ class Fleet:
         states: ActorStates | None = None,
         anti_lock: bool | None = None,
         stability: bool = False,
+        cycling: bool = False,
         substep: float = SUBSTEP,
     ) -> None:
         """A fleet at rest at the origin.
 
         states: arrays to work on whose first rows are these vehicles; None: own ones.
         anti_lock: None leaves it to each type. stability: stability and traction control and
-        brake-force distribution. substep: longest inner step, s.
+        brake-force distribution. cycling: anti-lock brakes work from wheel speeds. substep: longest inner step, s.
         """
         n = len(types)
         self.types = tuple(types)
@@ -54,6 +56,8 @@ class Fleet:
         if anti_lock is not None:
             self.params.anti_lock[:] = anti_lock
         self.params.stability[:] = stability
+        self.params.cycling[:] = cycling
+        self.wind = (0.0, 0.0)  # m/s of the air in world axes
         self.wheels = WheelStates(
             omega=np.zeros((n, 4)),
             steer=np.zeros(n),
@@ -61,6 +65,7 @@ class Fleet:
             a_load=np.zeros((n, 2)),
             slide=np.zeros((n, 4)),
             load=np.zeros((n, 4)),
+            memory=np.zeros((n, MEMORY)),
         )
         self.tire_friction = np.array(
             [[t.tire_friction] * 4 for t in types], dtype=np.float64
@@ -94,6 +99,8 @@ class Fleet:
         self.wheels.slip_y[i] = 0.0
         self.wheels.a_load[i] = 0.0
         self.wheels.slide[i] = 0.0
+        self.wheels.memory[i] = 0.0
+        self.wheels.memory[i, PRESSURE : PRESSURE + 4] = 1.0
 
     def step(
         self,
@@ -126,6 +133,7 @@ class Fleet:
             self._flat if grade is None else grade,
             self._flat if bank is None else bank,
             self.states.present if active is None else active,
+            *self.wind,
             self.dt / self.steps,
             self.steps,
         )

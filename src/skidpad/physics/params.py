@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.physics.types import VehicleType
+from skidpad.physics.wind import AIR_DENSITY, side_coefficients
 
 Floats = NDArray[np.float64]
-
-AIR_DENSITY = 1.225  # kg/m^3, ISO 2533 at sea level
 
 
 class VehicleParams(NamedTuple):
@@ -44,7 +43,9 @@ class VehicleParams(NamedTuple):
     roll_front: Floats
     pitch_gradient: Floats
     roll_gradient: Floats
+    side: Floats  # (n, 2) 0.5 rho A c of side force and, times the wheelbase, of yaw moment; `wind`
     anti_lock: NDArray[np.bool_]
+    cycling: NDArray[np.bool_]  # anti-lock brakes work from wheel speeds
     stability: NDArray[np.bool_]  # stability and traction control, brake-force distribution
 
 
@@ -57,6 +58,7 @@ class WheelStates(NamedTuple):
     a_load: Floats  # (n, 2) specific force behind the load transfer, low-passed
     slide: Floats  # (n, 4) slip over the slip of full sliding; beyond 1 the tyre slides
     load: Floats  # (n, 4) N
+    memory: Floats  # (n, 16) of anti-lock brakes that cycle, `antilock`
 
 
 # Columns of what the road does to the tyres, (n, 12), each for FL, FR, RL, RR: friction at nominal
@@ -101,6 +103,8 @@ def vehicle_params(types: Sequence[VehicleType]) -> VehicleParams:
         roll_front=column([t.roll_share_front for t in types]),
         pitch_gradient=column([t.pitch_gradient for t in types]),
         roll_gradient=column([t.roll_gradient for t in types]),
+        side=side_coefficients(types),
         anti_lock=np.array([t.abs for t in types], dtype=np.bool_),
+        cycling=np.zeros(len(types), dtype=np.bool_),
         stability=np.zeros(len(types), dtype=np.bool_),
     )

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from skidpad.core.constants import G
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.states import ActorStates
+from skidpad.physics.antilock import PRESSURE, regulate
 from skidpad.physics.params import STIFFNESS, WATER, Floats, VehicleParams, WheelStates
 from skidpad.physics.stability import Correction, Model, Motion, correction
 from skidpad.physics.tyre import RELAXATION_RADII, V_SLIP_MIN
@@ -77,7 +78,10 @@ class Car(NamedTuple):
     front: Tyre
     rear: Tyre
     model: Model
-    anti_lock: bool
+    side: float  # N over the square of m/s, of the air
+    side_turn: float  # N m over that
+    anti_lock: bool  # ideal
+    cycling: bool  # anti-lock brakes from wheel speeds
     stability: bool
 
 
@@ -143,7 +147,10 @@ def _car(i: int, p: VehicleParams, command: Floats, grade: float, bank: float) -
             (1.0 / p.stiffness[i, 0] - 1.0 / p.stiffness[i, 1]) / G,
             3.0 / p.stiffness[i, 1],
         ),
-        p.anti_lock[i],
+        p.side[i, 0],
+        p.side[i, 1],
+        p.anti_lock[i] and not p.cycling[i],
+        p.anti_lock[i] and p.cycling[i],
         p.stability[i],
     )
 
@@ -189,9 +196,13 @@ def _stability_correction(
 @inner_kernel
 def _push(
     car: Car, u: float, v: float, r: float, a_x: float, drive: float, asked: Correction,
-    steer: float, omega: Floats, slip_y: Floats, slide: Floats, load: Floats, feel: Floats, h: float,
+    steer: float, omega: Floats, slip_y: Floats, slide: Floats, load: Floats, feel: Floats,
+    pressure: Floats, h: float,
 ) -> Push:  # fmt: skip
-    """All four wheels through h seconds; omega, slip_y and slide (4,) are written."""
+    """All four wheels through h seconds; omega, slip_y and slide (4,) are written.
+
+    pressure: share of the brake torque that anti-lock brakes leave to each wheel, first four entries.
+    """
     cd, sd = cos(steer), sin(steer)
     speed = sqrt(u * u + v * v)
     engine_drag = car.mass * car.engine_drag * (1.0 - car.throttle) * min(speed / V_CLUTCH, 1.0)
@@ -211,9 +222,13 @@ def _push(
         brake = car.torque_front if front else car.torque_rear
         if car.stability:
             if not front:
-                brake = min(brake, per_load * load[w], low * load[w])
+                brake = min(brake, per_load * load[w])
+                if not car.cycling:
+                    brake = min(brake, low * load[w])
             if asked.rear != front:
                 brake = max(brake + (twist if left else -twist), 0.0)
+        if car.cycling and speed > V_ABS_MIN:
+            brake *= pressure[PRESSURE + w]
         wheel = turn(
             Contact(vx, vy, omega[w], slip_y[w], load[w], feel[w], feel[STIFFNESS + w]),
             tyre,
@@ -243,9 +258,13 @@ def _push(
 @inner_kernel
 def _advance(
     i: int, states: ActorStates, wheels: WheelStates, car: Car, feel: Floats, g_x: float,
-    g_y: float, turn_max: float, h: float, steps: int,
+    g_y: float, turn_max: float, wind_x: float, wind_y: float, h: float, steps: int,
 ) -> None:  # fmt: skip
-    """A vehicle through `steps` substeps of h seconds. feel (12,); g_x, g_y: m/s^2 of a slope."""
+    """A vehicle through `steps` substeps of h seconds. feel (12,); g_x, g_y: m/s^2 of a slope.
+
+    wind_x, wind_y: m/s of the air in the world.
+    """
+    windy, memory, rims = wind_x != 0.0 or wind_y != 0.0, wheels.memory[i], np.empty(4)
     steer_lag, load_lag = 1.0 - exp(-h / STEER_TIME), 1.0 - exp(-h / LOAD_TIME)
     omega, load, a_load = wheels.omega[i], wheels.load[i], wheels.a_load[i]
     body = _body(i, states, car.x_cog)
@@ -260,15 +279,25 @@ def _advance(
         _wheel_loads(car, a_load[0], a_load[1], load)
         asked = _stability_correction(car, u, v, r, steer, feel)
         drive = _drive(car, u, speed, omega) * asked.drive
+        if car.cycling:
+            for w in range(4):
+                rims[w] = omega[w] * (car.front.radius if w < 2 else car.rear.radius)
+            regulate(memory, rims, car.half_track, r, g_x - a_x, car.brake > 0.0, h)
         push = _push(car, u, v, r, a_x, drive, asked, steer, omega, wheels.slip_y[i],
-                     wheels.slide[i], load, feel, h)  # fmt: skip
+                     wheels.slide[i], load, feel, memory, h)  # fmt: skip
+        u_air, v_air = u - (wind_x * c + wind_y * s), v - (wind_y * c - wind_x * s)
+        air = sqrt(u_air * u_air + v_air * v_air)
         a_load[0] += load_lag * (push.x / car.mass - a_load[0])
         a_load[1] += load_lag * (push.y / car.mass - a_load[1])
-        a_x = (push.x - car.drag * speed * u) / car.mass + g_x
-        a_y = (push.y - car.drag * speed * v) / car.mass + g_y
+        a_x = (push.x - car.drag * air * u_air) / car.mass + g_x
+        side, moment = car.drag * speed * v, push.moment
+        if windy:
+            side = car.side * air * v_air
+            moment -= car.side_turn * u_air * v_air + 0.5 * (car.a - car.b) * side
+        a_y = (push.y - side) / car.mass + g_y
         vx += h * (a_x * c - a_y * s)
         vy += h * (a_x * s + a_y * c)
-        r += h * push.moment / car.yaw_inertia
+        r += h * moment / car.yaw_inertia
         slow = speed < V_HOLD and abs(r) < V_HOLD and (car.brake > 0.0 or car.handbrake)
         if slow and push.held >= car.mass * sqrt(g_x * g_x + g_y * g_y) + abs(drive):
             vx, vy, r = 0.0, 0.0, 0.0
@@ -322,6 +351,8 @@ def step_vehicles(
     grade: Floats,
     bank: Floats,
     active: NDArray[np.bool_],
+    wind_x: float,
+    wind_y: float,
     h: float,
     steps: int,
 ) -> None:
@@ -329,13 +360,13 @@ def step_vehicles(
 
     commands (n, 5): throttle, brake, steer (left positive), handbrake, reverse. feel (n, 12): `params`.
     grade (n,): slope along the heading, rad, uphill positive. bank (n,): roll of the
-    road about the heading, rad, left side up positive.
+    road about the heading, rad, left side up positive. wind_x, wind_y: m/s of the air.
     """
     for i in range(active.shape[0]):
         if active[i]:
             car = _car(i, params, commands[i], grade[i], bank[i])
             g_x, g_y = -G * sin(grade[i]), -G * sin(bank[i])
             turn_max = params.steer_rate[i] * h
-            _advance(i, states, wheels, car, feel[i], g_x, g_y, turn_max, h, steps)
+            _advance(i, states, wheels, car, feel[i], g_x, g_y, turn_max, wind_x, wind_y, h, steps)
             states.pitch[i] = -grade[i] - params.pitch_gradient[i] * wheels.a_load[i, 0]
             states.roll[i] = bank[i] + params.roll_gradient[i] * wheels.a_load[i, 1]

@@ -82,6 +82,8 @@ class Now(NamedTuple):
     care: Care  # what drivers know of weather
     road_noise: float  # rad
     driving_only: bool
+    wind_x: float  # m/s of the air in world axes
+    wind_y: float
 
 
 @kernel
@@ -140,7 +142,7 @@ def _drive(rows: Rows, moved: Flags, w: Wheeled, now: Now) -> None:
         w.active[i] = s.present[i] and rows.simulated[i] and not moved[i]
     step_vehicles(
         s, w.wheels, w.params, rows.commands, w.feel, rows.grade, rows.bank, w.active,
-        now.dt / now.substeps, now.substeps,
+        now.wind_x, now.wind_y, now.dt / now.substeps, now.substeps,
     )  # fmt: skip
     for i in range(len(w.active)):
         for k in range(4):

@@ -29,9 +29,14 @@ class SplitStop:
     utilisation: float  # mean deceleration over that of both sides' friction together
 
 
-def split_stop(kind: VehicleType, v: float, *, steers: bool, stability: bool = True) -> SplitStop:
-    """Full braking from v m/s straight on, left wheels on HIGH, right ones on LOW."""
-    bench = Bench([kind], v, [[HIGH, LOW, HIGH, LOW]], stability=stability)
+def split_stop(
+    kind: VehicleType, v: float, *, steers: bool, stability: bool = True, cycling: bool = False
+) -> SplitStop:
+    """Full braking from v m/s straight on, left wheels on HIGH, right ones on LOW.
+
+    cycling: anti-lock brakes work from wheel speeds, else they are ideal.
+    """
+    bench = Bench([kind], v, [[HIGH, LOW, HIGH, LOW]], stability=stability, cycling=cycling)
     lag = round(REACTION / TICK)
     seen = [0.0] * lag  # steer that the driver has decided upon
     steer = 0.0

@@ -5,7 +5,7 @@ faster than the body slows by the accelerometer. A wheel whose slip or own decel
 has its pressure relieved, is held until it recovers, and built up again (EP 0392686, [0002]). Either
 rear wheel rules both (select-low; Mazda workshop manual 1990-1995, chapter 9, system operation). While
 one front wheel cycles, the other's pressure may lead it by a gap that grows slowly: the driver has time
-to steer. Slip of 20 and 35 % as bounds: kfz-tech.de, "ABS (additional information)"; rates of pressure,
+to steer. Engine drag is taken back with the pressure. Slip of 20 and 35 % as bounds: kfz-tech.de, "ABS (additional information)"; rates of pressure,
 the gap, and the deceleration of a wheel that locks are ours (assumptions).
 """
 
@@ -28,7 +28,8 @@ SLIP_LOW, SLIP_HIGH = 0.20, 0.35  # kfz-tech.de
 SLIP_SEEN = 0.05  # least slip with which a wheel's deceleration counts
 LOCKING = 30.0  # m/s^2 of the rim, no body slows so
 MARGIN = 0.5  # m/s^2 by which the reference may fall faster than the body slows
-APPLY, RELIEVE, RAISE = 1.0 / 0.15, 10.0, 1.5  # 1/s: first pressure, down, up again
+APPLY, RELIEVE = 1.0 / 0.15, 10.0  # 1/s: first pressure, and relief
+RAISE, RAISE_FIRST = 1.5, 0.05  # 1/s of the pressure there is and a little, up again
 GAP_FIRST, GAP_RATE = 0.15, 0.5  # of the torque asked for, and that per second
 V_LEAST = 0.5  # m/s of the reference below which slip is not computed
 
@@ -82,7 +83,7 @@ def _turn_phase(m: Floats, w: int, rim: float, speed: float, h: float) -> None:
     if phase == RELEASE:
         pressure -= RELIEVE * h
     elif phase == BUILD:
-        pressure += (APPLY if m[CYCLES] == 0.0 else RAISE) * h
+        pressure += (APPLY if m[CYCLES] == 0.0 else RAISE * (RAISE_FIRST + pressure)) * h
     m[PHASE + w], m[PRESSURE + w] = phase, min(max(pressure, 0.0), 1.0)
 
 

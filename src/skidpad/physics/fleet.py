@@ -44,7 +44,8 @@ class Fleet:
 
         states: arrays to work on whose first rows are these vehicles; None: own ones.
         anti_lock: None leaves it to each type. stability: stability and traction control and
-        brake-force distribution. cycling: anti-lock brakes work from wheel speeds. substep: longest inner step, s.
+        brake-force distribution. cycling: anti-lock brakes work from wheel speeds.
+        substep: longest inner step, s.
         """
         n = len(types)
         self.types = tuple(types)

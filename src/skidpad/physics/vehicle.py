@@ -115,6 +115,9 @@ def _car(i: int, p: VehicleParams, command: Floats, grade: float, bank: float) -
     relaxation = RELAXATION_RADII * radius
     wheelbase = p.a[i] + p.b[i]
     per_wheel = 0.5 * p.mass[i] * G / wheelbase
+    # no control flow inside the call: numba takes no more than 30 arguments with it
+    torque_hand = p.handbrake_torque[i] if handbrake else 0.0
+    anti_lock, cycling = p.anti_lock[i], p.cycling[i]
     return Car(
         p.mass[i],
         p.mass[i] * G * cos(grade) * cos(bank),
@@ -138,7 +141,7 @@ def _car(i: int, p: VehicleParams, command: Floats, grade: float, bank: float) -
         p.engine_drag[i],
         brake * p.brake_torque[i, 0],
         brake * p.brake_torque[i, 1],
-        p.handbrake_torque[i] if handbrake else 0.0,
+        torque_hand,
         p.rolling[i],
         Tyre(p.stiffness[i, 0], per_wheel * p.b[i], relaxation, radius, inertia),
         Tyre(p.stiffness[i, 1], per_wheel * p.a[i], relaxation, radius, inertia),
@@ -149,8 +152,8 @@ def _car(i: int, p: VehicleParams, command: Floats, grade: float, bank: float) -
         ),
         p.side[i, 0],
         p.side[i, 1],
-        p.anti_lock[i] and not p.cycling[i],
-        p.anti_lock[i] and p.cycling[i],
+        anti_lock & ~cycling,
+        anti_lock & cycling,
         p.stability[i],
     )
 
@@ -227,8 +230,10 @@ def _push(
                     brake = min(brake, low * load[w])
             if asked.rear != front:
                 brake = max(brake + (twist if left else -twist), 0.0)
+        left_on = 1.0  # share of brake torque and engine drag that anti-lock brakes leave on
         if car.cycling and speed > V_ABS_MIN:
-            brake *= pressure[PRESSURE + w]
+            left_on = pressure[PRESSURE + w]
+            brake *= left_on
         wheel = turn(
             Contact(vx, vy, omega[w], slip_y[w], load[w], feel[w], feel[STIFFNESS + w]),
             tyre,
@@ -237,7 +242,7 @@ def _push(
                 brake,
                 0.0 if front else car.torque_hand,
                 car.rolling,
-                share * engine_drag,
+                share * engine_drag * left_on,
                 tyre.inertia * abs(a_x) / tyre.radius,
                 car.anti_lock and speed > V_ABS_MIN,
                 car.stability,

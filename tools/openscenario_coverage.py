@@ -63,7 +63,7 @@ PARTIAL: Mapping[str, str] = MappingProxyType(
             "brake lamps and the ego's beams are drawn, all are exported as OSI; no colours, no fading"
         ),
         "VisibilityAction": "for sensors; pictures for people and other traffic go by none",
-        "EnvironmentAction": "falling snow counts by its sight, wind not at all",
+        "EnvironmentAction": "falling snow counts by its sight, wind with the setting `wind`",
         "TrafficSignalStateAction": STATES,
         "UserDefinedValueCondition": NAMED,
         "CustomCommandAction": NAMED,

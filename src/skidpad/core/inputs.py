@@ -117,3 +117,5 @@ class Outside:
     unseen: frozenset[str] = frozenset()  # actors that no sensor sees (embedded backend)
     # actors whose brake lamps something else than the brake works, and whether they shine (embedded)
     brake_lamps: tuple[tuple[str, bool], ...] = ()
+    # as (m/s, rad it blows to), where wind pushes vehicles; None: as it was (embedded backend)
+    wind: tuple[float, float] | None = None

@@ -21,6 +21,7 @@ from skidpad.core.setting import Plain, SettingField, SettingsPart, describe_set
 from skidpad.core.stack_settings import StackSettings
 from skidpad.core.tyres import REFERENCE, known_tyres
 from skidpad.core.vocabulary import (
+    AntiLock,
     Clearance,
     GripModel,
     LidarModel,
@@ -87,6 +88,23 @@ class WorldSettings(SettingsPart):
     )
     esc: bool = setting_field(
         True, "M-1, R-5", "stability and traction control, brake-force distribution"
+    )
+    anti_lock: AntiLock = setting_field(
+        AntiLock.IDEAL, "M-1, T-11", "anti-lock brakes: ideal, or cycles by wheel speeds"
+    )
+    wind: bool = setting_field(False, "M-1, T-11", "wind pushes vehicles")
+    wind_speed: float | None = setting_field(
+        None,
+        "T-11",
+        "mean wind in m/s; none: of the scenario or wind_intensity",
+        low=0.0,
+        high=30.0,
+    )
+    wind_direction_deg: float = setting_field(
+        90.0, "T-11", "where it blows to, left from the map's x axis", low=-360.0, high=360.0
+    )
+    wind_gusts: float = setting_field(
+        0.0, "T-11", "standard deviation of gusts over the mean", low=0.0, high=0.5
     )
 
 

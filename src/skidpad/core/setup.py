@@ -11,6 +11,7 @@ from skidpad.core.states import VehicleCommand
 from skidpad.core.surface import SurfacePatch
 from skidpad.core.tyres import REFERENCE
 from skidpad.core.vocabulary import (
+    AntiLock,
     Control,
     GripModel,
     LidarModel,
@@ -71,6 +72,15 @@ class TrafficSetup:
     stratum: Stratum = Stratum.NATURAL  # risky: with variety, tails are oversampled
 
 
+@dataclass(frozen=True, slots=True)
+class Wind:
+    """What the air of a run does."""
+
+    speed: float = 0.0  # m/s
+    towards: float = 0.0  # rad counter-clockwise from the map's x axis, as OpenSCENARIO has it
+    gusts: float = 0.0  # standard deviation over the speed
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setup:
     """Everything that a backend needs to begin a run."""
@@ -94,6 +104,8 @@ class Setup:
     lidar: LidarModel = LidarModel.EXACT  # of the lidars that a stack asks for (embedded backend)
     radar_model: RadarModel = RadarModel.GEOMETRIC  # of the common radar (embedded backend)
     stability: bool = False  # all vehicles have stability and traction control (embedded backend)
+    anti_lock: AntiLock = AntiLock.IDEAL  # of vehicles that have them (embedded backend)
+    wind: Wind | None = None  # that pushes vehicles; None: no air moves (embedded backend)
     level: SensorLevel = SensorLevel.PIXELS
     asked: frozenset[str] = frozenset()  # ids among specs whose readings go to `frame.extra` (L-3)
     render_all: bool = False  # every image every tick, read or not

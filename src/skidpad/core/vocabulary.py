@@ -217,6 +217,13 @@ class RadarModel(str, Enum):
     PHYSICAL = "physical"
 
 
+class AntiLock(str, Enum):
+    """How anti-lock brakes work: `ideal` knows the grip, `wheel_speeds` cycles without knowing it."""
+
+    IDEAL = "ideal"
+    WHEEL_SPEEDS = "wheel_speeds"
+
+
 class SensorLevel(str, Enum):
     """Real images and radar points, or geometric detection from boxes (decision M-3)."""
 

@@ -5,8 +5,9 @@ faster than the body slows by the accelerometer. A wheel whose slip or own decel
 has its pressure relieved, is held until it recovers, and built up again (EP 0392686, [0002]). Either
 rear wheel rules both (select-low; Mazda workshop manual 1990-1995, chapter 9, system operation). While
 one front wheel cycles, the other's pressure may lead it by a gap that grows slowly: the driver has time
-to steer. Engine drag is taken back with the pressure. Slip of 20 and 35 % as bounds: kfz-tech.de, "ABS (additional information)"; rates of pressure,
-the gap, and the deceleration of a wheel that locks are ours (assumptions).
+to steer. Engine drag is taken back with the pressure. Slip of 20 and 35 % as bounds: kfz-tech.de, "ABS
+(additional information)"; rates of pressure, the gap, and the deceleration of a wheel that locks are
+ours (assumptions).
 """
 
 from __future__ import annotations

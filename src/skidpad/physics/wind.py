@@ -16,13 +16,13 @@ Valid: mean wind to 30 m/s, vehicles that roll on four wheels. Roll is not model
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import cos, exp, sin, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.randomness import stream
+from skidpad.core.setup import Wind
 from skidpad.physics.types import VehicleType
 
 Floats = NDArray[np.float64]
@@ -33,15 +33,6 @@ COMPACT_SIDE = 5.0  # m^2
 SIDE_FILL = 0.8  # of length times height
 GUST_LENGTH = 50.0  # m
 HURRICANE = 32.7  # m/s, least wind of Beaufort 12 (tcdata.typhoon.org.cn, extended Beaufort scale)
-
-
-@dataclass(frozen=True, slots=True)
-class Wind:
-    """What the air of a run does."""
-
-    speed: float = 0.0  # m/s
-    towards: float = 0.0  # rad counter-clockwise from the map's x axis, as OpenSCENARIO has it
-    gusts: float = 0.0  # standard deviation over the speed
 
 
 def side_coefficients(types: Sequence[VehicleType]) -> Floats:

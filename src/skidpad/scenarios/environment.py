@@ -37,6 +37,9 @@ class Wetness(Enum):
     HIGH_FLOODED = "highFlooded"
 
 
+WIND_MOST = 100.0  # m/s
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Environment:
     """What the file says; None is left as the run has it."""
@@ -49,7 +52,7 @@ class Environment:
     fall_mm_h: float = 0.0
     visual_range: float | None = None  # m
     temperature_c: float | None = None
-    wind: float = 0.0  # m/s
+    wind: tuple[float, float] | None = None  # m/s, and rad of the world that it blows to
     wetness: Wetness | None = None
     friction_scale: float | None = None  # of what the road has otherwise
     time_of_day: str = ""  # ISO 8601
@@ -123,8 +126,16 @@ def _weather(node: Node) -> dict[str, Any]:
         "fall_mm_h": rate,
         "visual_range": None if fog is None else fog.limit("visualRange"),
         "temperature_c": node.number("temperature") - CELSIUS if node.has("temperature") else None,
-        "wind": 0.0 if wind is None else wind.number("speed"),
+        "wind": None if wind is None else _wind(wind),
     }
+
+
+def _wind(node: Node) -> tuple[float, float]:
+    """Speed and direction of a <Wind>: its target direction, as a heading in the world."""
+    speed = node.number("speed")
+    if not 0.0 <= speed <= WIND_MOST:
+        raise node.error(f"speed must be in [0, {WIND_MOST:g}] m/s, got {speed:g}")
+    return speed, node.number("direction")
 
 
 @dataclass(frozen=True, slots=True)

@@ -84,6 +84,8 @@ class FileChanges:
         self.player, self.done, self.noticed = player, 0, 0
         settings = spec.settings
         assert isinstance(spec.course, Scenario)
+        # a speed among the settings goes before what the file says
+        self.takes_wind = settings.world.wind_speed is None
         self.follows, self.mu_ref = spec.course.weather_of_file, settings.world.mu_ref
         self.outside = Outside(
             weather=spec.weather, grip=spec.grip, range_model=settings.sensors.range
@@ -108,6 +110,8 @@ class FileChanges:
                 now = replace(now, weather=weather)
             if environment.friction_scale is not None:
                 now = replace(now, mu_ref=self.mu_ref * environment.friction_scale)
+            if environment.wind is not None and self.takes_wind:
+                now = replace(now, wind=environment.wind)
         before, self.outside = self.outside, now
         return None if now == before else now
 

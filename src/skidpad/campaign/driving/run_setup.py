@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import asdict, dataclass, replace
-from math import isfinite, nan
+from math import isfinite, nan, radians
 from pathlib import Path
 from typing import Any
 
@@ -33,12 +33,13 @@ from skidpad.core.run import (
     StackDriver,
 )
 from skidpad.core.settings import NightRain, Relocation, TrafficSettings
-from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
+from skidpad.core.setup import ActorSetup, Setup, TrafficSetup, Wind
 from skidpad.core.simulator import BackendKind
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand
 from skidpad.core.told import describe_value
 from skidpad.core.vocabulary import Control, Outcome
 from skidpad.physics.types import EGO_TYPE, vehicle_type
+from skidpad.physics.wind import wind_of_intensity
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
 from skidpad.scenarios import scenario as scenarios
@@ -201,6 +202,8 @@ def _scenario(spec: RunSpec, course: Scenario) -> Stage:
     environment = compiled.start.environment
     if environment is not None and environment.friction_scale is not None:
         setup = replace(setup, mu_ref=setup.mu_ref * environment.friction_scale)
+    if environment is not None and environment.wind is not None:
+        setup = replace(setup, wind=wind_of(spec, environment.wind))
     return Stage(compiled.map, setup, Unsupervised(), played, played)
 
 
@@ -274,11 +277,29 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
         lidar=sensors.lidar,
         radar_model=sensors.radar_model,
         stability=world.esc,
+        anti_lock=world.anti_lock,
+        wind=wind_of(spec),
         level=spec.sensors,
         render_all=spec.render is Render.ALL or _foreign_on_carla(spec),
         patches=spec.surface,
         scenery=spec.scenery,
     )
+
+
+def wind_of(spec: RunSpec, said: tuple[float, float] | None = None) -> Wind | None:
+    """Returns the wind that pushes vehicles; None: none does.
+
+    said: speed in m/s and direction in rad of a scenario; a speed among the settings goes before it.
+    """
+    world = spec.settings.world
+    if not world.wind:
+        return None
+    speed, towards = world.wind_speed, radians(world.wind_direction_deg)
+    if speed is None and said is not None:
+        speed, towards = said
+    if speed is None:
+        speed = wind_of_intensity(spec.weather.wind_intensity)
+    return Wind(speed, towards, world.wind_gusts)
 
 
 def _foreign_on_carla(spec: RunSpec) -> bool:

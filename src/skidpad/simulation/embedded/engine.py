@@ -101,6 +101,8 @@ class EmbeddedBackend:
             mu_ref=mu_ref,
         )
         self.world.lay(road_of(changed))
+        if outside.wind is not None:
+            self.world.blow(*outside.wind)
         self.world.lights.hold(outside.lights)
         names = self.world.table.names
         self._unseen = np.array([name in outside.unseen for name in names], dtype=np.bool_)

@@ -23,7 +23,14 @@ def staged(setup: Setup, seed: int) -> World:
     roles = cast_of(map, setup, seed)
     road = road_of(setup)
     grip = road.params()
-    conditions = Conditions(seed=seed, dt=setup.dt, grip=grip, stability=setup.stability)
+    conditions = Conditions(
+        seed=seed,
+        dt=setup.dt,
+        grip=grip,
+        stability=setup.stability,
+        anti_lock=setup.anti_lock,
+        wind=setup.wind,
+    )
     world = World(map, Lights.pretimed(map, seed, setup.dt), conditions)
     traffic = setup.traffic or TrafficSetup(vehicles=0)
     drivers = Traffic(map, traffic, seed, care_of(setup, traffic.slow_in_weather))

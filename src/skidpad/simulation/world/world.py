@@ -7,7 +7,7 @@ Everything random comes from named streams of the seed.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import atan2, cos, isfinite, sin
 
 import numpy as np
@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.core.jit import hold
-from skidpad.core.setup import DT, ActorCommand
+from skidpad.core.setup import DT, ActorCommand, Wind
 from skidpad.core.states import LaneInvasion, VehicleCommand
+from skidpad.core.vocabulary import AntiLock
 from skidpad.physics.contact import CONTACT_LAW, Contacts
 from skidpad.physics.fleet import Fleet
 from skidpad.physics.grip import GripParams, Road
 from skidpad.physics.types import VehicleType
+from skidpad.physics.wind import Gusts
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.world.ground import ROAD_NOISE, RoadSigns, read_signs
 from skidpad.simulation.world.lights import Lights
@@ -58,6 +60,8 @@ class Conditions:
     dt: float = DT
     grip: GripParams
     stability: bool = False  # vehicles have stability and traction control
+    anti_lock: AntiLock = AntiLock.IDEAL  # of vehicles that have them
+    wind: Wind | None = None  # None: no air moves
     road_noise: float = ROAD_NOISE  # rad of cross slope, decision M-11
     all_lanes: bool = False  # actors stand on sidewalks and shoulders too
 
@@ -84,6 +88,8 @@ class World:
         self.moved_on: tuple[int, ...] = ()
         self.invasions: tuple[LaneInvasion, ...] = ()
         self.notices: tuple[str, ...] = ()
+        self.gusts = None if conditions.wind is None else Gusts(conditions.wind, conditions.seed)
+        self.air = (0.0, 0.0)  # m/s of the air in world axes
         self._next_id = 0
         self._begin([])
         self._outfit()
@@ -130,7 +136,13 @@ class World:
         self.rows = Rows.of(members, self.conditions.seed)
         self.states, self.commands, self.mu = self.rows.states, self.rows.commands, self.rows.mu
         self.grade, self.bank, self.placed = self.rows.grade, self.rows.bank, self.rows.placed
-        self.fleet = Fleet(types, self.dt, states=self.states, stability=self.conditions.stability)
+        self.fleet = Fleet(
+            types,
+            self.dt,
+            states=self.states,
+            stability=self.conditions.stability,
+            cycling=self.conditions.anti_lock is AntiLock.WHEEL_SPEEDS,
+        )
         self.tyres = self.fleet.tire_friction.copy()  # (wheeled, 4) outside friction zones
         self.bodies = bodies_of(members)
 
@@ -214,6 +226,11 @@ class World:
         self._fill_grips()
         if self.patches is not None:
             self.patches.lay(road)
+
+    def blow(self, speed: float, towards: float) -> None:
+        """From now on the mean wind is this, in m/s and rad, where wind pushes vehicles."""
+        if self.gusts is not None:
+            self.gusts.wind = replace(self.gusts.wind, speed=speed, towards=towards)
 
     def _fill_grips(self) -> None:
         road = self._road
@@ -328,6 +345,8 @@ class World:
             for word in words:
                 self._obey(word)
         self._feel_road()
+        if self.gusts is not None:
+            self.air = self.gusts.advance(self.dt)
         self.notices, self.put_back, self.moved_on = (), (), ()
         if self.traffic is not None and self.tick % CHECK_PERIOD == 0:
             self._advance(stages & ~SETTLE)
@@ -355,6 +374,7 @@ class World:
             CARELESS if self.traffic is None else self.traffic.care,
             c.road_noise,
             not c.all_lanes,
+            *self.air,
         )
         step = advance_undriven if self.traffic is None else advance
         touches, crossed = step(self.arena, now)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from time import process_time
 
 import numpy as np
 import pytest
@@ -146,3 +147,22 @@ def test_a_patch_is_felt_by_the_tyres_of_each_vehicle_and_by_the_weather_of_the_
     backend.change(outside)
     backend.step(VehicleCommand())
     assert backend.truth().mu[0] == pytest.approx(before, rel=0.03)
+
+
+def test_the_example_of_a_stop_on_split_friction_is_quick_and_shows_the_control(tmp_path):
+    """30 s of processor time are asked for after the first compile; 3 s are needed."""
+    where = Path(__file__).parents[2] / "examples"
+    begin, speeds = process_time(), {}
+    for control in ("ideal", "wheel_speeds"):
+        out = tmp_path / control
+        call = [
+            "play", "lead_slowdown", "--stack", f"{where / 'split_brake.py'}:SplitBrake",
+            "--surface", str(where / "split_mu.yaml"), "--set", f"anti_lock={control}",
+            "--sensors", "objects", "--duration", "6", "--out", str(out),
+        ]  # fmt: skip
+        found = CliRunner().invoke(app, call)
+        assert found.exit_code == 0, found.output
+        speeds[control] = read_log(out).v_ego
+    assert process_time() - begin < 30.0
+    drop = {name: v[45] - v[-1] for name, v in speeds.items()}
+    assert 3.0 < drop["wheel_speeds"] < drop["ideal"]

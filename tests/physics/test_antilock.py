@@ -64,7 +64,7 @@ def test_rear_wheels_select_low_and_the_lead_of_a_front_wheel_is_limited():
     assert np.array_equal(stop.memory[:, PRESSURE + 2], stop.memory[:, PRESSURE + 3])
     cycled = stop.memory[:, CYCLES] > 0.0
     assert np.all(abs(left - right)[cycled] <= stop.memory[cycled, GAP] + 1e-9)
-    assert left[-1] > right[-1]
+    assert np.mean(left[:100]) > np.mean(right[:100]) + 0.1
 
 
 def test_split_friction_is_held_by_the_driver_without_stability_control():
@@ -89,7 +89,7 @@ def test_gentle_braking_is_left_alone_and_nothing_changes_without_the_switch():
             fleet.step(commands, np.full((1, 4), 0.9))
         way.append(float(fleet.states.x[0]))
         assert fleet.wheels.memory[0, CYCLES] == 0.0
-    assert way[1] == pytest.approx(way[0], abs=0.35)  # pressure takes 0.15 s to build up
+    assert way[1] == pytest.approx(way[0], abs=0.4)  # pressure takes 0.15 s to build up
     ideal, named, cycles = (
         log_hash(run(adas_run(2, "icy_30", settings=s, seed=3, duration=3.0)).log)
         for s in ({}, {"anti_lock": "ideal"}, {"anti_lock": "wheel_speeds"})

@@ -151,6 +151,11 @@ def short_drive(weather: str | Weather) -> Outcome:
     return lambda settings: log_hash(run(cell(settings, weather)).log)
 
 
+def in_wind(**also: Any) -> Outcome:
+    """A short drive in a wind."""
+    return lambda s: short_drive("rain-noon")(s.with_values({"wind": True, **also}))
+
+
 def pictures(settings: Settings, weather: str, *ids: str) -> list[bytes]:
     """What some cameras show at the start."""
     ready = cell(settings, weather, sensors=SensorLevel.PIXELS)
@@ -223,6 +228,11 @@ OTHERS: dict[str, Scenario] = {
     "radar_model": Scenario("physical", short_drive("clear-noon")),
     "lane_material": Scenario(True, lane_friction),
     "esc": Scenario(False, short_drive("icy_30")),
+    "anti_lock": Scenario("wheel_speeds", short_drive("icy_30")),
+    "wind": Scenario(True, short_drive("rain-noon")),
+    "wind_speed": Scenario(12.0, in_wind()),
+    "wind_direction_deg": Scenario(0.0, in_wind(wind_speed=12.0)),
+    "wind_gusts": Scenario(0.3, in_wind(wind_speed=12.0)),
     "camera": Scenario(False, lambda s: pictures(s, "rain-noon", "rgb_front")),
     "night_rain": Scenario("rain_only", lambda s: pictures(s, "rain-night", "rgb_front")),
     "drivers": Scenario(False, short_drive("rain-noon")),

@@ -152,9 +152,9 @@ def test_a_patch_is_felt_by_the_tyres_of_each_vehicle_and_by_the_weather_of_the_
 def test_the_example_of_a_stop_on_split_friction_is_quick_and_shows_the_control(tmp_path):
     """30 s of processor time are asked for after the first compile; 3 s are needed."""
     where = Path(__file__).parents[2] / "examples"
-    begin, speeds = process_time(), {}
+    speeds = {}
     for control in ("ideal", "wheel_speeds"):
-        out = tmp_path / control
+        begin, out = process_time(), tmp_path / control
         call = [
             "play", "lead_slowdown", "--stack", f"{where / 'split_brake.py'}:SplitBrake",
             "--surface", str(where / "split_mu.yaml"), "--set", f"anti_lock={control}",

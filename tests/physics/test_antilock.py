@@ -55,7 +55,16 @@ def test_locked_wheels_stop_later_and_slide():
 
 def test_the_control_is_given_no_friction():
     parameters = inspect.signature(antilock.regulate.py_func).parameters
-    assert list(parameters) == ["m", "rims", "half_track", "yaw_rate", "slows", "pedal", "h"]
+    assert list(parameters) == [
+        "m",
+        "omega",
+        "radius",
+        "half_track",
+        "yaw_rate",
+        "slows",
+        "pedal",
+        "h",
+    ]
 
 
 def test_rear_wheels_select_low_and_the_lead_of_a_front_wheel_is_limited():

@@ -37,29 +37,30 @@ V_LEAST = 0.5  # m/s of the reference below which slip is not computed
 
 @inner_kernel
 def regulate(
-    m: Floats, rims: Floats, half_track: float, yaw_rate: float, slows: float, pedal: bool, h: float
-) -> None:
+    m: Floats, omega: Floats, radius: float, half_track: float, yaw_rate: float, slows: float,
+    pedal: bool, h: float,
+) -> None:  # fmt: skip
     """Pressures h seconds later, into `m` (MEMORY,).
 
-    rims (4,): speeds of the rims in m/s. slows: deceleration of the body in m/s^2.
+    omega (4,): spins of the wheels in rad/s, of this radius in m. slows: deceleration of the body in m/s^2.
     """
     fastest = 0.0
     for w in range(4):
         arm = half_track if w % 2 == 0 else -half_track
-        fastest = max(fastest, rims[w] + yaw_rate * arm)
+        fastest = max(fastest, omega[w] * radius + yaw_rate * arm)
     if not pedal:
         for w in range(4):
-            m[PRESSURE + w], m[PHASE + w], m[RIM + w] = 1.0, BUILD, rims[w]
+            m[PRESSURE + w], m[PHASE + w], m[RIM + w] = 1.0, BUILD, omega[w] * radius
         m[REFERENCE], m[GAP], m[PRESSED] = fastest, GAP_FIRST, 0.0
         return
     if m[PRESSED] == 0.0:
         m[PRESSED], m[REFERENCE] = 1.0, fastest
         for w in range(4):
-            m[PRESSURE + w], m[RIM + w] = 0.0, rims[w]
+            m[PRESSURE + w], m[RIM + w] = 0.0, omega[w] * radius
     m[REFERENCE] = max(fastest, m[REFERENCE] - (max(slows, 0.0) + MARGIN) * h)
     for w in range(4):
         arm = half_track if w % 2 == 0 else -half_track
-        _turn_phase(m, w, rims[w], max(m[REFERENCE] - yaw_rate * arm, V_LEAST), h)
+        _turn_phase(m, w, omega[w] * radius, max(m[REFERENCE] - yaw_rate * arm, V_LEAST), h)
     rear = min(m[PRESSURE + 2], m[PRESSURE + 3])
     m[PRESSURE + 2] = m[PRESSURE + 3] = rear
     _limit_lead(m, h)

@@ -269,7 +269,7 @@ def _advance(
 
     wind_x, wind_y: m/s of the air in the world.
     """
-    windy, memory, rims = wind_x != 0.0 or wind_y != 0.0, wheels.memory[i], np.empty(4)
+    windy, memory = wind_x != 0.0 or wind_y != 0.0, wheels.memory[i]
     steer_lag, load_lag = 1.0 - exp(-h / STEER_TIME), 1.0 - exp(-h / LOAD_TIME)
     omega, load, a_load = wheels.omega[i], wheels.load[i], wheels.a_load[i]
     body = _body(i, states, car.x_cog)
@@ -285,9 +285,8 @@ def _advance(
         asked = _stability_correction(car, u, v, r, steer, feel)
         drive = _drive(car, u, speed, omega) * asked.drive
         if car.cycling:
-            for w in range(4):
-                rims[w] = omega[w] * (car.front.radius if w < 2 else car.rear.radius)
-            regulate(memory, rims, car.half_track, r, g_x - a_x, car.brake > 0.0, h)
+            pedal = car.brake > 0.0
+            regulate(memory, omega, car.front.radius, car.half_track, r, g_x - a_x, pedal, h)
         push = _push(car, u, v, r, a_x, drive, asked, steer, omega, wheels.slip_y[i],
                      wheels.slide[i], load, feel, memory, h)  # fmt: skip
         u_air, v_air = u - (wind_x * c + wind_y * s), v - (wind_y * c - wind_x * s)

@@ -151,6 +151,20 @@ def short_drive(weather: str | Weather) -> Outcome:
     return lambda settings: log_hash(run(cell(settings, weather)).log)
 
 
+def full_brake(settings: Settings) -> float:
+    """Speed after a second of full braking on ice."""
+    ready = cell(settings, "icy_30")
+    setup = stage_of(ready).setup
+    backend = EmbeddedBackend()
+    backend.reset(replace(setup, ego=replace(setup.ego, speed=15.0)), ready.seed)
+    for _ in range(20):
+        backend.step(VehicleCommand(brake=1.0))
+    states = backend.truth().states
+    speed = float(np.hypot(states.vx[0], states.vy[0]))
+    backend.close()
+    return speed
+
+
 def in_wind(**also: Any) -> Outcome:
     """A short drive in a wind."""
     return lambda s: short_drive("rain-noon")(s.with_values({"wind": True, **also}))
@@ -228,7 +242,7 @@ OTHERS: dict[str, Scenario] = {
     "radar_model": Scenario("physical", short_drive("clear-noon")),
     "lane_material": Scenario(True, lane_friction),
     "esc": Scenario(False, short_drive("icy_30")),
-    "anti_lock": Scenario("wheel_speeds", short_drive("icy_30")),
+    "anti_lock": Scenario("wheel_speeds", full_brake),
     "wind": Scenario(True, short_drive("rain-noon")),
     "wind_speed": Scenario(12.0, in_wind()),
     "wind_direction_deg": Scenario(0.0, in_wind(wind_speed=12.0)),

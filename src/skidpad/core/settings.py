@@ -95,16 +95,16 @@ class WorldSettings(SettingsPart):
     wind: bool = setting_field(False, "M-1, T-11", "wind pushes vehicles")
     wind_speed: float | None = setting_field(
         None,
-        "T-11",
+        "M-1, T-11",
         "mean wind in m/s; none: of the scenario or wind_intensity",
         low=0.0,
         high=30.0,
     )
     wind_direction_deg: float = setting_field(
-        90.0, "T-11", "where it blows to, left from the map's x axis", low=-360.0, high=360.0
+        90.0, "M-1, T-11", "where it blows to, left from the map's x axis", low=-360.0, high=360.0
     )
     wind_gusts: float = setting_field(
-        0.0, "T-11", "standard deviation of gusts over the mean", low=0.0, high=0.5
+        0.0, "M-1, T-11", "standard deviation of gusts over the mean", low=0.0, high=0.5
     )
 
 

@@ -90,3 +90,31 @@ def test_what_is_not_said_stays_and_what_is_too_much_is_held_in_range():
     flood = Environment(fall=Fall.RAIN, fall_mm_h=900.0, wetness=Wetness.HIGH_FLOODED)
     found = weather_of(flood, base, "x")
     assert (found.precipitation, found.wetness, found.cloudiness) == (100.0, 100.0, 80.0)
+
+
+def windy(speed: float) -> str:
+    """An environment with a wind that blows to the left of the road."""
+    return f"""<GlobalAction><EnvironmentAction><Environment name="theirs">
+<Weather><Wind direction="1.5708" speed="{speed}"/></Weather>
+</Environment></EnvironmentAction></GlobalAction>"""
+
+
+@pytest.mark.osc("EnvironmentAction")
+def test_the_wind_of_the_file_pushes_where_the_run_lets_it(tmp_path):
+    (tmp_path / "later").mkdir()
+    on = ("--set", "wind=on")
+    calm, _ = played(tmp_path, begin=windy(25.0))
+    blown, _ = played(tmp_path, *on, begin=windy(25.0))
+    changed = event("change", windy(25.0), time(1.0))
+    later, _ = played(tmp_path / "later", *on, begin=windy(0.0), stories=story(changed))
+    place = [float(log.ego.y[-1]) for log in (calm, blown, later)]
+    assert len(set(place)) == 3
+    assert np.array_equal(calm.ego.y[:15], later.ego.y[:15])
+
+
+def test_a_bad_wind_is_refused_with_its_range(tmp_path):
+    file = write(tmp_path, init=at("ego", -3, 100) + at("other", -1, 120) + windy(120.0))
+    with pytest.raises(FileError, match=r"<Wind>: speed must be in \[0, 100\] m/s, got 120"):
+        CliRunner().invoke(
+            app, ["play", str(file), "--out", str(tmp_path / "out")], catch_exceptions=False
+        )

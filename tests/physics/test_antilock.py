@@ -10,8 +10,8 @@ from skidpad.core.geometry import Pose
 from skidpad.physics import antilock
 from skidpad.physics.antilock import CYCLES, GAP, PRESSURE
 from skidpad.physics.fleet import Fleet
-from skidpad.physics.split import split_stop
 from skidpad.physics.types import vehicle_type
+from split_friction import split_stop
 
 CAR = vehicle_type("mini_cooper_s")
 

@@ -13,9 +13,9 @@ from skidpad.core.constants import G
 from skidpad.core.errors import ConfigError
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import ActorKind
-from skidpad.physics.params import AIR_DENSITY
 from skidpad.physics.types import VehicleType, vehicle_type, vehicle_types
 from skidpad.physics.vehicle import V_CLUTCH, steer_share
+from skidpad.physics.wind import AIR_DENSITY
 
 OMEGA, ZETA = 1.2, 0.9  # rad/s and damping of the lateral control, half the yaw response's
 V_LATERAL_MIN = 4.0  # m/s, keeps gains finite at walking speed

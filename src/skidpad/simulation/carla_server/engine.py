@@ -18,8 +18,8 @@ import numpy as np
 
 from skidpad.core.constants import G
 from skidpad.core.vocabulary import ActorKind
-from skidpad.physics.params import AIR_DENSITY
 from skidpad.physics.types import VehicleType
+from skidpad.physics.wind import AIR_DENSITY
 from skidpad.simulation.carla_server import wire
 
 Curve = Sequence[tuple[float, float]]  # rpm and N m

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
 
-from skidpad.core.geometry import footprint
+from skidpad.core.geometry import Pose, footprint
 from skidpad.core.run import Roads, RunSpec, run_from_plain
+from skidpad.core.setup import ActorSetup
 from skidpad.core.vocabulary import Scenery, SemanticClass
+from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import bundled_maps, load_map
 from skidpad.roads.lanes import LaneKind, Marking
 from skidpad.roads.roadside import Shape
@@ -18,6 +23,7 @@ from skidpad.scenery.free_ground import outlines_of
 from skidpad.scenery.sides import RoadKind, sides_of
 from skidpad.scenery.sight import sight_triangles
 from skidpad.simulation.carla_server.maps import spawn_points
+from skidpad.simulation.world.actors import PAINT_SHARES, PALETTE, Role, draw_paint
 
 MAPS = (*bundled_maps(), "Town01", "Town02", "Town04", "Town07", "Town10HD")
 
@@ -89,7 +95,10 @@ def test_none_is_the_map_itself_and_full_leaves_the_roads_as_they_are() -> None:
     assert dressed.arrays is road_map.arrays
     assert dressed.lanes is road_map.lanes
     assert dressed.signals is road_map.signals
-    assert dressed.roadside.boxes[: len(road_map.roadside.boxes)] == road_map.roadside.boxes
+    own = dressed.roadside.boxes[: len(road_map.roadside.boxes)]
+    bare = tuple(replace(b, shape=Shape.BOX, variant=0) for b in own)
+    assert bare == road_map.roadside.boxes  # buildings of the file have windows, where they stood
+    assert {b.shape for b in own if b.label == SemanticClass.BUILDING} == {Shape.BLOCK}
     assert dressed.content_hash != road_map.content_hash
     changed = [
         name
@@ -150,3 +159,12 @@ def test_a_run_says_its_scenery_and_one_without_is_described_as_before() -> None
     assert dressed.to_plain()["scenery"] == "full"
     assert run_from_plain(dressed.to_plain(), "here") == dressed
     assert run_from_plain(plain.to_plain(), "here") == plain
+
+
+def test_paints_are_drawn_as_often_as_cars_have_them_and_only_with_scenery() -> None:
+    drawn = Counter(draw_paint(3, f"car_{i}") for i in range(2000))
+    for paint, share in zip(PALETTE, PAINT_SHARES, strict=True):
+        assert drawn[paint] / 2000 == pytest.approx(share, abs=0.035)
+    role = Role(ActorSetup(name="car_1", type=EGO_TYPE, place=Pose(0.0, 0.0)))
+    assert role.newcomer(1).rgb == PALETTE[1]
+    assert role.newcomer(1, 3).rgb == draw_paint(3, "car_1")

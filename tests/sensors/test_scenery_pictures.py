@@ -12,11 +12,13 @@ from skidpad.core.specs import CameraSpec, Modality
 from skidpad.core.vocabulary import Scenery, SemanticClass
 from skidpad.physics.presets import preset
 from skidpad.roads.bundled import load_map
+from skidpad.roads.roadside import Box, Shape
 from skidpad.scenery.dressing import dress_map
 from skidpad.sensors.finish.extras import ALL_EXTRAS
 from skidpad.sensors.scene.grain import NO_GRAIN
 from skidpad.sensors.scene.shapes import shape_levels
 from skidpad.sensors.scene.static import build_scene
+from skidpad.sensors.scene.street_light import NO_STREET_LIGHT, street_light_of
 from skidpad.sensors.suite import PixelSettings, PixelSuite
 
 EYE = Pose(0.5, 0.0, 1.5)
@@ -103,3 +105,22 @@ def test_colours_are_spread_more_evenly_than_without(lane: int, share: float) ->
     plain = share_of_commonest(look(Scenery.NONE, lane, share)[1])
     full = share_of_commonest(look(Scenery.FULL, lane, share)[1])
     assert full < 0.75 * plain
+
+
+def test_street_lamps_light_the_ground_at_night_only_and_fade_as_a_point_of_light() -> None:
+    lamp = Box(SemanticClass.POLE, 10.0, 20.0, 7.0, 0.0, 0.3, 0.8, 0.2, shape=Shape.LAMP)
+    light = street_light_of([lamp])
+    grid = light.light.reshape(light.rows, light.columns)
+    i, j = round(10.0 - light.x0), round(20.0 - light.y0)
+    assert grid.argmax() == i * light.columns + j
+    share = (1.0 - (7.0 / 30.0) ** 2) / 2.0**1.5  # as far away as the lamp is high
+    assert grid[i + 7, j] / grid[i, j] == pytest.approx(share, rel=1e-4)
+    assert street_light_of([]).light.size == 0
+    for weather, brighter in (("clear-noon", False), ("clear-night", True)):
+        suite, rgb, labels, _ = look(Scenery.FULL, 3, 0.5, weather)
+        suite.shading._street_light = NO_STREET_LIGHT
+        ego = suite._ego
+        dark = suite.observe(0, states_at([(ego.x, ego.y, ego.z, ego.yaw)]), {}).images["rgb"].rgb
+        road = np.isin(labels, [SemanticClass.ROAD, SemanticClass.SIDEWALK, SemanticClass.TERRAIN])
+        gained = rgb[road].astype(int).mean() - dark[road].astype(int).mean()
+        assert (gained > 2.0) if brighter else gained == 0.0

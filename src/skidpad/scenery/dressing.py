@@ -11,18 +11,19 @@ from functools import lru_cache
 import numpy as np
 
 from skidpad.core.geometry import footprint
-from skidpad.core.randomness import stream
-from skidpad.core.vocabulary import Scenery
+from skidpad.core.randomness import stream, stream_key
+from skidpad.core.vocabulary import Scenery, SemanticClass
 from skidpad.roads.lanes import LaneKind, LaneSamples, LaneTable, Marking
 from skidpad.roads.queries import RoadMap
-from skidpad.roads.roadside import Box
+from skidpad.roads.roadside import Box, Shape
 from skidpad.roads.terrain import Terrain, terrain_of
 from skidpad.scenery.free_ground import FreeGround
 from skidpad.scenery.rows import backdrop_of, rows_of
 from skidpad.scenery.sides import sides_of
-from skidpad.scenery.things import Thing
+from skidpad.scenery.things import STOREY, Thing
 
 EDITION = 1  # of what is generated; raise it when the same map gets other things
+LEAST_FRONT = 4.0  # m of the shorter side of a building that has windows
 SUNK = 0.3  # m that things reach into the ground, whose triangles are coarse
 
 
@@ -35,7 +36,8 @@ def dress_map(map: RoadMap, scenery: Scenery) -> RoadMap:
 def _dress_fully(map: RoadMap) -> RoadMap:
     dressed = copy(map)
     boxes = boxes_of(things_of(map), terrain_of(map.samples))
-    dressed.roadside = replace(map.roadside, boxes=(*map.roadside.boxes, *boxes))
+    own = (add_facade(box) for box in map.roadside.boxes)
+    dressed.roadside = replace(map.roadside, boxes=(*own, *boxes))
     dressed.samples = name_kerbs(map.samples, map.lanes)
     dressed.content_hash = f"{map.content_hash} with scenery {EDITION}"
     return dressed
@@ -67,6 +69,19 @@ def boxes_of(things: Sequence[Thing], terrain: Terrain) -> list[Box]:
             height = box.height + (rise if box.z == 0.0 else 0.0)
             found.append(replace(box, z=round(low, 3), height=round(height, 3)))
     return found
+
+
+def add_facade(box: Box) -> Box:
+    """Returns a building of the file with windows; the box stays as it is, and so does all else."""
+    storeys = min(int((box.height - 1.5) / STOREY), 15)
+    if (
+        box.label != SemanticClass.BUILDING
+        or storeys < 1
+        or min(box.length, box.width) < LEAST_FRONT
+    ):
+        return box
+    seed = stream_key(0, "facade", f"{box.x:.2f}", f"{box.y:.2f}")
+    return replace(box, shape=Shape.BLOCK, variant=seed % (1 << 16) * 16 + storeys)
 
 
 def count_things(things: Sequence[Thing]) -> dict[str, int]:

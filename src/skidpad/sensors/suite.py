@@ -107,7 +107,9 @@ class PixelSuite:
         light = lighting(weather, beam)
         snowed = Extra.SNOW in settings.extras
         static = self.scene.static
-        self.shading = Shading(static.palette, self._table, light, snowed, static.grain)
+        self.shading = Shading(
+            static.palette, self._table, light, snowed, static.grain, static.street_light
+        )
         if settings.extras:
             self._finish.look_out(weather, light)
         self._passes: dict[tuple[object, Sight], Pass] = {}

@@ -38,11 +38,13 @@ from skidpad.sensors.pictures.blocks import (
     slopes,
 )
 from skidpad.sensors.pictures.lighting import Lighting
-from skidpad.sensors.pictures.roughness import MORE_LANES, TILES, roughen
+from skidpad.sensors.pictures.roughness import MORE_LANES, TILES, roughen, vary_sky
 from skidpad.sensors.pictures.sky import disc, sky
+from skidpad.sensors.pictures.street_lamps import add_street_light
 from skidpad.sensors.raster.view import View
 from skidpad.sensors.scene.grain import NO_GRAIN
 from skidpad.sensors.scene.materials import ACTOR_PAINTED, EMISSIVE, MATERIALS, Material
+from skidpad.sensors.scene.street_light import NO_STREET_LIGHT, StreetLight
 
 ROADLIKE = (Material.ASPHALT, Material.SHOULDER, Material.MARKING, Material.SIDEWALK)
 SNOWY = (Material.GRASS, Material.EMBANKMENT, Material.SHOULDER, Material.SIDEWALK, Material.MEDIAN)
@@ -66,11 +68,13 @@ class Shading:
         light: Lighting,
         snow_on_road: bool = False,
         grain: Float32 = NO_GRAIN,
+        street_light: StreetLight = NO_STREET_LIGHT,
     ) -> None:
         """snow_on_road: for people; what a stack reads has snow beside the road only.
 
-        grain: of the scene (`StaticScene.grain`).
+        grain, street_light: of the scene (`StaticScene`).
         """
+        self._street_light = street_light
         self._grain = grain * np.float32(1.0 - 0.6 * light.snow)
         self.light = light
         self._table = _look_up(palette, table, light, snow_on_road)
@@ -118,6 +122,7 @@ class Shading:
             self._table,
             self._grain,
             TILES,
+            self._street_light,
             self._work,
             inverse,
             key,
@@ -297,6 +302,7 @@ def shade(
     table: Float32,
     grain: Float32,
     tiles: Float32,
+    lamps: StreetLight,
     work: Float32,
     inverse: Float32,
     key: NDArray[np.int32],
@@ -322,9 +328,15 @@ def shade(
                         work[H : H + BLOCK] = ZERO
                     else:
                         _headlights(v, count, light, to_body, offset, work)
+                if lamps.light.size > 0 and light.lamps > 0.0:
+                    if light.headlights <= 0.0:
+                        work[H : H + BLOCK] = ZERO
+                    add_street_light(view, v, count, np.float32(light.lamps), lamps, work)
                 _surfaces(v, count, light, sun, up, work)
             if empty:
                 sky(v, count, light, up, work)
+                if grain.shape[0] > 0:
+                    vary_sky(view, v, count, light, sun, tiles, work)
                 if light.disc > 0.0:
                     disc(v, count, light, sun, work)
             develop(count, work, out[y, first : first + count])

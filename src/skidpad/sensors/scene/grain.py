@@ -16,19 +16,19 @@ NO_GRAIN = np.zeros((0, 3), dtype=np.float32)
 
 # shares by which grains, patches and tints change a colour: about three standard deviations
 GRAIN: dict[Material, tuple[float, float, float]] = {
-    Material.ASPHALT: (0.16, 0.30, 0.04),
-    Material.SHOULDER: (0.18, 0.30, 0.05),
-    Material.MARKING: (0.10, 0.24, 0.03),
-    Material.GRASS: (0.34, 0.50, 0.20),
-    Material.EMBANKMENT: (0.34, 0.50, 0.22),
-    Material.MEDIAN: (0.34, 0.46, 0.18),
-    Material.SIDEWALK: (0.10, 0.22, 0.04),
-    Material.CONCRETE: (0.08, 0.20, 0.03),
+    Material.ASPHALT: (0.22, 0.66, 0.16),
+    Material.SHOULDER: (0.22, 0.66, 0.18),
+    Material.MARKING: (0.16, 0.44, 0.05),
+    Material.GRASS: (0.34, 0.70, 0.34),
+    Material.EMBANKMENT: (0.34, 0.70, 0.36),
+    Material.MEDIAN: (0.34, 0.66, 0.32),
+    Material.SIDEWALK: (0.10, 0.50, 0.13),
+    Material.CONCRETE: (0.08, 0.40, 0.07),
     Material.KERB: (0.10, 0.22, 0.03),
     Material.FENCE: (0.12, 0.20, 0.05),
     Material.ROOF: (0.16, 0.24, 0.07),
 }
-LEAVES, WALLS = (0.60, 0.46, 0.12), (0.07, 0.26, 0.05)
+LEAVES, WALLS = (0.70, 0.70, 0.26), (0.08, 0.50, 0.14)
 
 
 def grain_table(boxes: Iterable[tuple[int, int]]) -> Float32:

@@ -44,21 +44,39 @@ def _ring(thing: Box, sides: int, z: float, share: float = 1.0) -> Points:
 
 
 def _crown(thing: Box, material: int) -> list[Mesh]:
-    """A lump of leaves: rings of uneven radius, most in the lower middle."""
+    """Lumps of leaves: one in the middle, and smaller ones around it that break its outline."""
+    lumps = (4, 3, 0, 0)
 
     def one(level: int) -> Mesh:
         rng = np.random.default_rng(thing.variant)
-        heights = np.linspace(0.0, 1.0, RINGS[level])
-        rings = []
-        for h in heights:
-            share = (1.0 - abs(2.0 * h - 0.85) ** 2.2 / 2.6) * (0.35 if h in (0.0, 1.0) else 0.97)
-            uneven = rng.uniform(0.78, 1.0, SIDES[level])[:, None]
-            ring = _ring(thing, SIDES[level], h * thing.height, share)
-            ring[:, :2] *= uneven
-            rings.append(ring)
-        return loft(np.array(rings), thing.label, material)
+        size = np.array([thing.length, thing.width, thing.height])
+        turn = float(rng.uniform(0.0, 2.0 * np.pi))
+        count = lumps[level]
+        middle = _lump_of_leaves(thing, level, rng, size * ((0.84, 0.84, 0.96) if count else 1.0))
+        parts = [middle.moved(np.eye(3), np.array([0.0, 0.0, 0.02 * thing.height * bool(count)]))]
+        for k in range(count):
+            angle = turn + 2.0 * np.pi * k / count
+            small = size * rng.uniform(0.44, 0.56) * (1.0, 1.0, 0.9)
+            away = 0.5 * (size - small)
+            up = float(rng.uniform(0.0, 0.75)) * (size[2] - small[2])
+            place = np.array([away[0] * np.cos(angle), away[1] * np.sin(angle), up])
+            parts.append(_lump_of_leaves(thing, level + 1, rng, small).moved(np.eye(3), place))
+        mesh = merge(parts)
+        return mesh._replace(material=np.full(len(mesh.triangles), material, dtype=np.uint8))
 
     return [one(level) for level in range(LEVELS)]
+
+
+def _lump_of_leaves(thing: Box, level: int, rng: Rng, size: Points) -> Mesh:
+    """Rings of uneven radius, most in the lower middle, from the ground up."""
+    sides, rings = SIDES[level], []
+    for h in np.linspace(0.0, 1.0, RINGS[level]).tolist():
+        share = (1.0 - abs(2.0 * h - 0.85) ** 2.2 / 2.6) * (0.35 if h in (0.0, 1.0) else 0.97)
+        angle = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides
+        radius = 0.5 * share * rng.uniform(0.78, 1.0, sides)
+        ring = [radius * np.cos(angle) * size[0], radius * np.sin(angle) * size[1]]
+        rings.append(np.stack([*ring, np.full(sides, h * size[2])], axis=1))
+    return loft(np.array(rings), thing.label, 0)
 
 
 def _cone(thing: Box, material: int) -> list[Mesh]:

@@ -20,6 +20,7 @@ from skidpad.sensors.scene.ground import ground_pieces
 from skidpad.sensors.scene.materials import MATERIALS, Material, base_palette
 from skidpad.sensors.scene.mesh import Mesh, merge
 from skidpad.sensors.scene.road_mesh import LEVELS, ChunkKey, road_pieces
+from skidpad.sensors.scene.street_light import StreetLight, street_light_of
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -60,6 +61,7 @@ class StaticScene:
     chunks: Chunks
     lamps: Lamps
     palette: NDArray[np.float32]  # (256, 3) sRGB grey levels by material
+    street_light: StreetLight
     grain: NDArray[np.float32]  # unevenness by material; of dressed maps only
 
     def lamp_keys(self, lights: Mapping[int, LightState]) -> NDArray[np.int32]:
@@ -95,7 +97,9 @@ def build_scene(samples: LaneSamples, lanes: LaneTable, roadside: Roadside) -> S
     }
     chunks = pack(blocks.values())
     lamps_found = _find_lamps(chunks, roadside, blocks, grouped)
-    return StaticScene(chunks, lamps_found, palette, _grain_of(roadside, box_material))
+    street_light = street_light_of(roadside.boxes)
+    grain = _grain_of(roadside, box_material)
+    return StaticScene(chunks, lamps_found, palette, street_light, grain)
 
 
 def _grain_of(

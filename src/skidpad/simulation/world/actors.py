@@ -10,6 +10,7 @@ from msgspec import structs
 
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.geometry import Pose
+from skidpad.core.randomness import stream
 from skidpad.core.setup import (
     RESERVE_NAME,
     VEHICLES_MAX,
@@ -43,6 +44,16 @@ PALETTE = (
     (35, 80, 50),
     (215, 180, 45),
 )
+PAINT_SHARES = (
+    0.34,
+    0.21,
+    0.19,
+    0.08,
+    0.08,
+    0.05,
+    0.01,
+    0.04,
+)  # the same report; yellow: all others
 
 
 # Adult 95th-percentile stance and mass; city bicycle with rider; usual construction-site sizes.
@@ -64,13 +75,19 @@ class Role:
     late: bool = False  # enters when there is room (A-209)
     reserve: bool = False  # and not before it is called
 
-    def newcomer(self, i: int) -> Newcomer:
-        """How it enters as the i-th."""
+    def newcomer(self, i: int, paint_seed: int | None = None) -> Newcomer:
+        """How it enters as the i-th; paint_seed: its paint is drawn, else it is that of its place."""
         a = self.actor
         body = SHAPES[a.type] if a.type in SHAPES else vehicle_type(a.type)
         if a.tyres and isinstance(body, VehicleType):
             body = structs.replace(body, tyres=a.tyres)
-        return Newcomer(body, a.name, a.type, a.rgb or PALETTE[i % len(PALETTE)])
+        paint = PALETTE[i % len(PALETTE)] if paint_seed is None else draw_paint(paint_seed, a.name)
+        return Newcomer(body, a.name, a.type, a.rgb or paint)
+
+
+def draw_paint(seed: int, name: str) -> tuple[int, int, int]:
+    """Returns the paint of the actor of this name, as often as cars have it."""
+    return PALETTE[int(stream(seed, "paint", name).choice(len(PALETTE), p=PAINT_SHARES))]
 
 
 def place_of(map: RoadMap, place: Pose | LanePosition) -> Pose:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.setup import Setup, TrafficSetup
-from skidpad.core.vocabulary import Control
+from skidpad.core.vocabulary import Control, Scenery
 from skidpad.physics.grip import road_of
 from skidpad.roads.bundled import load_map
 from skidpad.scenery.dressing import dress_map
@@ -38,7 +38,8 @@ def staged(setup: Setup, seed: int) -> World:
     lanes = lane_frictions(setup)
     if setup.patches or lanes:
         world.patches = Patches(map, setup.patches, road, lanes)
-    ids = world.enter([role.newcomer(i) for i, role in enumerate(roles)])
+    paints = seed if setup.scenery is Scenery.FULL else None
+    ids = world.enter([role.newcomer(i, paints) for i, role in enumerate(roles)])
     world.lay(road)
     world.book = ContactBook(world.obstacles.names, setup.dt)
     for id, role in zip(ids, roles, strict=True):

@@ -48,7 +48,9 @@ class Pictured:
         if self.weather is not weather:
             self.weather = weather
             static, light = self.live.static, lighting(weather)
-            self.shading = Shading(static.palette, self.bodies, light, grain=static.grain)
+            self.shading = Shading(
+                static.palette, self.bodies, light, False, static.grain, static.street_light
+            )
 
 
 class Surroundings:

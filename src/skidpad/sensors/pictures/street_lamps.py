@@ -1,0 +1,40 @@
+"""The light of street lamps on what a block of pixels shows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from skidpad.core.jit import inner_kernel
+from skidpad.sensors.pictures.blocks import ONE, ZERO, Float32, H, U, W
+from skidpad.sensors.pictures.roughness import A
+from skidpad.sensors.raster.view import View
+from skidpad.sensors.scene.street_light import StreetLight
+
+_FARTHEST = np.float32(1e-5)
+_NOWHERE = np.float32(-1.0)
+
+
+@inner_kernel
+def add_street_light(
+    view: View, v: np.float32, count: int, share: np.float32, lamps: StreetLight, work: Float32
+) -> None:
+    """Add the light of street lamps, `share` of it, to the beams that fall on a block."""
+    r = view.rotation
+    x_u, x_1 = np.float32(r[0, 0]), np.float32(r[1, 0]) * v + np.float32(r[2, 0])
+    y_u, y_1 = np.float32(r[0, 1]), np.float32(r[1, 1]) * v + np.float32(r[2, 1])
+    x_0, y_0 = np.float32(view.centre[0] - lamps.x0), np.float32(view.centre[1] - lamps.y0)
+    per, rows, columns = (
+        np.float32(lamps.per_cell),
+        np.float32(lamps.rows),
+        np.float32(lamps.columns),
+    )
+    for x in range(count):
+        u, w = work[U + x], work[W + x]
+        z = ONE / (w if w > _FARTHEST else _FARTHEST)
+        i = np.floor((x_0 + z * (x_u * u + x_1)) * per)
+        j = np.floor((y_0 + z * (y_u * u + y_1)) * per)
+        inside = i >= ZERO and i < rows and j >= ZERO and j < columns and w > ZERO
+        work[A + x] = i * columns + j if inside else _NOWHERE
+    for x in range(count):
+        if work[A + x] >= ZERO:
+            work[H + x] += share * lamps.light[np.uint64(work[A + x])]

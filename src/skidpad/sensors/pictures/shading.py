@@ -47,7 +47,14 @@ from skidpad.sensors.scene.materials import ACTOR_PAINTED, EMISSIVE, MATERIALS, 
 from skidpad.sensors.scene.street_light import NO_STREET_LIGHT, StreetLight
 
 ROADLIKE = (Material.ASPHALT, Material.SHOULDER, Material.MARKING, Material.SIDEWALK)
-SNOWY = (Material.GRASS, Material.EMBANKMENT, Material.SHOULDER, Material.SIDEWALK, Material.MEDIAN)
+SNOWY = (
+    Material.GRASS,
+    Material.EMBANKMENT,
+    Material.SHOULDER,
+    Material.SIDEWALK,
+    Material.MEDIAN,
+    Material.ROOF,
+)
 SNOWED = (Material.ASPHALT, Material.MARKING)
 SNOW_LEFT = 0.72  # share of a driven road that packed snow covers; by eye
 GLOSSY = (Material.PAINT, Material.GLASS)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import Enum
-from itertools import product
 from math import cos, hypot, inf, sin
 from typing import Any, TypeVar
 
@@ -109,9 +108,3 @@ def along_road(network: Network, a: Pose, b: Pose) -> Point | None:
     ahead, behind = shortest_route(network.map, p, q), shortest_route(network.map, q, p)
     ways = [r.length * sign for r, sign in ((ahead, 1.0), (behind, -1.0)) if r is not None]
     return (min(ways, key=abs), left) if ways else None
-
-
-def box_corners(box: Box) -> list[Point]:
-    """The outline in the entity's own axes."""
-    signs = product((-0.5, 0.5), repeat=2)
-    return [(box.forward + a * box.length, box.left + b * box.width) for a, b in signs]

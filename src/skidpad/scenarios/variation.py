@@ -8,14 +8,13 @@ from enum import Enum
 from functools import cache
 from importlib.resources import files
 from types import MappingProxyType
-from typing import Any
 
 import msgspec
 import numpy as np
 
 from skidpad.core.randomness import stream
 from skidpad.core.setup import DT
-from skidpad.scenarios.shipped import NAMES, find_shipped
+from skidpad.scenarios.shipped import find_shipped
 
 CUT = 2.5  # deviations
 SKILL_SPREAD = 0.15  # of the gains of scripted drivers
@@ -102,8 +101,3 @@ def drawn_skill(name: str, seed: int) -> dict[str, float]:
         actor: spread.draw(1.0, stream(seed, "scenario", name, "driver", actor))
         for actor in find_shipped(name).actors
     }
-
-
-def describe_shipped() -> dict[str, Any]:
-    """Nominal parameters by scenario, for reports."""
-    return {name: dict(find_shipped(name).parameters) for name in NAMES}

@@ -8,8 +8,6 @@ from enum import Enum
 from skidpad.core.lefthanded import pose_from_carla
 from skidpad.core.specs import CameraSpec, Modality, PointSensorSpec, RadarSpec, SensorSpec
 
-AXES = "carla"  # x forward, y right, z up in m; pitch up, yaw clockwise in deg
-
 
 class CaptureSize(Enum):
     """Which published image sizes the display cameras take (D-002 to D-004)."""

@@ -144,8 +144,3 @@ def apply_control(model: VehicleType, old: PhysicsControl, new: PhysicsControl) 
         if not isclose(wheel[member], was[member], rel_tol=1e-6):
             changes[name] = wheel[member] * scale
     return msgspec.structs.replace(model, **changes) if changes else model
-
-
-def with_friction(control: PhysicsControl, friction: np.ndarray[Any, Any]) -> PhysicsControl:
-    """The same with other tire_friction, for friction triggers."""
-    return replace(control, tire_friction=friction)

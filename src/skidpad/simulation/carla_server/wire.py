@@ -86,11 +86,6 @@ def iso_turn(value: Any, field: str) -> Vector:
     return (radians(x), radians(y), radians(z))
 
 
-def iso_torque(value: Any, field: str) -> Vector:
-    """A torque or angular impulse in ISO axes, its unit unchanged."""
-    return turn_from_carla(*vector(value, field))
-
-
 def iso_steer(steer: float) -> float:
     """A steer command or angle, right positive, as ISO; and back."""
     return mirror_value(steer)

@@ -28,7 +28,7 @@ from skidpad.scenarios.actions.world import (
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.environment import Environment
-from skidpad.scenarios.findings import Fault
+from skidpad.scenarios.findings import Fault, Kind
 from skidpad.scenarios.measures import Point, corners
 from skidpad.scenarios.motion import Guide, Shape
 from skidpad.scenarios.network import Network, Place
@@ -201,8 +201,13 @@ class _Starting:
             return self.scene.actors[gap.other].v_told
         if self.wish.speed is None:
             return 0.0
-        v = self.wish.speed.target.speed(self.scene)
-        return limit_speed(v, self.entity.performance)
+        asked = self.wish.speed.target.speed(self.scene)
+        v = limit_speed(asked, self.entity.performance)
+        if v != asked:
+            what = f"speed of {self.name!r} at the begin: {asked:g} m/s asked, {v:g} m/s applied"
+            note = self.wish.node.finding(f"{what} (maxSpeed)", Kind.NOTE)
+            self.ctx.findings.append(note)
+        return v
 
 
 _ASKED = object()

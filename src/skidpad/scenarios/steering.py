@@ -44,7 +44,12 @@ def aim(axles: Axles, pose: Pose, target: Pose, v: float) -> float:
     most = curvature_max(axles, v)
     if forward * copysign(1.0, v) <= 0.0:
         return copysign(most, left)
-    return min(max(2.0 * left / (forward * forward + left * left), -most), most)
+    return min(max(arc_to(forward, left), -most), most)
+
+
+def arc_to(forward: float, left: float) -> float:
+    """Returns the curvature of the arc from the rear axle through a place, 1/m."""
+    return 2.0 * left / max(forward * forward + left * left, STRAIGHT)
 
 
 def move_on_arc(pose: Pose, way: float, curvature: float) -> Pose:
@@ -80,7 +85,7 @@ class SteeredTrack:
     ) -> None:
         self.line, self.s, self.begin, self.closed, self.timed = line, s, s, closed, timed
         self.pose, self.v, self.t, self.curvature = pose, v, t, 0.0
-        self.axles, self.most = axles, most
+        self.axles, self.most, self.asked_curvature = axles, most, 0.0
         self._project(SEARCH + line.length)
 
     def at(self, t: float) -> tuple[Pose, float, float]:
@@ -119,7 +124,9 @@ class SteeredTrack:
         self.v = self._reachable(v, dt)
         ahead = max(self.s, self.begin) + look_ahead(self.axles, self.v)
         sense = self.v if abs(self.v) > SLOW else v
-        self.curvature = aim(self.axles, self.pose, self.point(ahead), sense)
+        target = self.point(ahead)
+        self.curvature = aim(self.axles, self.pose, target, sense)
+        self.asked_curvature = arc_to(*between(self.pose, target.x, target.y))
 
     def pace(self, line_speed: float, line_length: float) -> float:
         """Returns the speed that brings it to where its times want it, m/s, without going back."""

@@ -44,6 +44,21 @@ class NoEffect:
         return DONE
 
 
+def note_bound(
+    scene: Scene, actor: Actor, element: str, asked: float, applied: float, of: str
+) -> None:
+    """Says what a bound makes of an action, once; of: the quantity, its unit and the bound's name."""
+    quantity, unit, bound = of.split(", ")
+    if abs(asked - applied) > SAME * max(abs(asked), abs(applied)):
+        scene.notice(
+            f"<{element}> of {actor.name}: {quantity} {asked:g} {unit} asked, "
+            f"{applied:g} {unit} applied ({bound})"
+        )
+
+
+SAME = 1e-6  # relative difference of two values that are one
+
+
 class Dimension(Enum):
     """What the number of a change means."""
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 from math import copysign, inf, sqrt
 
+from skidpad.scenarios.actions.base import note_bound
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.entities import Performance
@@ -66,7 +67,18 @@ class KeepGap:
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """From now on."""
-        limits = self.limits.of(actor.entity.performance)
+        own = actor.entity.performance
+        limits = self.limits.of(own)
+        for name, unit, asked, has in (
+            ("maxSpeed", "m/s", self.limits.v_max, own.v_max),
+            ("maxAcceleration", "m/s^2", self.limits.a_max, own.a_max),
+            ("maxDeceleration", "m/s^2", self.limits.b_max, own.b_max),
+            ("maxAccelerationRate", "m/s^3", self.limits.a_rate, own.a_rate),
+            ("maxDecelerationRate", "m/s^3", self.limits.b_rate, own.b_rate),
+        ):
+            if has < asked < inf:
+                of = f"{name}, {unit}, that of its <Performance>"
+                note_bound(scene, actor, "LongitudinalDistanceAction", asked, has, of)
         if self.limits.none and not actor.placed_by_file:
             scene.notice(
                 f"<LongitudinalDistanceAction> of {actor.name}: at once asked, at most "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import cos, sqrt
 
-from skidpad.scenarios.actions.base import Dimension, Dynamics, Following, dynamics
+from skidpad.scenarios.actions.base import Dimension, Dynamics, Following, dynamics, note_bound
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.entities import Axles
@@ -30,7 +30,7 @@ class ChangeOfOffset:
         self, actor: Actor, change: Transition, *, by_way: bool = False, to_lane: bool = False
     ) -> None:
         self.actor, self.change, self.by_way, self.done = actor, change, by_way, 0.0
-        self.to_lane = to_lane
+        self.to_lane, self.noted = to_lane, False
 
     def step(self, scene: Scene) -> bool:
         """Demand the offset of the end of this step; an actor that stands does not move aside."""
@@ -48,6 +48,11 @@ class ChangeOfOffset:
         pace = v / sqrt(1.0 + slope * slope) if self.by_way else 1.0
         if not self.by_way and abs(slope) > v:
             pace = v / abs(slope)  # no actor goes sideways faster than it goes
+            element = "LaneChangeAction" if self.to_lane else "LaneOffsetAction"
+            if not self.noted:
+                of = "speed to the side, m/s, it goes no faster"
+                note_bound(scene, actor, element, abs(slope), v, of)
+            self.noted = True
         begin, self.done = self.done, self.done + pace * scene.dt
         now = self.done if self.to_lane else begin
         guide.offset, slope, bend = self.change.at(now)

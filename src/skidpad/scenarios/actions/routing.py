@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from random import Random
 
 from skidpad.core.geometry import Pose
-from skidpad.scenarios.actions.base import Following
+from skidpad.scenarios.actions.base import Following, note_bound
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.entities import Entity
@@ -214,7 +214,7 @@ class Steered:
     """A trajectory that a vehicle steers along, at its own speed or after its times."""
 
     def __init__(self, actor: Actor, track: SteeredTrack, times: TimedTrack | None) -> None:
-        self.actor, self.track, self.times = actor, track, times
+        self.actor, self.track, self.times, self.noted = actor, track, times, False
 
     def step(self, scene: Scene) -> bool:
         """Until the vehicle has reached the end; it then drives on along its lane."""
@@ -224,6 +224,11 @@ class Steered:
         there = track.move_to(scene.t)
         v = actor.guide.v if self.times is None else self._pace(self.times, scene.t, scene.dt)
         track.aim_at(v, scene.dt)
+        asked, most = abs(track.asked_curvature), abs(track.curvature)
+        if asked > most and not self.noted:
+            self.noted = True
+            of = "curvature, 1/m, maxSteering or 7 m/s^2 to the side"
+            note_bound(scene, actor, "FollowTrajectoryAction", asked, most, of)
         if self.times is not None:
             actor.guide.v, actor.guide.a = track.v, 0.0
         if there:

@@ -7,7 +7,7 @@ from enum import Enum
 from itertools import pairwise
 from math import copysign, inf
 
-from skidpad.scenarios.actions.base import Dimension, Dynamics, Following, dynamics
+from skidpad.scenarios.actions.base import Dimension, Dynamics, Following, dynamics, note_bound
 from skidpad.scenarios.actions.jerk import (
     Jerk,
     Piece,
@@ -21,6 +21,8 @@ from skidpad.scenarios.document import Node
 from skidpad.scenarios.entities import Performance
 from skidpad.scenarios.motion import SLOW, STEEPEST, Shape, Transition
 from skidpad.scenarios.scene import Actor, Running, Scene
+
+ELEMENT, PROFILE = "SpeedAction", "SpeedProfileAction"
 
 
 class Relation(Enum):
@@ -63,7 +65,9 @@ class Speed:
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """From the speed demanded so far."""
         v, limits = actor.guide.v, actor.entity.performance
-        end = limit_speed(self.target.speed(scene), limits)
+        asked = self.target.speed(scene)
+        end = limit_speed(asked, limits)
+        note_bound(scene, actor, ELEMENT, asked, end, "speed, m/s, maxSpeed")
         if self.dynamics.following is Following.FOLLOW:
             bound = limits.a_max if end > v else limits.b_max
             if jerk_of(limits).is_limited or (self.dynamics.shape is Shape.STEP and bound < inf):
@@ -72,7 +76,10 @@ class Speed:
             span = over_distance(v, end, self.dynamics)
         else:
             span = self.dynamics.span(end - v)
-        span = max(span, least_span(end - v, span, self.dynamics.shape, limits))
+        least = least_span(end - v, span, self.dynamics.shape, limits)
+        if least > span:
+            note_bound(scene, actor, ELEMENT, span, least, duration_bound(end - v))
+        span = max(span, least)
         change = Transition(v, end, span, self.dynamics.shape)
         follow = self.target if self.target.continuous else None
         going = ChangeOfSpeed(actor, change, scene.t, follow)
@@ -98,6 +105,12 @@ class Speed:
             else:
                 duration = over_distance(v, end, replace(change, value=way))
                 pieces = list(smooth_pieces(v, end, most, jerk, duration))
+        if duration is not None:
+            took = sum(piece.duration for piece in pieces)
+            if took > duration:
+                note_bound(
+                    scene, actor, ELEMENT, duration, took, "duration, s, limits of <Performance>"
+                )
         follow = self.target if self.target.continuous else None
         going = SmoothChange(actor, scene.t, [first, *pieces], end, follow)
         actor.pace_by(going, scene)
@@ -114,6 +127,11 @@ def acceleration_under_way(actor: Actor) -> float:
 
 
 ROUNDING = 1e-6  # of an acceleration that is measured over a step
+
+
+def duration_bound(size: float) -> str:
+    """Returns what bounds the duration of a change of speed, for its note."""
+    return f"duration, s, {'maxAcceleration' if size > 0.0 else 'maxDeceleration'}"
 
 
 def jerk_of(limits: Performance) -> Jerk:
@@ -232,6 +250,7 @@ class Profile:
         pieces: list[Piece] = []
         for entry, duration in self.entries:
             end = limit_speed(base + entry, own)
+            note_bound(scene, actor, PROFILE, base + entry, end, "speed, m/s, maxSpeed")
             most = (self.limits.a_max, own.a_max) if end > v else (self.limits.b_max, own.b_max)
             pieces += smooth_pieces(v, end, min(*most, DEFAULT_CHANGE), jerk, duration)
             v = end
@@ -246,6 +265,7 @@ class Profile:
         times, speeds = [scene.t], [actor.guide.v]
         for entry, duration in self.entries:
             v = limit_speed(base + entry, own)
+            note_bound(scene, actor, PROFILE, base + entry, v, "speed, m/s, maxSpeed")
             needed = abs(v - speeds[-1]) / (a if v > speeds[-1] else b)
             times.append(times[-1] + (needed if duration is None else duration))
             speeds.append(v)

@@ -79,7 +79,7 @@ def random_roads(
 
 @dataclass(frozen=True, slots=True)
 class OnRoute:
-    """So far along a route; lane None: the lane that the route begins on."""
+    """So far along a route, on a lane with an offset, or without one at t of the road."""
 
     route: ScenarioRoute
     s: float
@@ -90,11 +90,15 @@ class OnRoute:
     def place(self, scene: Scene) -> Place:
         """By the lanes of the route."""
         point = self.route.at(scene.network, self.s)
-        if self.lane_id is not None:
-            point = scene.network.beside(point, self.lane_id) or point
-        pose = point.pose.moved(left=self.offset)
+        network = scene.network
+        if self.lane_id is None:
+            there = network.on_road(point.road, network.map.s_road(point), self.offset)
+            return replace(there, pose=replace(there.pose, yaw=self.facing.turned(point.heading)))
+        point = network.beside(point, self.lane_id) or point
+        left = self.offset if network.forward(point) else -self.offset
+        pose = point.pose.moved(left=left)
         pose = replace(pose, yaw=self.facing.turned(pose.yaw))
-        return Place(pose, replace(point, offset=self.offset))
+        return Place(pose, replace(point, offset=left))
 
 
 @dataclass(frozen=True, slots=True)

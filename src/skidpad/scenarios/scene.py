@@ -24,6 +24,7 @@ from skidpad.scenarios.tracking import Track, track_demand
 from skidpad.simulation.scripted import ActorDriver, Motion
 
 STANDING = 0.05, 1e-3  # m/s, of what drives on tyres, and of what is where the file says
+JUST = 1e-9  # s, what has begun to last
 TOUCHING = 0.05  # m, bodies that the physics keeps apart are this near
 Path = tuple[str, ...]
 
@@ -117,6 +118,7 @@ class Actor:
     seen: bool = False  # in a tick before
     handed: bool = True  # somebody else's controller is active, where mode is None
     word: ActorCommand | None = None  # appear or vanish, said once
+    appears: bool = False  # added in this step, in which it moves on already
     visible: bool = True  # to sensors
     assigned: Any = None  # a `registry.ControllerOf` that an action has given it
     towed_by: Actor | None = None  # the vehicle whose hitch draws it
@@ -225,6 +227,9 @@ class Actor:
         """The word to the backend for the step from t to t + dt."""
         if self.word is not None:
             word, self.word = self.word, None
+            if self.appears and self.placed_by_file:
+                word = replace(self._place_command(t + dt, dt), present=True)
+            self.appears = False
             return word
         if not self.present or not self.driven_by_file:
             return None
@@ -300,7 +305,8 @@ class Actor:
             self.acceleration = (motion.vx - before.vx) / dt, (motion.vy - before.vy) / dt
         self.travelled += self.v * dt
         self.stood = self.stood + dt if max(v, self.v) < bound else 0.0
-        self.at_end = self.at_end + dt if self.guide.at_end else 0.0
+        waited = self.at_end + dt if self.at_end > 0.0 else JUST
+        self.at_end = waited if self.guide.at_end else 0.0
 
 
 class Flow(Protocol):

@@ -25,9 +25,13 @@ class AddEntity:
     position: Position
 
     def happen(self, scene: Scene) -> Running:
-        """At a place, with the speed demanded so far."""
+        """At a place, with the speed demanded so far; what is there already stays where it is."""
         actor = scene.actors[self.name]
+        if actor.present:
+            scene.notice(f"<AddEntityAction> of {self.name} has no effect: it is there already")
+            return DONE
         actor.put(scene.network, self.position.place(scene), actor.guide.v)
+        actor.appears = True
         return DONE
 
 

@@ -13,7 +13,7 @@ from skidpad.scenarios.conditions.base import EntityCondition, Rule, rule
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.entities import Body
-from skidpad.scenarios.measures import Axes, between
+from skidpad.scenarios.measures import Axes, along_road, between
 from skidpad.scenarios.network import Network, next_lane_id
 from skidpad.scenarios.positions import Position, position
 from skidpad.scenarios.scene import Actor, Scene
@@ -229,7 +229,7 @@ class Clearance:
         sign = 1 if scene.network.forward(base) == place.along else -1
         if not self._has_lane(scene, base, sign):
             return False
-        return not any(self._inside(scene, here, base.lane_id, sign, n) for n in others)
+        return not any(self._inside(scene, here, base, place.along, n) for n in others)
 
     def _wanted(self, lane: int, sign: int) -> set[int]:
         """Ids of the lanes that are asked for."""
@@ -246,18 +246,26 @@ class Clearance:
             wanted = {i for i in wanted if (i > 0) == (base.lane_id > 0)}
         return any(i == base.lane_id or scene.network.beside(base, i) for i in wanted)
 
-    def _inside(self, scene: Scene, here: Actor, lane: int, sign: int, other: str) -> bool:
+    def _inside(
+        self, scene: Scene, here: Actor, base: LanePoint, along: bool, other: str
+    ) -> bool:
         it = scene.actors[other]
         there = scene.network.place_of(it.pose).lane
-        if there is None:
+        way = along_road(scene.network, here.pose, it.pose)
+        if there is None or way is None:
             return False
-        if self.lanes and there.lane_id not in self._wanted(lane, sign):
-            return False
-        if self.opposite and abs(wrap_angle(it.pose.yaw - here.pose.yaw)) < 1.57:
-            return False
-        forward, _ = scene.between(here.name, other)
         room = 0.5 * (here.entity.box.length + it.entity.box.length) if self.free else 0.0
-        return -self.behind - room <= forward <= self.ahead + room
+        if not -self.behind - room <= way[0] <= self.ahead + room:
+            return False
+        near = base  # the own lane on the road of the other one
+        if there.road != base.road:
+            near = scene.network.map.ahead(base, way[0] if along else -way[0]) or base
+            if near.road != there.road:
+                return False
+        if not self.opposite and (there.lane_id > 0) != (near.lane_id > 0):
+            return False
+        sign = 1 if scene.network.forward(near) == along else -1
+        return not self.lanes or there.lane_id in self._wanted(near.lane_id, sign)
 
 
 def _clearance(node: Node, ctx: Context) -> EntityCondition:

@@ -81,8 +81,9 @@ class Speed:
             note_bound(scene, actor, ELEMENT, span, least, duration_bound(end - v))
         span = max(span, least)
         change = Transition(v, end, span, self.dynamics.shape)
-        follow = self.target if self.target.continuous else None
-        going = ChangeOfSpeed(actor, change, scene.t, follow)
+        if self.at_once and self.target.other is not None:
+            actor.guide.v = end
+        going = ChangeOfSpeed(actor, change, scene.t, self)
         actor.pace_by(going, scene)
         return going
 
@@ -164,26 +165,43 @@ def least_span(size: float, span: float, shape: Shape, limits: Performance) -> f
 
 
 class ChangeOfSpeed:
-    """A speed action under way; follow: a target that is kept to when it is reached."""
+    """A speed action under way; the speed of another entity is looked at in every step, as in esmini."""
 
-    def __init__(
-        self, actor: Actor, change: Transition, began: float, follow: Target | None = None
-    ) -> None:
-        self.actor, self.change, self.began, self.follow = actor, change, began, follow
+    def __init__(self, actor: Actor, change: Transition, began: float, action: Speed) -> None:
+        self.actor, self.change, self.began, self.action = actor, change, began, action
+        self.late = 0.0  # s that the entity has lost to its own limits
 
     def step(self, scene: Scene) -> bool:
         """Demand the speed of the end of this step."""
         if self.actor.longitudinal is not self:
             return True
-        t = scene.t + scene.dt - self.began
-        guide = self.actor.guide
-        guide.v, guide.a, _ = self.change.at(t)
-        if self.follow is None:
+        t, guide = scene.t + scene.dt - self.began - self.late, self.actor.guide
+        if self.action.target.other is None:
+            guide.v, guide.a, _ = self.change.at(t)
             return self.change.over(t)
-        if self.change.over(t):
-            v = limit_speed(self.follow.speed(scene), self.actor.entity.performance)
-            guide.v, guide.a = v, 0.0
-        return False
+        end = self._aim(scene)
+        v, a, _ = self.change.at(t)
+        limited = self._limit(v, scene.dt)
+        if limited != v and not self.change.over(t):
+            self.late += scene.dt * (1.0 - (limited - guide.v) / (v - guide.v))
+        guide.v, guide.a = limited, a
+        return self.change.over(t) and limited == end and not self.action.target.continuous
+
+    def _aim(self, scene: Scene) -> float:
+        """Returns the speed asked for, as it is now, which becomes the end of the change."""
+        dynamics, limits = self.action.dynamics, self.actor.entity.performance
+        end, span = limit_speed(self.action.target.speed(scene), limits), self.change.span
+        if dynamics.dimension is Dimension.RATE:
+            size = end - self.change.start
+            span = dynamics.span(size)
+            span = max(span, least_span(size, span, dynamics.shape, limits))
+        self.change = replace(self.change, end=end, span=span)
+        return end
+
+    def _limit(self, v: float, dt: float) -> float:
+        """Returns a speed that the entity can have a step after its own one now."""
+        limits, now = self.actor.entity.performance, self.actor.guide.v
+        return min(max(v, now - limits.b_max * dt), now + limits.a_max * dt)
 
 
 class SmoothChange(SmoothProfile):

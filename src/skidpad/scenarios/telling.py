@@ -200,6 +200,9 @@ class ToldGroup(ToldParent):
         scene.moved(self.path, Move.END)
         self.manoeuvres = [ToldManoeuvre(m, self.group) for m in self.group.manoeuvres]
         self.children = self.manoeuvres
+        for event in (e for m in self.group.manoeuvres for e in m.events):
+            for path in (event.path, *(action.path for action in event.actions)):
+                scene.states[path] = State.STANDBY
         self.start(scene)
 
 

@@ -183,20 +183,21 @@ class Network:
             point = self.map.at(following, entry)
 
     def _wanted(self, lane: int, forward: bool, roads: tuple[int, ...]) -> int | None:
+        """The lane after this one that is on the way; else one through a junction to a road of it."""
         step = self.map.successors if forward else self.map.predecessors
-        found = step(lane)
-        here = int(self.map.lanes.road[lane])
-        of_route = [i for i in found if int(self.map.lanes.road[i]) in roads]
-        if not of_route:
-            return None
+        found, road = step(lane), self.map.lanes.road
+        here = int(road[lane])
         at = roads.index(here) if here in roads else -1
-
-        def rank(i: int) -> int:
-            road = int(self.map.lanes.road[i])
-            later = [k for k, r in enumerate(roads) if r == road and k >= at]
-            return later[0] if later else len(roads)
-
-        return min(of_route, key=rank)
+        ways = {i: {int(road[i])} for i in found}
+        if not any(way & set(roads) for way in ways.values()):
+            ways = {i: {int(road[j]) for j in step(i)} for i in found}
+        later = {road: k for k, road in reversed(list(enumerate(roads))) if k >= at}
+        ranks = {
+            i: min(later.get(r, len(roads)) for r in way)
+            for i, way in ways.items()
+            if way & set(roads)
+        }
+        return min(ranks, key=lambda i: ranks[i], default=None)
 
 
 def next_lane_id(lane: int, change: int) -> int:

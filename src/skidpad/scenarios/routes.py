@@ -10,6 +10,7 @@ from skidpad.roads.queries import LanePoint
 from skidpad.roads.routing import shortest_route
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
+from skidpad.scenarios.measures import between
 from skidpad.scenarios.network import Network, Place
 from skidpad.scenarios.positions import Fixed, Orientation, Position, orientation, position
 from skidpad.scenarios.scene import Scene
@@ -92,8 +93,10 @@ class OnRoute:
         point = self.route.at(scene.network, self.s)
         network = scene.network
         if self.lane_id is None:
-            there = network.on_road(point.road, network.map.s_road(point), self.offset)
-            return replace(there, pose=replace(there.pose, yaw=self.facing.turned(point.heading)))
+            there = network.on_road(point.road, network.map.s_road(point), self.offset).pose
+            _, left = between(point.pose, there.x, there.y)
+            there = replace(there, yaw=self.facing.turned(point.heading))
+            return Place(there, replace(point, offset=left))
         point = network.beside(point, self.lane_id) or point
         left = self.offset if network.forward(point) else -self.offset
         pose = point.pose.moved(left=left)

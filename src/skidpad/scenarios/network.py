@@ -19,6 +19,7 @@ from skidpad.roads.routing import shortest_route
 ON_LANE = 1.0  # m beyond a lane's edge that still is on it
 SLOPE_STEP = 0.5  # m to either side, over which a slope is taken
 ABREAST, ABREAST_STEPS = 1e-3, 6  # m ahead that still is abreast, and tries to get there
+STEP = 1e-3  # m into the next lane
 END_SLACK = 0.5  # m beyond the end of a road that still is its end
 
 
@@ -181,6 +182,22 @@ class Network:
             entry = 0.0 if forward else float(self.map.lanes.length[following])
             distance = s - length if forward else s
             point = self.map.at(following, entry)
+
+    def ahead_on_roads(
+        self, point: LanePoint, distance: float, roads: tuple[int, ...]
+    ) -> LanePoint:
+        """The place so many m of road s further along the traffic of a lane, at most its end."""
+        while True:
+            s, ends = self.map.s_road(point), self._ends(point.lane)
+            room = ends[1] - s if self.forward(point) else s - ends[0]
+            way = min(distance, room)
+            there = s + way if self.forward(point) else s - way
+            distance -= way
+            point = self.map.on_lane(point.road, point.lane_id, min(max(there, ends[0]), ends[1]))
+            further = self.ahead(point, STEP, roads) if distance > STEP else None
+            if further is None or further.lane == point.lane:
+                return point
+            point = further
 
     def _wanted(self, lane: int, forward: bool, roads: tuple[int, ...]) -> int | None:
         """The lane after this one that is on the way; else one through a junction to a road of it."""

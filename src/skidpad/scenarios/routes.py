@@ -27,8 +27,8 @@ class ScenarioRoute:
     roads: tuple[int, ...]
 
     def at(self, network: Network, s: float) -> LanePoint:
-        """The place `s` m along it, at most its end."""
-        return network.ahead(self.start, s, self.roads) or self.start
+        """The place `s` m along the reference lines of its roads, at most its end."""
+        return network.ahead_on_roads(self.start, s, self.roads)
 
 
 def compile_route(node: Node, ctx: Context) -> ScenarioRoute:

@@ -24,7 +24,6 @@ from skidpad.scenarios.tracking import Track, track_demand
 from skidpad.simulation.scripted import ActorDriver, Motion
 
 STANDING = 0.05, 1e-3  # m/s, of what drives on tyres, and of what is where the file says
-JUST = 1e-9  # s, what has begun to last
 TOUCHING = 0.05  # m, bodies that the physics keeps apart are this near
 Path = tuple[str, ...]
 
@@ -305,8 +304,7 @@ class Actor:
             self.acceleration = (motion.vx - before.vx) / dt, (motion.vy - before.vy) / dt
         self.travelled += self.v * dt
         self.stood = self.stood + dt if max(v, self.v) < bound else 0.0
-        waited = self.at_end + dt if self.at_end > 0.0 else JUST
-        self.at_end = waited if self.guide.at_end else 0.0
+        self.at_end = self.at_end + dt if self.guide.at_end else 0.0
 
 
 class Flow(Protocol):

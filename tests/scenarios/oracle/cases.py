@@ -39,6 +39,7 @@ from tests.scenarios.oracle.actions import (
 )
 from tests.scenarios.oracle.conditions import conditions
 from tests.scenarios.oracle.ends import at_once, backwards, without_road
+from tests.scenarios.oracle.pairs import pairs
 from tests.scenarios.oracle.settings import BEGIN, NORTH, SETTINGS, WEST, Case, case, moving, turned
 from tests.scenarios.oracle.sideways import sideways
 
@@ -357,6 +358,7 @@ CASES: dict[str, Case] = {
         begins,
         conditions,
         sideways,
+        pairs,
     )
     for c in part()
 }

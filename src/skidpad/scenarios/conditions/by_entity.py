@@ -246,9 +246,7 @@ class Clearance:
             wanted = {i for i in wanted if (i > 0) == (base.lane_id > 0)}
         return any(i == base.lane_id or scene.network.beside(base, i) for i in wanted)
 
-    def _inside(
-        self, scene: Scene, here: Actor, base: LanePoint, along: bool, other: str
-    ) -> bool:
+    def _inside(self, scene: Scene, here: Actor, base: LanePoint, along: bool, other: str) -> bool:
         it = scene.actors[other]
         there = scene.network.place_of(it.pose).lane
         way = along_road(scene.network, here.pose, it.pose)

@@ -26,7 +26,7 @@ from skidpad.core.run import ActorMode
 from skidpad.roads.bundled import load_map
 from skidpad.scenarios.network import network_of
 from skidpad.scenarios.player import Player
-from skidpad.scenarios.routes import random_roads, roads_through
+from skidpad.scenarios.routes import random_roads
 from skidpad.scenarios.scenario import check
 from skidpad.scenarios.stage import IdealWorld, played
 
@@ -305,20 +305,6 @@ def test_t_of_a_place_on_a_route_counts_from_the_line_of_the_road(tmp_path):
         "ego"
     )
     assert (row[0].x, row[0].y) == pytest.approx((150.0, -2.5), abs=0.05)
-
-
-def test_a_route_leads_through_a_junction_on_the_lane_of_the_other_direction():
-    """In town from road 5: backwards along lane 1, the lane that comes from the next road of the way."""
-    network = network_of(load_map("town"), "town")
-    for goal in goals():
-        start = network.map.on_lane(5, -1, 1.0)
-        way = roads_through(network, (start, goal))
-        against = network.beside(network.ahead(start, 20.0, way), 1)
-        assert against is not None
-        ahead = network.ahead(against, -120.0, way)
-        assert ahead is not None
-        beside = network.ahead(start, 140.0, way)
-        assert hypot(ahead.x - beside.x, ahead.y - beside.y) < 25.0
 
 
 @pytest.mark.osc("EntityCondition", "ByEntityCondition", "LateralAction")

@@ -17,7 +17,7 @@ from tests.scenarios.files import (
     to,
     vehicle,
 )
-from tests.scenarios.oracle.actions import lane_change, relative
+from tests.scenarios.oracle.actions import assigned, lane_change, relative
 from tests.scenarios.oracle.settings import BEGIN, SETTINGS, Case, case, moving
 
 
@@ -116,7 +116,22 @@ def places_on_routes() -> Iterator[Case]:
         yield Case(f"place_on_route_{name}", "curve", parts, 5.0)
 
 
+def routes() -> Iterator[Case]:
+    """Along a route through a fork, on the own lane and on that of the other direction."""
+    for name, lane, goal in (("ahead", -1, 3), ("straight_on", -1, 2), ("against", 1, 3)):
+        way = assigned(on_lane(-1, 50), on_lane(-1, 60, road=goal))
+        heading = "" if lane < 0 else '<Orientation type="relative" h="3.14159265"/>'
+        place = on_lane(lane, 60).replace("/>", f">{heading}</LanePosition>")
+        parts = {
+            "entities": vehicle("ego") + vehicle("other"),
+            "init": moving("ego", on_lane(-1, 20), 8) + moving("other", place, 10),
+            "stories": story(event("e", way, time(BEGIN))),
+        }
+        yield Case(f"route_fork_{name}", "fork", parts, 9.0)
+
+
 def pairs() -> Iterator[Case]:
+    yield from routes()
     yield from speeds()
     yield from rooms()
     yield from group_twice()

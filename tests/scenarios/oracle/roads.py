@@ -40,6 +40,60 @@ def network(*roads: str) -> str:
 north="0" south="0" east="0" west="0"/>{"".join(roads)}</OpenDRIVE>"""
 
 
+ONE = (lane(1), lane(-1))  # lanes of roads at the fork, left and right
+
+
+def arm(id: int, start: tuple[float, float, float], link: str) -> str:
+    """A road of 100 m with one lane either way; link: its predecessor or successor at the fork."""
+    x, y, heading = start
+    left, right = ONE
+    return f"""<road name="" length="100" id="{id}" junction="-1"><link><{link} elementType="junction"
+elementId="10"/></link><planView><geometry s="0" x="{x}" y="{y}" hdg="{heading}" length="100"><line/>
+</geometry></planView><lanes><laneSection s="0"><left>{left}</left><center><lane id="0" type="none"
+level="false"/></center><right>{right}</right></laneSection></lanes></road>"""
+
+
+def connection(
+    id: int,
+    ends: tuple[tuple[int, str], tuple[int, str]],
+    lanes: tuple[int, int],
+    start: tuple[float, float, float],
+    shape: tuple[float, str],
+) -> str:
+    """A connecting road with one lane on the right, from an end of a road to that of another."""
+    (a, from_), (b, to) = ends
+    x, y, heading = start
+    length, form = shape
+    own = lane(-1).replace(
+        "<link/>", f'<link><predecessor id="{lanes[0]}"/><successor id="{lanes[1]}"/></link>'
+    )
+    return f"""<road name="" length="{length}" id="{id}" junction="10"><link><predecessor elementType="road"
+elementId="{a}" contactPoint="{from_}"/><successor elementType="road" elementId="{b}" contactPoint="{to}"/>
+</link><planView><geometry s="0" x="{x}" y="{y}" hdg="{heading}" length="{length}">{form}</geometry>
+</planView><lanes><laneSection s="0"><center><lane id="0" type="none" level="false"/></center>
+<right>{own}</right></laneSection></lanes></road>"""
+
+
+def fork() -> str:
+    """Road 1 runs east to x = 100; beyond 20 m road 2 runs on east, and road 3 north."""
+    east, north = (0.0, 0.0, 0.0), (120.0, 20.0, pi / 2)
+    turn = 10.0 * pi
+    pieces = (
+        (11, ((1, "end"), (2, "start")), (-1, -1), (100.0, 0.0, 0.0), (20.0, LINE)),
+        (12, ((1, "end"), (3, "start")), (-1, -1), (100.0, 0.0, 0.0), (turn, ARC.format(0.05))),
+        (13, ((2, "start"), (1, "end")), (1, 1), (120.0, 0.0, pi), (20.0, LINE)),
+        (14, ((3, "start"), (1, "end")), (1, 1), (120.0, 20.0, -pi / 2), (turn, ARC.format(-0.05))),
+    )
+    links = "".join(
+        f"""<connection id="{k}" incomingRoad="{ends[0][0]}" connectingRoad="{id}" contactPoint="start">
+<laneLink from="{lanes[0]}" to="-1"/></connection>"""
+        for k, (id, ends, lanes, _, _) in enumerate(pieces)
+    )
+    roads = [arm(1, east, "successor"), arm(2, (120.0, 0.0, 0.0), "predecessor")]
+    roads += [arm(3, north, "predecessor"), *(connection(*piece) for piece in pieces)]
+    return network(*roads, f'<junction name="" id="10">{links}</junction>')
+
+
 RISE = """<elevation s="0" a="0" b="0" c="0" d="0"/><elevation s="100" a="0" b="0" c="0.0004" d="0"/>
 <elevation s="200" a="4" b="0.08" c="0" d="0"/>"""
 
@@ -48,5 +102,6 @@ ROADS = {
     "straight": network(road((1000.0, LINE))),
     "curve": network(road((100.0, LINE), (300.0, ARC.format(1 / 120)))),
     "hill": network(road((800.0, LINE), heights=RISE)),
+    "fork": fork(),
     "cross": network(road((600.0, LINE)), road((400.0, LINE), id=2, start=(200.0, -200.0, pi / 2))),
 }

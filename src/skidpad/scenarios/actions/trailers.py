@@ -44,7 +44,7 @@ class ConnectTrailer:
 
 @dataclass(frozen=True, slots=True)
 class DisconnectTrailer:
-    """Let the own trailer go; it keeps its speed, as the standard says nothing of brakes."""
+    """Let the own trailer go; on a road it keeps its speed, as the standard says nothing of brakes."""
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """Let it go in this step."""
@@ -52,6 +52,9 @@ class DisconnectTrailer:
             if trailer.towed_by is actor:
                 trailer.towed_by = None
                 trailer.follow_road(scene.network, trailer.guide.v)
+                trailer.guide.at_end = scene.network.stand_in  # no road to go along
+                if trailer.guide.at_end:
+                    trailer.guide.base = None
         return DONE
 
 

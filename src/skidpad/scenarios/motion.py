@@ -171,11 +171,15 @@ class Guide:
 
     def _move(self, distance: float) -> None:
         assert self.base is not None
-        further = self.network.ahead(self.base, distance, self.roads)
-        self.at_end = further is None
-        if further is not None:
-            self.base = further
+        if self.at_end and distance == 0.0:
             return
+        further = self.network.ahead(self.base, distance, self.roads)
+        if further is not None:
+            self.at_end, self.base = False, further
+            return
+        if self.at_end:
+            self.v = 0.0  # it stands at the end of the road, and has no speed to go on with
+        self.at_end = True
         rest = self._rest(distance)
         if rest is not None:
             self.base = rest

@@ -130,7 +130,21 @@ def routes() -> Iterator[Case]:
         yield Case(f"route_fork_{name}", "fork", parts, 9.0)
 
 
+def road_ends() -> Iterator[Case]:
+    """What stands at the end of a road has no speed: put somewhere else it begins from standstill."""
+    both = f"""{private(teleport(on_lane(-1, 300)))}</Action><Action name="go">
+{private(speed(to(10), "linear", 3))}"""
+    at_end = by_entity('<EndOfRoadCondition duration="0.975"/>', "other")
+    parts = {
+        "entities": vehicle("ego") + vehicle("other"),
+        "init": moving("ego", on_lane(-2, 100), 12) + moving("other", on_lane(-1, 960), 12),
+        "stories": story(event("e", both, at_end)),
+    }
+    yield Case("road_end_again_straight", "straight", parts, 9.0)
+
+
 def pairs() -> Iterator[Case]:
+    yield from road_ends()
     yield from routes()
     yield from speeds()
     yield from rooms()

@@ -24,6 +24,7 @@ from skidpad.scenarios.tracking import Track, track_demand
 from skidpad.simulation.scripted import ActorDriver, Motion
 
 STANDING = 0.05, 1e-3  # m/s, of what drives on tyres, and of what is where the file says
+JUST = 1e-9  # s, what has begun to last
 TOUCHING = 0.05  # m, bodies that the physics keeps apart are this near
 Path = tuple[str, ...]
 
@@ -252,8 +253,6 @@ class Actor:
             v = v if self.track.timed or self.track.steered else self.guide.v
         else:
             pose, v = self._pose_on_road(dt), self.guide.v
-            if self.guide.at_end:
-                v = 0.0
         self.pose = pose
         return ActorCommand(self.name, place=self.centre(pose), speed=v)
 
@@ -304,7 +303,8 @@ class Actor:
             self.acceleration = (motion.vx - before.vx) / dt, (motion.vy - before.vy) / dt
         self.travelled += self.v * dt
         self.stood = self.stood + dt if max(v, self.v) < bound else 0.0
-        self.at_end = self.at_end + dt if self.guide.at_end else 0.0
+        waited = self.at_end + dt if self.at_end else JUST
+        self.at_end = waited if self.guide.at_end else 0.0
 
 
 class Flow(Protocol):

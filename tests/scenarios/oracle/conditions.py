@@ -144,7 +144,7 @@ def conditions() -> Iterator[Case]:
         private(speed(to(4), "linear", 1)),
         entity_condition('<OffroadCondition duration="0.475"/>'),
     )
-    end_of_road = SETTINGS["straight"][2] + moving("other", on_lane(-1, 960), 10)
+    end_of_road = SETTINGS["straight"][2] + moving("other", on_lane(-1, 960.2), 10)
     parts = {
         "entities": vehicle("ego") + vehicle("other"),
         "init": end_of_road,

@@ -137,7 +137,7 @@ def road_ends() -> Iterator[Case]:
     at_end = by_entity('<EndOfRoadCondition duration="0.975"/>', "other")
     parts = {
         "entities": vehicle("ego") + vehicle("other"),
-        "init": moving("ego", on_lane(-2, 100), 12) + moving("other", on_lane(-1, 960), 12),
+        "init": moving("ego", on_lane(-2, 100), 12) + moving("other", on_lane(-1, 959), 12),
         "stories": story(event("e", both, at_end)),
     }
     yield Case("road_end_again_straight", "straight", parts, 9.0)

@@ -16,12 +16,15 @@ from skidpad.core.vocabulary import Scenery, SemanticClass
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import bundled_maps, load_map
 from skidpad.roads.lanes import LaneKind, Marking
+from skidpad.roads.opendrive.bake import bake
+from skidpad.roads.queries import RoadMap
 from skidpad.roads.roadside import Shape
 from skidpad.roads.walkable import walk_mesh
 from skidpad.scenery.dressing import count_things, dress_map, name_kerbs, things_of
 from skidpad.scenery.free_ground import outlines_of
 from skidpad.scenery.sides import RoadKind, sides_of
 from skidpad.scenery.sight import sight_triangles
+from skidpad.scenery.signs import LOWER_EDGE, signs_of
 from skidpad.simulation.carla_server.maps import spawn_points
 from skidpad.simulation.world.actors import PAINT_SHARES, PALETTE, Role, draw_paint
 
@@ -47,7 +50,8 @@ def lane_quads(samples) -> np.ndarray:
 
 def test_nothing_generated_stands_on_or_within_a_metre_of_lanes_crossings_or_ways(road_map) -> None:
     dressed = dress_map(road_map, Scenery.FULL)
-    added = dressed.roadside.boxes[len(road_map.roadside.boxes) :]
+    signs = list(signs_of(road_map.samples, road_map.lanes, road_map.signals, road_map.roadside))
+    added = dressed.roadside.boxes[len(road_map.roadside.boxes) + len(signs) :]
     assert added
     corners = np.array([footprint(b.x, b.y, b.yaw, b.length, b.width) for b in added])
     tree = shapely.STRtree(shapely.polygons(corners.reshape(-1, 4, 2)))
@@ -168,3 +172,31 @@ def test_paints_are_drawn_as_often_as_cars_have_them_and_only_with_scenery() -> 
     role = Role(ActorSetup(name="car_1", type=EGO_TYPE, place=Pose(0.0, 0.0)))
     assert role.newcomer(1).rgb == PALETTE[1]
     assert role.newcomer(1, 3).rgb == draw_paint(3, "car_1")
+
+
+PLATES = """<OpenDRIVE><header revMajor="1" revMinor="4"/>
+<road name="" length="60" id="1" junction="-1"><planView>
+<geometry s="0" x="0" y="0" hdg="0" length="60"><line/></geometry></planView>
+<elevationProfile><elevation s="0" a="2" b="0" c="0" d="0"/></elevationProfile>
+<lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right>
+<lane id="-1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane></right>
+</laneSection></lanes><signals>
+<signal id="1" s="20" t="-5" zOffset="0" type="206" subtype="-1" orientation="+" dynamic="no"/>
+<signal id="2" s="30" t="-5" zOffset="2.4" type="274" value="50" orientation="+" dynamic="no"/>
+<signal id="3" s="40" t="-2" zOffset="0" type="205" subtype="-1" orientation="+" dynamic="no"/>
+</signals></road></OpenDRIVE>"""
+
+
+def test_signs_of_the_file_have_plates_on_posts_unless_they_would_stand_on_a_lane() -> None:
+    road = RoadMap(bake(PLATES.encode(), "plates", "plates.xodr"))
+    boxes = list(signs_of(road.samples, road.lanes, road.signals, road.roadside))
+    plates = [b for b in boxes if b.shape is Shape.SIGN]
+    assert [(round(b.x), b.variant, b.label) for b in plates] == [
+        (20, 8, SemanticClass.TRAFFIC_SIGN),
+        (30, 16, SemanticClass.TRAFFIC_SIGN),
+    ]
+    assert all(b.z == pytest.approx(2.0 + LOWER_EDGE) for b in plates)
+    dressed = dress_map(road, Scenery.FULL)
+    assert set(boxes) <= set(dressed.roadside.boxes)
+    own = replace(road.roadside, boxes=tuple(boxes))
+    assert not list(signs_of(road.samples, road.lanes, road.signals, own))

@@ -42,6 +42,7 @@ class Shape(IntEnum):
     SHELTER = 9  # of a bus stop
     CAR = 10  # parked
     FENCE = 11
+    SIGN = 12  # a plate whose variant is its number of corners
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ from skidpad.roads.terrain import Terrain, terrain_of
 from skidpad.scenery.free_ground import FreeGround
 from skidpad.scenery.rows import backdrop_of, rows_of
 from skidpad.scenery.sides import sides_of
+from skidpad.scenery.signs import signs_of
 from skidpad.scenery.things import STOREY, Thing
 
 EDITION = 1  # of what is generated; raise it when the same map gets other things
@@ -37,7 +38,8 @@ def _dress_fully(map: RoadMap) -> RoadMap:
     dressed = copy(map)
     boxes = boxes_of(things_of(map), terrain_of(map.samples))
     own = (add_facade(box) for box in map.roadside.boxes)
-    dressed.roadside = replace(map.roadside, boxes=(*own, *boxes))
+    signs = signs_of(map.samples, map.lanes, map.signals, map.roadside)
+    dressed.roadside = replace(map.roadside, boxes=(*own, *signs, *boxes))
     dressed.samples = name_kerbs(map.samples, map.lanes)
     dressed.content_hash = f"{map.content_hash} with scenery {EDITION}"
     return dressed
@@ -53,7 +55,9 @@ def things_of(map: RoadMap) -> list[Thing]:
             found += rows(side, stream(seed, "scenery", name, side.road, int(side.is_left)))
     if not found:
         return []
-    return FreeGround(map.samples, map.lanes, map.roadside).place(found)
+    signs = signs_of(map.samples, map.lanes, map.signals, map.roadside)
+    named = replace(map.roadside, boxes=(*map.roadside.boxes, *signs))
+    return FreeGround(map.samples, map.lanes, named).place(found)
 
 
 def boxes_of(things: Sequence[Thing], terrain: Terrain) -> list[Box]:

@@ -170,6 +170,23 @@ def _fence(thing: Box, material: int) -> list[Mesh]:
     return [near, near, far, far][:LEVELS]
 
 
+def _sign(thing: Box, material: int) -> list[Mesh]:
+    """A plate that looks back along the box, with a red rim where it is not red, and its back."""
+    half, size = 0.5 * thing.length, 0.5 * thing.height
+    turn = np.pi / thing.variant if thing.variant != 3 else -np.pi / 2.0  # yield stands on its tip
+
+    def plate(x: float, radius: float, of: int) -> Mesh:
+        angle = turn + 2.0 * np.pi * np.arange(thing.variant) / thing.variant
+        y, z = radius * np.cos(angle), size + radius * np.sin(angle)
+        corners = np.stack([np.full(thing.variant, x), y, z], axis=1)
+        fan = np.array([[0, k, k + 1] for k in range(1, thing.variant - 1)], dtype=np.int32)
+        return Mesh.of(corners, fan, thing.label, of)
+
+    back = plate(-half + 0.01, size, Material.STEEL)
+    rim = plate(-half + 0.005, size, material if thing.variant == 8 else Material.TAIL_LAMP)
+    return [merge([back, rim, plate(-half, 0.8 * size, material)])] * LEVELS
+
+
 SHAPES: dict[Shape, Callable[[Box, int], list[Mesh]]] = {
     Shape.BLOCK: flat_roofed_levels,
     Shape.HOUSE: gabled_levels,
@@ -182,4 +199,5 @@ SHAPES: dict[Shape, Callable[[Box, int], list[Mesh]]] = {
     Shape.SHELTER: _shelter,
     Shape.CAR: _car,
     Shape.FENCE: _fence,
+    Shape.SIGN: _sign,
 }

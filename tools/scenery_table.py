@@ -1,20 +1,25 @@
 """The table of views of docs/rendering.md: evenness of colours and classes seen, with and without scenery.
 
     python tools/scenery_table.py town figure8 --weather clear-noon rain-noon
+    python tools/scenery_table.py town figure8 motorway --picture docs/img/scenery.webp
 
 For views from lanes of each map: the share of pixels in the 8 commonest colours after a 5 x 5 median
 at 5 bits per channel, processor time of a picture of 800 x 600 with everything, and classes seen.
+With --picture, one view of each map instead: without, and with scenery in three weathers.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from time import process_time
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import CameraSpec, Modality
@@ -32,8 +37,10 @@ CAMERAS = tuple(
     CameraSpec(m.value, m, 800, 600, 90.0, Pose(0.5, 0.0, 1.5))
     for m in (Modality.RGB, Modality.SEMANTIC)
 )
-PLACES = (0.25, 0.6)  # shares of the way along the lanes that are long enough
+PLACES = (0.1, 0.6)  # shares of the way along the lanes that are long enough
 REPEATS = 5
+SHOWN = ("clear-noon", "rain-sunrise", "clear-night")
+SIZE = (320, 240)  # px of one picture in the sheet
 LONG = 40.0  # m
 
 
@@ -41,9 +48,14 @@ LONG = 40.0  # m
 class Seen:
     """One view of a map."""
 
-    commonest: float  # share of pixels
+    rgb: NDArray[np.uint8]
     milliseconds: float
     classes: frozenset[SemanticClass]
+
+    @property
+    def commonest(self) -> float:
+        """Share of the pixels that have one of the 8 commonest colours."""
+        return find_commonest_share(self.rgb)
 
 
 def find_commonest_share(rgb: NDArray[np.uint8]) -> float:
@@ -87,15 +99,32 @@ def look(road_map: RoadMap, place: Pose, weather: str) -> Seen:
     assert rgb is not None
     assert labels is not None
     classes = frozenset(SemanticClass(int(c)) for c in np.unique(labels))
-    return Seen(find_commonest_share(rgb), 1000.0 * float(np.median(times)), classes)
+    return Seen(rgb.copy(), 1000.0 * float(np.median(times)), classes)
+
+
+def draw_sheet(names: Sequence[str], path: Path) -> None:
+    """Write one view per map: a row of it without scenery, then with it by day, in rain, at night."""
+    rows = []
+    for name in names:
+        plain = load_map(name)
+        place = choose_places(plain)[0]
+        row = [look(plain, place, SHOWN[0])]
+        row += [look(dress_map(plain, Scenery.FULL), place, weather) for weather in SHOWN]
+        small = [cv2.resize(seen.rgb, SIZE, interpolation=cv2.INTER_AREA) for seen in row]
+        rows.append(np.hstack(small))
+    Image.fromarray(np.ascontiguousarray(np.vstack(rows))).save(path, quality=80, method=6)
 
 
 def main() -> None:
-    """Print the table as Markdown."""
+    """Print the table as Markdown, or draw the sheet."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("maps", nargs="+")
     parser.add_argument("--weather", nargs="+", default=["clear-noon", "rain-noon"])
+    parser.add_argument("--picture", type=Path)
     chosen = parser.parse_args()
+    if chosen.picture is not None:
+        draw_sheet(chosen.maps, chosen.picture)
+        return
     print(
         "| view | weather | 8 commonest colours, none / full | ms, none / full | seen only with full |"
     )

@@ -88,7 +88,7 @@ def carla(folder: Path) -> Columns:
     """A drive of the real client through the CARLA server: what the client was told."""
     out = folder / "seen.npz"
     for _ in range(ATTEMPTS):
-        with ServerProcess(["--idle-exit", "120"]) as server:
+        with ServerProcess(["--idle-exit", "120", "--scenery", "none"]) as server:
             done = subprocess.run(
                 [sys.executable, CLIENT, str(server.port), out],
                 capture_output=True,

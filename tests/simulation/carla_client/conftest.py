@@ -10,6 +10,8 @@ import pytest
 from carla_programs import run_program
 from skidpad.simulation.carla_server.process import ServerProcess
 
+BARE = ("--scenery", "none")  # runs there and here are compared, and runs have none
+
 
 @pytest.fixture
 def program() -> Callable[..., Any]:
@@ -25,7 +27,7 @@ def serve() -> Iterator[Callable[..., ServerProcess]]:
 
     def start(*options: str) -> ServerProcess:
         if options not in started or not started[options].alive:
-            started[options] = ServerProcess(["--idle-exit", "600", *options])
+            started[options] = ServerProcess(["--idle-exit", "600", *BARE, *options])
         return started[options]
 
     yield start

@@ -52,12 +52,16 @@ def without_hang() -> Callable[[Callable[[], str]], str]:
 
 @pytest.fixture
 def serve() -> Iterator[Callable[..., Server]]:
-    """Start servers with options; all are stopped at the end."""
+    """Start servers with options; all are stopped at the end.
+
+    What sensors say is compared with bare roads, so there is no scenery unless a test asks for it.
+    """
     pytest.importorskip("carla")
     started: list[Server] = []
 
     def start(*options: str) -> Server:
-        started.append(Server(["--idle-exit", "120", *options]))
+        bare = () if "--scenery" in options else ("--scenery", "none")
+        started.append(Server(["--idle-exit", "120", *bare, *options]))
         return started[-1]
 
     yield start

@@ -24,6 +24,8 @@ from numba.core.caching import IndexDataCacheFile
 from numba.core.registry import CPUDispatcher
 from numba.experimental import structref
 
+from skidpad.core.refcounts import LeanCompiler
+
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -110,9 +112,12 @@ def kernel(function: F) -> F:
 def inner_kernel(function: F) -> F:
     """Compile for other kernels alone, without the wrappers through which Python calls.
 
-    They take a fifth of the time to compile: the arrays of a named tuple are unpacked one by one.
+    They take a fifth of the time to compile: the arrays of a named tuple are unpacked one by one. They
+    become part of their callers: to hand a map's arrays on takes longer than most of them do.
     """
-    compiled = _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    compiled = _compile(
+        function, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True
+    )
     compiled.__class__ = InnerKernel
     return compiled  # type: ignore[no-any-return]
 
@@ -129,7 +134,10 @@ def _compile(function: Callable[..., Any], **flags: bool) -> Any:
     if "NUMBA_CACHE_DIR" not in os.environ:  # numba's own variable: the user's word is final
         file = Path(function.__code__.co_filename).resolve()
         numba.config.CACHE_DIR = _cache_of(file) if file.is_relative_to(PACKAGE) else ""
-    compiled = numba.njit(cache=True, nogil=True, error_model="numpy", **flags)(function)
+    decorate = numba.njit(
+        cache=True, nogil=True, error_model="numpy", pipeline_class=LeanCompiler, **flags
+    )
+    compiled = decorate(function)
     compiled._cache._cache_file.__class__ = ForgivingIndex
     return compiled
 

@@ -77,7 +77,8 @@ def test_an_edited_callee_is_compiled_into_its_caller(tmp_path: Path, decorator:
     for package in (root, root / "core"):
         (package / "__init__.py").touch()
     source = Path(sys.modules["skidpad.core.jit"].__file__ or "")
-    (root / "core" / "jit.py").write_bytes(source.read_bytes())
+    for name in ("jit.py", "refcounts.py"):
+        (root / "core" / name).write_bytes((source.parent / name).read_bytes())
     head = "from skidpad.core.jit import inner_kernel, kernel\n"
     caller = head + "from skidpad.callee import f\n@kernel\ndef g(x):\n    return f(x)\n"
     (root / "caller.py").write_text(caller)

@@ -10,9 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from skidpad.sensors.object_level.boxes import boxes_in_view, placed, walls_in_view
-from skidpad.sensors.object_level.object_radar import NEAR
-from skidpad.sensors.object_level.objects import (
+from skidpad.sensors.object_level.object_camera import (
     BIN,
     LEVEL_GAP,
     LEVEL_GRADE,
@@ -22,6 +20,7 @@ from skidpad.sensors.object_level.objects import (
     STRIP,
     WIDEN,
 )
+from skidpad.sensors.object_level.object_radar import NEAR
 from skidpad.sensors.ranging.beam import direction
 
 compiled = njit(error_model="numpy")
@@ -36,6 +35,13 @@ class Camera(NamedTuple):
     width: int
     height: int
     runs: int
+
+
+class Seat(NamedTuple):
+    """A sensor placed in the world."""
+
+    origin: np.ndarray  # (3,)
+    rotation: np.ndarray  # (3, 3)
 
 
 @compiled
@@ -194,7 +200,7 @@ def _near_to_far(camera, boxes, present, limit):
         reach = d - 0.5 * boxes.length[i]
         if reach < limit and abs(boxes.z[i] - boxes.z[0]) < LEVEL_GAP + LEVEL_GRADE * d:
             distance[i] = d
-    order = np.argsort(distance)
+    order = np.argsort(distance, kind="mergesort")  # boxes at one distance: the first one first
     return order[: np.sum(np.isfinite(distance))]
 
 
@@ -281,3 +287,68 @@ def _strip_runs(camera, px, py, z, height, u, width, hidden, out, n):
             out[n, 0], out[n, 1], out[n, 2], out[n, 3], out[n, 4] = u, width, top, bottom, depth
             n += 1
     return n
+
+
+@compiled
+def placed(mount, states):
+    """The ego's sensor seen from the world, body pitch and roll included (`Pose.rotation`)."""
+    cr, sr = np.cos(states.roll[0]), np.sin(states.roll[0])
+    cp, sp = np.cos(states.pitch[0]), np.sin(states.pitch[0])
+    cy, sy = np.cos(states.yaw[0]), np.sin(states.yaw[0])
+    body = np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+    origin = np.empty(3)
+    rotation = np.empty((3, 3))
+    centre = (states.x[0], states.y[0], states.z[0])
+    for i in range(3):
+        origin[i] = centre[i]
+        for k in range(3):
+            origin[i] += body[i, k] * mount.origin[k]
+            rotation[i, k] = 0.0
+            for m in range(3):
+                rotation[i, k] += body[i, m] * mount.rotation[m, k]
+    return Seat(origin, rotation)
+
+
+@compiled
+def walls_in_view(origin, yaw, slope, walls, reach):
+    """Walls of which a part may lie within `reach` and |left| <= slope * forward."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    keep = np.empty(walls.x0.size, np.int64)
+    n = 0
+    for w in range(walls.x0.size):
+        ax, ay = walls.x0[w] - origin[0], walls.y0[w] - origin[1]
+        bx, by = walls.x1[w] - origin[0], walls.y1[w] - origin[1]
+        if abs(ax) + abs(ay) > 1.5 * reach + abs(bx - ax) + abs(by - ay):
+            continue
+        af, al = c * ax + s * ay, -s * ax + c * ay
+        bf, bl = c * bx + s * by, -s * bx + c * by
+        behind = af < 0.0 and bf < 0.0
+        left = al > slope * af and bl > slope * bf
+        right = -al > slope * af and -bl > slope * bf
+        if not (behind or left or right):
+            keep[n] = w
+            n += 1
+    return keep[:n]
+
+
+@compiled
+def boxes_in_view(origin, yaw, slope, boxes, reach):
+    """Boxes of which a part may lie within `reach` and |left| <= slope * forward."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    stretch = np.hypot(1.0, slope)
+    keep = np.empty(boxes.x.size, np.int64)
+    n = 0
+    for b in range(boxes.x.size):
+        half = 0.5 * np.hypot(boxes.length[b], boxes.width[b])
+        dx, dy = boxes.x[b] - origin[0], boxes.y[b] - origin[1]
+        forward, left = c * dx + s * dy, -s * dx + c * dy
+        if -half < forward < reach + half and abs(left) - slope * forward < half * stretch:
+            keep[n] = b
+            n += 1
+    return keep[:n]

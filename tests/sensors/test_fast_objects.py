@@ -9,7 +9,6 @@ import pytest
 from sensors import plain_objects
 from sensors.test_objects import BUMPER, RADAR, ROOF, world
 from skidpad.roads.roadside import Barrier, BarrierKind, Box, Roadside
-from skidpad.sensors.object_level import objects
 from skidpad.sensors.object_level.boxes import Boxes
 from skidpad.sensors.object_level.objects import ObjectSuite
 
@@ -71,7 +70,7 @@ def plain(table, states, suite, tick):
 
 def assert_same(table, states, roadside, ticks, radar=RADAR):
     suite = ObjectSuite(roadside, table, [ROOF, BUMPER, radar], seed=5, dt=0.05)
-    suite._slope = lambda _states: SLOPE
+    suite._radar.slope[:] = SLOPE
     hits = 0
     for tick in ticks:
         seen, echoes = plain(table, states, suite, tick)
@@ -123,14 +122,14 @@ def test_rays_that_look_sideways_are_compared_with_every_wall():
 
 def test_a_fault_of_one_bit_is_found(monkeypatch):
     table, states, roadside = random_scene(7)
-    fast = objects._echoes
+    fast = ObjectSuite.radar
 
     def off_by_one_bit(*asked):
         points = fast(*asked)
-        points[0, 0] = np.nextafter(points[0, 0], np.float32(np.inf))
+        points.range[0] = np.nextafter(points.range[0], np.float32(np.inf))
         return points
 
-    monkeypatch.setattr(objects, "_echoes", off_by_one_bit)
+    monkeypatch.setattr(ObjectSuite, "radar", off_by_one_bit)
     with pytest.raises(AssertionError, match="the radar differs in tick 0"):
         assert_same(table, states, roadside, range(3))
 

@@ -115,9 +115,7 @@ def inner_kernel(function: F) -> F:
     They take a fifth of the time to compile: the arrays of a named tuple are unpacked one by one. They
     become part of their callers: to hand a map's arrays on takes longer than most of them do.
     """
-    compiled = _compile(
-        function, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True
-    )
+    compiled = _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True)
     compiled.__class__ = InnerKernel
     return compiled  # type: ignore[no-any-return]
 

@@ -13,6 +13,7 @@ from skidpad.core.states import ActorStates
 from skidpad.roads.roadside import Roadside
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 class Boxes(NamedTuple):
@@ -46,35 +47,35 @@ class Mount(NamedTuple):
     rotation: Floats
 
 
+def empty_mount() -> Mount:
+    """Returns arrays for `place`."""
+    return Mount(np.empty(3), np.empty((3, 3)))
+
+
 def mount_of(pose: Pose) -> Mount:
     """A mounting pose as arrays for kernels."""
     return Mount(np.array([pose.x, pose.y, pose.z]), np.ascontiguousarray(pose.rotation()))
 
 
 @inner_kernel
-def placed(mount: Mount, states: ActorStates) -> Mount:
-    """The ego's sensor seen from the world, body pitch and roll included (`Pose.rotation`)."""
+def place(mount: Mount, states: ActorStates, seat: Mount) -> None:
+    """The ego's sensor seen from the world into `seat`, body pitch and roll included (`Pose.rotation`)."""
     cr, sr = np.cos(states.roll[0]), np.sin(states.roll[0])
     cp, sp = np.cos(states.pitch[0]), np.sin(states.pitch[0])
     cy, sy = np.cos(states.yaw[0]), np.sin(states.yaw[0])
-    body = np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
+    body = (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, cp * sr, cp * cr),
     )
-    origin = np.empty(3)
-    rotation = np.empty((3, 3))
     centre = (states.x[0], states.y[0], states.z[0])
     for i in range(3):
-        origin[i] = centre[i]
+        seat.origin[i] = centre[i]
         for k in range(3):
-            origin[i] += body[i, k] * mount.origin[k]
-            rotation[i, k] = 0.0
+            seat.origin[i] += body[i][k] * mount.origin[k]
+            seat.rotation[i, k] = 0.0
             for m in range(3):
-                rotation[i, k] += body[i, m] * mount.rotation[m, k]
-    return Mount(origin, rotation)
+                seat.rotation[i, k] += body[i][m] * mount.rotation[m, k]
 
 
 def walls_of(roadside: Roadside) -> Walls:
@@ -94,11 +95,10 @@ def posts_of(roadside: Roadside) -> Boxes:
 
 @inner_kernel
 def walls_in_view(
-    origin: Floats, yaw: float, slope: float, walls: Walls, reach: float
-) -> NDArray[np.int64]:
-    """Walls of which a part may lie within `reach` and |left| <= slope * forward."""
+    origin: Floats, yaw: float, slope: float, walls: Walls, reach: float, keep: Ints
+) -> int:
+    """Walls of which a part may lie within `reach` and |left| <= slope * forward, into `keep`; how many."""
     c, s = np.cos(yaw), np.sin(yaw)
-    keep = np.empty(walls.x0.size, np.int64)
     n = 0
     for w in range(walls.x0.size):
         ax, ay = walls.x0[w] - origin[0], walls.y0[w] - origin[1]
@@ -113,17 +113,16 @@ def walls_in_view(
         if not (behind or left or right):
             keep[n] = w
             n += 1
-    return keep[:n]
+    return n
 
 
 @inner_kernel
 def boxes_in_view(
-    origin: Floats, yaw: float, slope: float, boxes: Boxes, reach: float
-) -> NDArray[np.int64]:
-    """Boxes of which a part may lie within `reach` and |left| <= slope * forward."""
+    origin: Floats, yaw: float, slope: float, boxes: Boxes, reach: float, keep: Ints
+) -> int:
+    """Boxes of which a part may lie within `reach` and |left| <= slope * forward, into `keep`; how many."""
     c, s = np.cos(yaw), np.sin(yaw)
     stretch = np.hypot(1.0, slope)
-    keep = np.empty(boxes.x.size, np.int64)
     n = 0
     for b in range(boxes.x.size):
         half = 0.5 * np.hypot(boxes.length[b], boxes.width[b])
@@ -132,4 +131,4 @@ def boxes_in_view(
         if -half < forward < reach + half and abs(left) - slope * forward < half * stretch:
             keep[n] = b
             n += 1
-    return keep[:n]
+    return n

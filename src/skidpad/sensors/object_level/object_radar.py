@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import Held, inner_kernel, kernel
+from skidpad.core.jit import inner_kernel
 from skidpad.core.specs import RadarSpec
 from skidpad.core.states import ActorStates
 from skidpad.core.weather import Weather
@@ -18,13 +18,15 @@ from skidpad.sensors.object_level.boxes import (
     Mount,
     Walls,
     boxes_in_view,
+    empty_mount,
     mount_of,
-    placed,
+    place,
     walls_in_view,
 )
 from skidpad.sensors.ranging.beam import Beam, beam_of, direction
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 NEAR = 0.1  # m, near clip
 CERTAIN = 1e-9  # a share of a wall this far below its first end, or above its last, is beyond it
@@ -58,15 +60,15 @@ class Rays(NamedTuple):
     right: Floats  # tangents
     down: Floats
     best: Floats  # m to what was met, or the reach
-    hit: NDArray[np.int64]  # row of the actor, 0: road, wall or post, -1: nothing
+    hit: Ints  # row of the actor, 0: road, wall or post, -1: nothing
     slope: Floats  # left by forward, rising; -inf: not ahead
-    order: NDArray[np.int64]  # the ray of each slope
+    order: Ints  # the ray of each slope
 
 
 class NearBoxes(NamedTuple):
     """The boxes in view of a radar in their own order, with what does not change from ray to ray."""
 
-    row: NDArray[np.int64]  # (n,) in `Boxes`
+    row: Ints  # (n,) in `Boxes`
     x: Floats  # m, the antenna seen from the box's foot
     y: Floats
     z: Floats  # m, the antenna over the box's middle
@@ -74,6 +76,38 @@ class NearBoxes(NamedTuple):
     sin: Floats
     half: Floats  # (n, 3) m, half of length, width and height
     radius: Floats  # m, a little more than half the diagonal
+
+
+class RadarScratch(NamedTuple):
+    """Arrays in which a radar works, and its echoes of the tick."""
+
+    seat: Mount
+    rays: Rays
+    walls: Ints  # (walls,) those in view
+    posts: NearBoxes
+    boxes: NearBoxes
+    slope: Floats  # (2,) of the road
+    echoes: NDArray[np.float32]  # (4, n) range, azimuth, altitude, range rate
+
+
+def _make_near(n: int) -> NearBoxes:
+    columns = (np.empty(n) for _ in range(5))
+    return NearBoxes(np.empty(n, np.int64), *columns, np.empty((n, 3)), np.empty(n))
+
+
+def make_scratch(rays: int, walls: int, posts: int, boxes: int) -> RadarScratch:
+    """Returns arrays for so many rays, walls, posts and actors."""
+    x, y, z, right, down, best, slope = np.empty((7, rays))
+    hit, order = np.empty((2, rays), np.int64)
+    return RadarScratch(
+        empty_mount(),
+        Rays(x, y, z, right, down, best, hit, slope, order),
+        np.empty(walls, np.int64),
+        _make_near(posts),
+        _make_near(boxes),
+        np.zeros(2),
+        np.empty((4, rays), np.float32),
+    )
 
 
 @inner_kernel
@@ -84,38 +118,42 @@ def cast_radar(
     states: ActorStates,
     walls: Walls,
     posts: Boxes,
-    slope: Floats,
-) -> NDArray[np.float32]:
-    """(m, 4) range, azimuth, altitude, range rate of the rays that hit something in reach.
+    work: RadarScratch,
+) -> int:
+    """Rays that hit something in reach into `work.echoes`; returns how many.
 
-    slope: (2,) dz/dx and dz/dy of the road, a plane through the ego's wheels; a nose that dives does
-    not tilt it.
+    The road is a plane through the ego's wheels of slope `work.slope`; a nose that dives does not tilt
+    it.
     """
-    beam, reach, seat = radar.beam, radar.reach, placed(radar.mount, states)
-    origin, rotation = seat.origin, seat.rotation
+    beam, reach, slope, rays, out = radar.beam, radar.reach, work.slope, work.rays, work.echoes
+    place(radar.mount, states, work.seat)
+    origin, rotation = work.seat.origin, work.seat.rotation
     yaw, edge = np.arctan2(rotation[1, 0], rotation[0, 0]), beam.half_width
-    near_posts = _boxes_seen(origin, posts, boxes_in_view(origin, yaw, edge, posts, reach))
-    near_boxes = _boxes_seen(origin, boxes, boxes_in_view(origin, yaw, edge, boxes, reach))
+    near_posts, near_boxes = work.posts, work.boxes
+    m_posts = boxes_in_view(origin, yaw, edge, posts, reach, near_posts.row)
+    m_boxes = boxes_in_view(origin, yaw, edge, boxes, reach, near_boxes.row)
+    _measure_boxes(origin, posts, m_posts, near_posts)
+    _measure_boxes(origin, boxes, m_boxes, near_boxes)
     ox, oy = origin[0] - boxes.x[0], origin[1] - boxes.y[0]
     height = origin[2] - boxes.z[0] - slope[0] * ox - slope[1] * oy
     vx0 = states.vx[0] - states.yaw_rate[0] * oy
     vy0 = states.vy[0] + states.yaw_rate[0] * ox
-    rays = _rays(beam, tick, rotation, reach)
+    _aim(beam, tick, rotation, reach, rays)
     for k in range(beam.rays):
         fall = rays.z[k] - slope[0] * rays.x[k] - slope[1] * rays.y[k]
         if fall < 0.0 and -height / fall < reach:  # the road
             rays.best[k], rays.hit[k] = -height / fall, 0
-    _meet_walls(rays, origin, yaw, walls, walls_in_view(origin, yaw, edge, walls, reach))
-    out = np.empty((beam.rays, 4), np.float32)
+    m_walls = walls_in_view(origin, yaw, edge, walls, reach, work.walls)
+    _meet_walls(rays, origin, yaw, walls, work.walls, m_walls)
     n = 0
     for k in range(beam.rays):
         dx, dy, dz, best, hit = rays.x[k], rays.y[k], rays.z[k], rays.best[k], rays.hit[k]
-        for j in range(near_posts.row.size):
+        for j in range(m_posts):
             if not _is_aside(dx, dy, near_posts.x[j], near_posts.y[j], near_posts.radius[j], best):
                 t = _ray_box(dx, dy, dz, near_posts, j)
                 if t < best:
                     best, hit = t, 0
-        for j in range(near_boxes.row.size):
+        for j in range(m_boxes):
             i = near_boxes.row[j]
             if i == 0 or not states.present[i]:
                 continue
@@ -132,35 +170,28 @@ def cast_radar(
             vx += states.vx[hit] - states.yaw_rate[hit] * hy
             vy += states.vy[hit] + states.yaw_rate[hit] * hx
         right, down = rays.right[k], rays.down[k]
-        out[n, 0], out[n, 1] = best, np.arctan2(-right, 1.0)
-        out[n, 2] = np.arctan2(-down, np.sqrt(1.0 + right * right))
-        out[n, 3] = vx * dx + vy * dy
+        out[0, n], out[1, n] = best, np.arctan2(-right, 1.0)
+        out[2, n] = np.arctan2(-down, np.sqrt(1.0 + right * right))
+        out[3, n] = vx * dx + vy * dy
         n += 1
-    returns: NDArray[np.float32] = out[:n].copy()
-    return returns
+    return n
 
 
-@kernel
-def road_slope(map: Held[LaneArrays], x: float, y: float, z: float) -> Floats:
-    """(2,) dz/dx and dz/dy of the road at a place; level where there is no lane."""
-    lanes, slope = map.value, np.zeros(2)
+@inner_kernel
+def find_slope(lanes: LaneArrays, x: float, y: float, z: float, slope: Floats) -> None:
+    """dz/dx and dz/dy of the road at a place into `slope` (2,); level where there is no lane."""
+    slope[0] = slope[1] = 0.0
     lane, s, _ = project_kernel(lanes, x, y, z, True)
     if lane >= 0:
         _, _, _, heading, _, _, grade, bank, _ = sample_kernel(lanes, lane, s)
         tilt = np.tan(bank)
         slope[0] = grade * np.cos(heading) - tilt * np.sin(heading)
         slope[1] = grade * np.sin(heading) + tilt * np.cos(heading)
-    return slope
 
 
 @inner_kernel
-def _rays(beam: Beam, tick: int, rotation: Floats, reach: float) -> Rays:
+def _aim(beam: Beam, tick: int, rotation: Floats, reach: float, rays: Rays) -> None:
     n = beam.rays
-    table = np.empty((7, n))
-    rays = Rays(
-        table[0], table[1], table[2], table[3], table[4], table[5], np.full(n, -1), table[6],
-        np.empty(n, np.int64),
-    )  # fmt: skip
     yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
     c, s = np.cos(yaw), np.sin(yaw)
     for k in range(n):
@@ -171,7 +202,7 @@ def _rays(beam: Beam, tick: int, rotation: Floats, reach: float) -> Rays:
         dy = rotation[1, 0] * fx + rotation[1, 1] * fy + rotation[1, 2] * fz
         rays.x[k], rays.y[k] = dx, dy
         rays.z[k] = rotation[2, 0] * fx + rotation[2, 1] * fy + rotation[2, 2] * fz
-        rays.right[k], rays.down[k], rays.best[k] = right, down, reach
+        rays.right[k], rays.down[k], rays.best[k], rays.hit[k] = right, down, reach, -1
         forward = c * dx + s * dy
         slope = (c * dy - s * dx) / forward if forward > AHEAD else -np.inf
         j = k
@@ -179,18 +210,18 @@ def _rays(beam: Beam, tick: int, rotation: Floats, reach: float) -> Rays:
             rays.slope[j], rays.order[j] = rays.slope[j - 1], rays.order[j - 1]
             j -= 1
         rays.slope[j], rays.order[j] = slope, k
-    return rays
 
 
 @inner_kernel
 def _meet_walls(
-    rays: Rays, origin: Floats, yaw: float, walls: Walls, chosen: NDArray[np.int64]
+    rays: Rays, origin: Floats, yaw: float, walls: Walls, chosen: Ints, count: int
 ) -> None:
     """A wall is compared with the rays whose slope lies between those of its ends."""
     c, s = np.cos(yaw), np.sin(yaw)
     n = rays.x.size
     are_ahead = rays.slope[0] > -np.inf
-    for w in chosen:
+    for m in range(count):
+        w = chosen[m]
         px, py = walls.x0[w] - origin[0], walls.y0[w] - origin[1]
         qx, qy = walls.x1[w] - origin[0], walls.y1[w] - origin[1]
         ex, ey = walls.x1[w] - walls.x0[w], walls.y1[w] - walls.y0[w]
@@ -200,7 +231,7 @@ def _meet_walls(
         if are_ahead and p > AHEAD and q > AHEAD:
             one, other = (c * py - s * px) / p, (c * qy - s * qx) / q
             last = max(one, other) + ASIDE
-            first = np.searchsorted(rays.slope, min(one, other) - ASIDE)
+            first = _first_from(rays.slope, min(one, other) - ASIDE)
         for j in range(first, n):
             if rays.slope[j] > last:
                 break
@@ -210,6 +241,19 @@ def _meet_walls(
                 rise = origin[2] + t * rays.z[k] - (walls.z0[w] + f * (walls.z1[w] - walls.z0[w]))
                 if 0.0 <= rise <= walls.height[w]:
                     rays.best[k], rays.hit[k] = t, 0
+
+
+@inner_kernel
+def _first_from(rising: Floats, value: float) -> int:
+    """The first of rising values that is not below `value`."""
+    low, high = 0, rising.size
+    while low < high:
+        middle = (low + high) // 2
+        if rising[middle] < value:
+            low = middle + 1
+        else:
+            high = middle
+    return low
 
 
 @inner_kernel
@@ -243,20 +287,16 @@ def _is_aside(dx: float, dy: float, x: float, y: float, radius: float, best: flo
 
 
 @inner_kernel
-def _boxes_seen(origin: Floats, boxes: Boxes, chosen: NDArray[np.int64]) -> NearBoxes:
-    n = chosen.size
-    near = NearBoxes(
-        chosen, np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty((n, 3)),
-        np.empty(n),
-    )  # fmt: skip
-    for j, b in enumerate(chosen):
+def _measure_boxes(origin: Floats, boxes: Boxes, count: int, near: NearBoxes) -> None:
+    """Fills in the boxes that `near.row` names."""
+    for j in range(count):
+        b = near.row[j]
         near.x[j], near.y[j] = origin[0] - boxes.x[b], origin[1] - boxes.y[b]
         near.z[j] = origin[2] - boxes.z[b] - boxes.height[b] / 2.0
         near.cos[j], near.sin[j] = np.cos(boxes.yaw[b]), np.sin(boxes.yaw[b])
         near.half[j, 0], near.half[j, 1] = boxes.length[b] / 2.0, boxes.width[b] / 2.0
         near.half[j, 2] = boxes.height[b] / 2.0
         near.radius[j] = 0.5 * (boxes.length[b] + boxes.width[b]) + MARGIN
-    return near
 
 
 @inner_kernel

@@ -15,6 +15,7 @@ import numpy as np
 
 from skidpad.core.errors import require_range
 from skidpad.core.geometry import Pose, mps_from_kmh
+from skidpad.core.jit import Held, hold, kernel
 from skidpad.core.states import ActorStates, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import (
     ActorKind,
@@ -120,13 +121,15 @@ class Supervisor:
         self.contacts_seen = 0  # index into the collision history (A-193)
         self.reason = RelocationReason.COLLISION
         self.truth: WorldTruth | None = None
+        self._states: ActorStates | None = None  # those of `_held`
         self.off = 0  # ticks with all wheels off every lane
         self.first: LanePoint | None = None  # where the run began
+        self._lane: LanePoint | None = None  # of this moment, where it was asked for
         self.last: LanePoint | None = None  # nearest lane, as long as there was one
 
     def observe(self, truth: WorldTruth) -> Supervision:
         """The phase of the tick that `truth` begins."""
-        self.truth = truth
+        self.truth, self._lane = truth, None
         self.contacts_seen += len(truth.contacts)
         if self.phase is not Supervision.NONE:
             if self.left == 0:
@@ -256,7 +259,7 @@ class Supervisor:
     def _astray(self, truth: WorldTruth) -> RelocationReason | None:
         """Why the ego is put back although it touched nothing: wrong way, or off the road."""
         states = truth.states
-        place = self._find_lane(states)
+        place = self._lane = self._find_lane(states)
         if place is not None:
             self.first, self.last = self.first or place, place
             crossing = self.map.lanes.junction[place.lane] >= 0  # its lanes lead all ways
@@ -305,7 +308,7 @@ class Supervisor:
         """The stack says that it holds, or a vehicle or a red light stands ahead."""
         if report is not None and report.tier in HOLDING:
             return True
-        ego = self._find_lane(truth.states)
+        ego = self._lane or self._find_lane(truth.states)
         if ego is None:
             return False
         here = replace(
@@ -316,11 +319,9 @@ class Supervisor:
     def _is_clear_of_others(self, here: LanePoint) -> bool:
         assert self.truth is not None
         states = self.truth.states
-        dx, dy = states.x - here.x, states.y - here.y
-        forward = dx * cos(here.heading) + dy * sin(here.heading)
-        aside = np.abs(dy * cos(here.heading) - dx * sin(here.heading))
-        ahead = states.present & (forward > 0.0) & (forward < CLEAR_AHEAD) & (aside < CLEAR_ASIDE)
-        return not bool((ahead & (np.abs(states.z - here.z) < LEVEL))[1:].any())
+        if states is not self._states:
+            self._states, self._held = states, hold(states)
+        return not has_actor_ahead(self._held, here.x, here.y, here.z, here.heading)
 
     def _light_ahead(self, ego: LanePoint, truth: WorldTruth) -> bool:
         signals = self.map.signals
@@ -329,3 +330,17 @@ class Supervisor:
         near &= (distance > 0.0) & (distance < LIGHT_REACH)
         stop = (LightState.RED, LightState.YELLOW)
         return any(truth.lights.get(int(i)) in stop for i in signals.id[near])
+
+
+@kernel
+def has_actor_ahead(held: Held[ActorStates], x: float, y: float, z: float, heading: float) -> bool:
+    """Tells whether an actor besides the ego is in the box ahead of a place."""
+    s = held.value
+    c, sn = cos(heading), sin(heading)
+    for i in range(1, len(s.x)):
+        dx, dy = s.x[i] - x, s.y[i] - y
+        forward, aside = dx * c + dy * sn, abs(dy * c - dx * sn)
+        near = 0.0 < forward < CLEAR_AHEAD and aside < CLEAR_ASIDE and abs(s.z[i] - z) < LEVEL
+        if near and s.present[i]:
+            return True
+    return False

@@ -100,7 +100,11 @@ class FileChanges:
         """What has changed since it was asked last."""
         scene = self.player.scene
         unseen = frozenset(actor.name for actor in scene.actors.values() if not actor.visible)
-        now = replace(self.outside, lights=held_lights(scene), unseen=unseen)
+        lights, before = held_lights(scene), self.outside
+        is_same = lights == before.lights and unseen == before.unseen and not scene.lamps
+        if is_same and self.done == len(scene.environments):
+            return None  # as in most ticks
+        now = replace(before, lights=lights, unseen=unseen)
         if scene.lamps:
             now = replace(now, brake_lamps=lit_brake_lamps(scene), beam=beam_of_ego(scene))
         for environment in scene.environments[self.done :]:
@@ -112,7 +116,7 @@ class FileChanges:
                 now = replace(now, mu_ref=self.mu_ref * environment.friction_scale)
             if environment.wind is not None and self.takes_wind:
                 now = replace(now, wind=environment.wind)
-        before, self.outside = self.outside, now
+        self.outside = now
         return None if now == before else now
 
     def new_notices(self) -> list[str]:

@@ -15,6 +15,9 @@ from skidpad.roads.roadside import Roadside
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+GROUP = 16  # walls
+ROUNDING = 1e-3  # m, more than any sum of coordinates is rounded by
+
 
 class Boxes(NamedTuple):
     """n upright boxes standing at z; arrays (n,)."""
@@ -38,6 +41,16 @@ class Walls(NamedTuple):
     y1: Floats
     z1: Floats
     height: Floats
+
+
+class WallGroups(NamedTuple):
+    """Walls in groups of GROUP that follow one another, as barriers do; arrays (groups,), m."""
+
+    x_min: Floats  # of the first ends
+    x_max: Floats
+    y_min: Floats
+    y_max: Floats
+    longest: Floats  # |dx| + |dy| of the longest wall
 
 
 class Mount(NamedTuple):
@@ -87,6 +100,22 @@ def walls_of(roadside: Roadside) -> Walls:
     return Walls(*np.concatenate([np.empty((0, 7)), *rows]).T.copy())
 
 
+def group_walls(walls: Walls) -> WallGroups:
+    """Where the walls of each group are, so that far ones are passed over together."""
+    starts = np.arange(0, len(walls.x0), GROUP)
+    if not len(starts):
+        return WallGroups(*np.empty((5, 0)))
+    length = np.abs(walls.x1 - walls.x0) + np.abs(walls.y1 - walls.y0)
+    low, high = np.minimum.reduceat, np.maximum.reduceat
+    return WallGroups(
+        low(walls.x0, starts),
+        high(walls.x0, starts),
+        low(walls.y0, starts),
+        high(walls.y0, starts),
+        high(length, starts),
+    )
+
+
 def posts_of(roadside: Roadside) -> Boxes:
     """Every roadside box."""
     rows = [(b.x, b.y, b.z, b.yaw, b.length, b.width, b.height) for b in roadside.boxes]
@@ -95,24 +124,35 @@ def posts_of(roadside: Roadside) -> Boxes:
 
 @inner_kernel
 def walls_in_view(
-    origin: Floats, yaw: float, slope: float, walls: Walls, reach: float, keep: Ints
+    origin: Floats,
+    yaw: float,
+    slope: float,
+    walls: Walls,
+    groups: WallGroups,
+    reach: float,
+    keep: Ints,
 ) -> int:
     """Walls of which a part may lie within `reach` and |left| <= slope * forward, into `keep`; how many."""
     c, s = np.cos(yaw), np.sin(yaw)
     n = 0
-    for w in range(walls.x0.size):
-        ax, ay = walls.x0[w] - origin[0], walls.y0[w] - origin[1]
-        bx, by = walls.x1[w] - origin[0], walls.y1[w] - origin[1]
-        if abs(ax) + abs(ay) > 1.5 * reach + abs(bx - ax) + abs(by - ay):
+    for g in range(groups.x_min.size):
+        aside = max(groups.x_min[g] - origin[0], origin[0] - groups.x_max[g], 0.0)
+        aside += max(groups.y_min[g] - origin[1], origin[1] - groups.y_max[g], 0.0)
+        if aside > 1.5 * reach + groups.longest[g] + ROUNDING:
             continue
-        af, al = c * ax + s * ay, -s * ax + c * ay
-        bf, bl = c * bx + s * by, -s * bx + c * by
-        behind = af < 0.0 and bf < 0.0
-        left = al > slope * af and bl > slope * bf
-        right = -al > slope * af and -bl > slope * bf
-        if not (behind or left or right):
-            keep[n] = w
-            n += 1
+        for w in range(GROUP * g, min(GROUP * (g + 1), walls.x0.size)):
+            ax, ay = walls.x0[w] - origin[0], walls.y0[w] - origin[1]
+            bx, by = walls.x1[w] - origin[0], walls.y1[w] - origin[1]
+            if abs(ax) + abs(ay) > 1.5 * reach + abs(bx - ax) + abs(by - ay):
+                continue
+            af, al = c * ax + s * ay, -s * ax + c * ay
+            bf, bl = c * bx + s * by, -s * bx + c * by
+            behind = af < 0.0 and bf < 0.0
+            left = al > slope * af and bl > slope * bf
+            right = -al > slope * af and -bl > slope * bf
+            if not (behind or left or right):
+                keep[n] = w
+                n += 1
     return n
 
 

@@ -16,9 +16,11 @@ from skidpad.roads.kernels import LaneArrays, project_kernel, sample_kernel
 from skidpad.sensors.object_level.boxes import (
     Boxes,
     Mount,
+    WallGroups,
     Walls,
     boxes_in_view,
     empty_mount,
+    group_walls,
     mount_of,
     place,
     walls_in_view,
@@ -83,6 +85,7 @@ class RadarScratch(NamedTuple):
 
     seat: Mount
     rays: Rays
+    groups: WallGroups
     walls: Ints  # (walls,) those in view
     posts: NearBoxes
     boxes: NearBoxes
@@ -95,14 +98,15 @@ def _make_near(n: int) -> NearBoxes:
     return NearBoxes(np.empty(n, np.int64), *columns, np.empty((n, 3)), np.empty(n))
 
 
-def make_scratch(rays: int, walls: int, posts: int, boxes: int) -> RadarScratch:
-    """Returns arrays for so many rays, walls, posts and actors."""
+def make_scratch(rays: int, walls: Walls, posts: int, boxes: int) -> RadarScratch:
+    """Returns arrays for these walls, and for so many rays, posts and actors."""
     x, y, z, right, down, best, slope = np.empty((7, rays))
     hit, order = np.empty((2, rays), np.int64)
     return RadarScratch(
         empty_mount(),
         Rays(x, y, z, right, down, best, hit, slope, order),
-        np.empty(walls, np.int64),
+        group_walls(walls),
+        np.empty(len(walls.x0), np.int64),
         _make_near(posts),
         _make_near(boxes),
         np.zeros(2),
@@ -143,7 +147,7 @@ def cast_radar(
         fall = rays.z[k] - slope[0] * rays.x[k] - slope[1] * rays.y[k]
         if fall < 0.0 and -height / fall < reach:  # the road
             rays.best[k], rays.hit[k] = -height / fall, 0
-    m_walls = walls_in_view(origin, yaw, edge, walls, reach, work.walls)
+    m_walls = walls_in_view(origin, yaw, edge, walls, work.groups, reach, work.walls)
     _meet_walls(rays, origin, yaw, walls, work.walls, m_walls)
     n = 0
     for k in range(beam.rays):

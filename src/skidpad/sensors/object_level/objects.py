@@ -108,7 +108,7 @@ class ObjectSuite:
             empty_mount(), np.empty(n, np.int64), np.empty(n), np.empty(columns)
         )
         rays = max((a.beam.rays for a in self.antennas), default=0)
-        self._radar = make_scratch(rays, len(self.walls.x0), len(self.posts.x), n)
+        self._radar = make_scratch(rays, self.walls, len(self.posts.x), n)
         self._states: ActorStates | None = None
 
     def see_through(self, weather: Weather | None, beam: Beam | None) -> None:

@@ -25,7 +25,7 @@ SHARED = re.compile(r"^define linkonce_odr ")
 
 
 class LeanLibrary(JITCodeLibrary):  # type: ignore[misc]
-    """The machine code of one kernel and of all that it calls."""
+    """Holds the machine code of one kernel and of all that it calls."""
 
     state: Any  # of the compiler: what the kernel is and returns
     is_lean = False  # nothing in it counts references
@@ -48,7 +48,7 @@ class LeanCompiler(Compiler):  # type: ignore[misc]
     """Numba's compiler, with a library that can leave out the counting."""
 
     def compile_extra(self, func: Any) -> Any:
-        """Compiles a function."""
+        """Compiles a function with a library of this kind."""
         library = LeanLibrary(self.state.targetctx.codegen(), func.__qualname__)
         library.enable_object_caching()
         library.state, self.state.library = self.state, library

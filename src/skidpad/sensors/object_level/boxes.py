@@ -61,7 +61,7 @@ class Mount(NamedTuple):
 
 
 def empty_mount() -> Mount:
-    """Returns arrays for `place`."""
+    """Returns arrays that `place` can fill."""
     return Mount(np.empty(3), np.empty((3, 3)))
 
 
@@ -89,6 +89,14 @@ def place(mount: Mount, states: ActorStates, seat: Mount) -> None:
             seat.rotation[i, k] = 0.0
             for m in range(3):
                 seat.rotation[i, k] += body[i][m] * mount.rotation[m, k]
+
+
+@inner_kernel
+def placed(mount: Mount, states: ActorStates) -> Mount:
+    """The ego's sensor seen from the world, in arrays of its own; `place` needs none."""
+    seat = Mount(np.empty(3), np.empty((3, 3)))
+    place(mount, states, seat)
+    return seat
 
 
 def walls_of(roadside: Roadside) -> Walls:

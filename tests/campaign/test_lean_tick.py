@@ -1,0 +1,39 @@
+"""The kernels of a tick count no references: one that is counted there costs as much as a division."""
+
+from __future__ import annotations
+
+import pytest
+
+from core.test_refcounts import counts_references
+from runs import adas_run
+from skidpad.campaign.runs.run import run
+from skidpad.sensors.object_level import objects
+from skidpad.simulation import recovery
+from skidpad.simulation.world import step
+from skidpad.stack.perception import radar
+
+
+@pytest.fixture(scope="module", autouse=True)
+def drive() -> None:
+    """Every kernel of the tick is called."""
+    run(adas_run(4, duration=12.0))
+
+
+@pytest.mark.parametrize(
+    "compiled",
+    [step.advance, objects.look, objects.listen, objects.feel_slope, radar.retain],
+    ids=lambda compiled: compiled.py_func.__name__,
+)
+def test_a_kernel_of_the_tick_counts_nothing(compiled: object) -> None:
+    assert not counts_references(compiled)
+
+
+def test_kernels_in_which_arrays_are_made_count() -> None:
+    """Else the test above could not fail."""
+    assert counts_references(radar.first_in_lane)
+
+
+def test_the_supervisors_kernel_counts_nothing() -> None:
+    states = step.ActorStates.empty(3)
+    assert not recovery.has_actor_ahead(recovery.hold(states), 0.0, 0.0, 0.0, 0.0)
+    assert not counts_references(recovery.has_actor_ahead)

@@ -28,12 +28,11 @@ class LeanLibrary(JITCodeLibrary):  # type: ignore[misc]
     """Holds the machine code of one kernel and of all that it calls."""
 
     state: Any  # of the compiler: what the kernel is and returns
-    is_lean = False  # nothing in it counts references
+    _final_module: Any
 
     def _optimize_final_module(self) -> None:
         text = str(self._final_module)
         if not self._returns_references() and not allocates(text):
-            self.is_lean = True
             module = binding.parse_assembly(without_counting(text))
             module.name = self._final_module.name
             self._final_module = module

@@ -94,8 +94,8 @@ class RadarScratch(NamedTuple):
 
 
 def _make_near(n: int) -> NearBoxes:
-    columns = (np.empty(n) for _ in range(5))
-    return NearBoxes(np.empty(n, np.int64), *columns, np.empty((n, 3)), np.empty(n))
+    x, y, z, cos, sin = np.empty((5, n))
+    return NearBoxes(np.empty(n, np.int64), x, y, z, cos, sin, np.empty((n, 3)), np.empty(n))
 
 
 def make_scratch(rays: int, walls: Walls, posts: int, boxes: int) -> RadarScratch:

@@ -127,7 +127,8 @@ class ObjectSuite:
         seen = {}
         for (spec, _), eye, held in zip(self.cameras, self._eyes, self._held_eyes, strict=True):
             m = look(around, held, self.limit)
-            seen[spec.id] = Segments(*eye.runs[:, :m].copy(), eye.classes[:m].copy())
+            u, width, top, bottom, depth = eye.runs[:, :m].copy()
+            seen[spec.id] = Segments(u, width, top, bottom, depth, eye.classes[:m].copy())
         return seen
 
     def radar(self, tick: int, states: ActorStates) -> RadarPoints:

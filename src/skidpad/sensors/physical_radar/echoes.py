@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from skidpad.core.jit import inner_kernel
 from skidpad.core.states import ActorStates
 from skidpad.sensors.noise import uniform
-from skidpad.sensors.object_level.boxes import Walls, walls_in_view
+from skidpad.sensors.object_level.boxes import WallGroups, Walls, walls_in_view
 from skidpad.sensors.physical_radar.cells import Cells, add_echo, normal_pair
 from skidpad.sensors.physical_radar.setup import BEAM_STEP, DB, RadarSetup
 from skidpad.sensors.physical_radar.targets import LOBES, Sites, Targets
@@ -30,6 +30,7 @@ class RadarWorld(NamedTuple):
     targets: Targets
     sites: Sites
     walls: Walls
+    groups: WallGroups
 
 
 class Screens(NamedTuple):
@@ -202,7 +203,8 @@ def add_actors(
     origin, targets = sensor.origin, world.targets
     edge = np.tan(0.5 * radar.wide)
     yaw = np.arctan2(sensor.rotation[1, 0], sensor.rotation[0, 0])
-    rails = walls_in_view(origin, yaw, edge, world.walls, radar.reach)
+    room = np.empty(world.walls.x0.size, np.int64)
+    rails = room[: walls_in_view(origin, yaw, edge, world.walls, world.groups, radar.reach, room)]
     for k in range(screens.row.size):
         i = screens.row[k]
         c, s = screens.cos[k], screens.sin[k]

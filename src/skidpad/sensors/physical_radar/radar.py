@@ -15,7 +15,7 @@ from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.weather import Weather
 from skidpad.roads.roadside import Roadside
 from skidpad.sensors.noise import uniform
-from skidpad.sensors.object_level.boxes import placed, walls_of
+from skidpad.sensors.object_level.boxes import group_walls, placed, walls_of
 from skidpad.sensors.physical_radar.cells import (
     RANGES,
     SLACK,
@@ -62,10 +62,11 @@ class PhysicalRadar:
     ) -> None:
         """weather: acts on the waves; None: it does not."""
         self.spec, self._key = spec, np.uint64(stream_key(seed, "physical radar", spec.id))
+        walls = walls_of(roadside)
         self._world = hold(
             RadarWorld(
                 table.length, table.width, table.height, targets_of(table), sites_of(roadside),
-                walls_of(roadside),
+                walls, group_walls(walls),
             )
         )  # fmt: skip
         self._cells = hold(make_cells())

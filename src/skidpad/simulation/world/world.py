@@ -340,7 +340,8 @@ class World:
         if self.traffic is not None:
             stages |= DECIDE
         if words:
-            self._advance(stages & DECIDE)
+            if self.traffic is not None and self.traffic.drivers.state["active"].any():
+                self._advance(DECIDE)
             stages &= ~DECIDE
             for word in words:
                 self._obey(word)

@@ -254,7 +254,7 @@ def test_both_levels_and_the_switch():
     assert frames["objects"] != frames["no weather"]
 
 
-def test_a_tick_costs_at_most_twice_one_with_the_geometric_radar():
+def test_a_tick_costs_at_most_four_times_one_with_the_geometric_radar():
     backends = {m: measured(model=m)[0] for m in RadarModel}
     best = dict.fromkeys(RadarModel, np.inf)
     for _ in range(5):
@@ -264,7 +264,7 @@ def test_a_tick_costs_at_most_twice_one_with_the_geometric_radar():
                 frame = backend.step(VehicleCommand(throttle=0.3))
                 _ = frame.segments, frame.radar
             best[model] = min(best[model], process_time() - begin)
-    assert best[RadarModel.PHYSICAL] < 2.0 * best[RadarModel.GEOMETRIC]
+    assert best[RadarModel.PHYSICAL] < 4.0 * best[RadarModel.GEOMETRIC]
 
 
 def test_the_page_shows_this_model():

@@ -11,6 +11,7 @@ import typer
 
 import skidpad
 from skidpad.cli.campaigns.adas import adas, report, show
+from skidpad.cli.campaigns.effects import effects
 from skidpad.cli.campaigns.grip import grip
 from skidpad.cli.carla_launcher import carla_launcher, translate_options
 from skidpad.cli.channels.channels import channels
@@ -85,6 +86,7 @@ app.command()(compare)
 app.command()(rerun)
 app.command()(shadow)
 app.command()(study)
+app.command()(effects)
 app.command()(bench)
 app.command()(show)
 app.command()(export)

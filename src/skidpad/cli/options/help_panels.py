@@ -13,6 +13,7 @@ COMMANDS: dict[str, dict[str, str]] = {
         "search": "search lead_slowdown --vary LeadS=110:140 --vary Deceleration=2:9 --out out/search",
         "risk": "risk lead_slowdown --vary 'LeadS=normal(128,6,100:160)' --out out/risk",
         "study": "study F-08 --seeds 10",
+        "effects": "effects --stack 2 --weather rain-noon --seeds 10",
         "campaign": "campaign estimate adas --sensors objects --seeds 50",
         "export-dataset": "export-dataset --weather rain-night --seeds 3 --out out/images",
     },

@@ -1,0 +1,159 @@
+"""What each effect of weather does to a stack: alone, and all together, against none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import polars as pl
+
+from skidpad.campaign.driving.drivers import find_driver
+from skidpad.campaign.recipes.matrix import roads_of, warm_up
+from skidpad.campaign.runs.run import run
+from skidpad.campaign.workers.pool import local
+from skidpad.campaign.workers.worker import Job
+from skidpad.core.errors import SkidpadError
+from skidpad.core.run import CameraDriver, RunSpec
+from skidpad.core.settings import load_profile
+from skidpad.core.vocabulary import SensorLevel
+from skidpad.evidence.drive.metrics import run_metrics
+from skidpad.evidence.statistics import Comparison, compare_pairs
+from skidpad.physics.presets import find_weather
+from skidpad.recording.run.log_files import log_hash
+from skidpad.roads.bundled import load_map
+
+NONE, ALL = "none", "all"
+NOT_READ, NO_CHANGE = "not read by this stack", "nothing changed"
+# settings under which no weather acts on vehicles and sensors
+OFF: dict[str, Any] = {"grip": "none", "range": "none", "camera": False, "drivers": False}
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """One effect: its settings over `OFF`, and the sensor through which alone it acts."""
+
+    title: str
+    values: Mapping[str, Any]
+    sensor: str = ""
+
+
+GRIP, RANGE = {"grip": "physical"}, {"range": "physical"}
+EFFECTS: dict[str, Effect] = {
+    "grip": Effect("grip of tyres", GRIP),
+    "stiffness": Effect("grip and slip stiffness", GRIP | {"tyre_stiffness": True}),
+    "water": Effect("grip and drag of water", GRIP | {"water_drag": True}),
+    "anti_lock": Effect("grip and anti-lock by wheel speeds", GRIP | {"anti_lock": "wheel_speeds"}),
+    "wind": Effect("wind with gusts of 0.2", {"wind": True, "wind_gusts": 0.2}),
+    "sight": Effect("sight of depth, labels, radar", RANGE, "depth"),
+    "radar": Effect("sight and physical radar", RANGE | {"radar_model": "physical"}, "radar"),
+    "lidar": Effect("lidar: lost and false returns", RANGE | {"lidar": "physical"}, "lidar"),
+    "pictures": Effect("colour pictures", {"camera": True}, "pictures"),
+}
+# sensors that our drivers read; of another stack it shows only in its drives
+READS = {"camera": ("pictures",), "reference": ()} | dict.fromkeys("0123456", ("depth", "radar"))
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """What an effect did to one stack."""
+
+    stack: str
+    effect: str
+    title: str
+    interventions: Comparison
+    speed: Comparison  # km/h
+    changed: int  # of the pairs, drives that differ at all
+
+    @property
+    def note(self) -> str:
+        """What is printed where no drive changed; empty where one did."""
+        if self.changed:
+            return ""
+        sensor = EFFECTS[self.effect].sensor if self.effect in EFFECTS else ""
+        is_read = sensor in READS.get(self.stack, ())
+        return NOT_READ if sensor and not is_read else NO_CHANGE
+
+
+def settings_of_arm(arm: str) -> dict[str, Any]:
+    """Returns the settings of an arm: none, one effect, or all of them."""
+    values = dict(OFF)
+    for name, effect in EFFECTS.items():
+        if arm in (name, ALL):
+            values |= effect.values
+    return values
+
+
+def plan_arm(stack: str, weather: str, arm: str, seed: int, duration: float) -> RunSpec:
+    """Returns the run of an arm; the driver that sees pictures gets them."""
+    driver = find_driver(stack)
+    pixels = isinstance(driver, CameraDriver)
+    return RunSpec(
+        driver=driver,
+        weather=find_weather(weather),
+        settings=load_profile("recommended", settings_of_arm(arm)),
+        sensors=SensorLevel.PIXELS if pixels else SensorLevel.OBJECTS,
+        seed=seed,
+        duration=duration,
+    )
+
+
+def drive_arm(spec: RunSpec) -> dict[str, Any]:
+    """Drives one arm in a worker and returns its row."""
+    driven = run(spec)
+    metrics = run_metrics(driven.log, load_map(roads_of(spec).map))
+    return {
+        "seed": spec.seed,
+        "outcome": driven.outcome.value,
+        "interventions": metrics.interventions,
+        "mean_speed_kmh": metrics.mean_speed_kmh,
+        "log_hash": log_hash(driven.log),
+    }
+
+
+def drive_effects(
+    stack: str,
+    weather: str,
+    seeds: Sequence[int],
+    duration: float,
+    workers: int,
+    effects: Sequence[str] = tuple(EFFECTS),
+    on_run: Callable[[int, int], None] = lambda *_: None,
+) -> pl.DataFrame:
+    """Drives none, each effect alone and all together with the same seeds; one row a run."""
+    arms = (NONE, *effects, ALL)
+    jobs = [
+        Job(f"{arm}-{seed}", drive_arm, spec, spec.deadline_s)
+        for arm in arms
+        for seed in seeds
+        for spec in (plan_arm(stack, weather, arm, seed, duration),)
+    ]
+    rows: dict[str, dict[str, Any]] = {}
+    for finished in local(workers, warm_up)(jobs):
+        if finished.failure is not None:
+            how = finished.failure.value
+            raise SkidpadError(f"a run of effects {how}: {finished.detail.strip()}")
+        arm = finished.job.key.rsplit("-", 1)[0]
+        rows[finished.job.key] = {"stack": stack, "weather": weather, "arm": arm, **finished.value}
+        on_run(len(rows), len(jobs))
+    return pl.DataFrame([rows[job.key] for job in jobs])
+
+
+def compare_effects(rows: pl.DataFrame) -> list[Result]:
+    """Compares every arm with none, pair by pair of equal seeds; rows: of one stack and weather."""
+    order = rows["arm"].unique(maintain_order=True).to_list()
+    base = rows.filter(pl.col("arm") == NONE).sort("seed")
+    found = []
+    for arm in order:
+        if arm == NONE:
+            continue
+        these = rows.filter(pl.col("arm") == arm).sort("seed")
+        differences = {
+            name: (these[name] - base[name]).to_numpy().astype(float)
+            for name in ("interventions", "mean_speed_kmh")
+        }
+        title = "all together" if arm == ALL else EFFECTS[arm].title
+        changed = int((these["log_hash"] != base["log_hash"]).sum())
+        pairs = {name: compare_pairs(values) for name, values in differences.items()}
+        found.append(Result(arm, title, pairs["interventions"], pairs["mean_speed_kmh"], changed))
+    return found

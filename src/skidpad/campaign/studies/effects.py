@@ -155,5 +155,14 @@ def compare_effects(rows: pl.DataFrame) -> list[Result]:
         title = "all together" if arm == ALL else EFFECTS[arm].title
         changed = int((these["log_hash"] != base["log_hash"]).sum())
         pairs = {name: compare_pairs(values) for name, values in differences.items()}
-        found.append(Result(arm, title, pairs["interventions"], pairs["mean_speed_kmh"], changed))
+        found.append(
+            Result(
+                these["stack"][0],
+                arm,
+                title,
+                pairs["interventions"],
+                pairs["mean_speed_kmh"],
+                changed,
+            )
+        )
     return found

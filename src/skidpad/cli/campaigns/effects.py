@@ -27,11 +27,13 @@ def effects(
     out: Annotated[Path | None, typer.Option(help="Write the rows to this .csv file.")] = None,
 ) -> None:
     """Drive none, each effect of weather alone and all together; print what each one changes."""
+    import polars as pl
     from rich.console import Console
     from rich.progress import Progress
 
     from skidpad.campaign.studies.effects import EFFECTS, compare_effects, drive_effects
     from skidpad.core.errors import require_choice
+    from skidpad.recording.files import write_csv
 
     chosen = [require_choice("effect", name, tuple(EFFECTS)) for name in effect or EFFECTS]
     stacks, tables = stack or ["2"], []
@@ -43,6 +45,8 @@ def effects(
                 lambda done, n: progress.update(task, completed=done, total=n),  # noqa: B023
             )  # fmt: skip
         tables.append(rows)
+        if out is not None:
+            write_csv(out, pl.concat(tables))
         typer.echo(f"stack {one}, {weather}, {seeds} x {duration:g} s; differences to none")
         typer.echo("| effect | interventions per drive | mean speed, km/h | drives changed |")
         typer.echo("|---|---|---|---|")
@@ -54,11 +58,6 @@ def effects(
             changed = f"{result.changed} of {seeds}"
             typer.echo(f"| {result.title} | {cells[0]} | {cells[1]} | {changed} |")
     if out is not None:
-        import polars as pl
-
-        from skidpad.recording.files import write_csv
-
-        write_csv(out, pl.concat(tables))
         typer.echo(str(out))
 
 

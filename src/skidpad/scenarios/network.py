@@ -11,6 +11,7 @@ import numpy as np
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.roads.bundled import map_file
+from skidpad.roads.lanes import LaneKind
 from skidpad.roads.opendrive.document import RoadRecord, parse
 from skidpad.roads.opendrive.signals import road_place
 from skidpad.roads.queries import LanePoint, RoadMap
@@ -113,6 +114,18 @@ class Network:
         dx, dy = pose.x - at.x, pose.y - at.y
         t = dy * cos(at.heading) - dx * sin(at.heading)
         return RoadCoordinates(point.road, s, t, wrap_angle(pose.yaw - at.heading))
+
+    def is_void(self, point: LanePoint) -> bool:
+        """Returns whether a lane is of OpenDRIVE's type `none`: space beside the road, with nothing."""
+        if (
+            self.map.lanes.kind[point.lane] != LaneKind.OTHER
+            or map_file(self.name).suffix == ".npz"
+        ):
+            return False
+        s = self.map.s_road(point)
+        sections = self.roads[point.road].sections
+        section = next((one for one in sections if s <= one.s_end), sections[-1])
+        return any(one.id == point.lane_id and one.type == "none" for one in section.lanes)
 
     def slopes(self, pose: Pose) -> tuple[float, float]:
         """Pitch (nose down) and roll (left side up) of a body on the road there, rad; 0 off it."""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from tests.scenarios.files import (
     by_entity,
@@ -163,6 +164,8 @@ def conditions() -> Iterator[Case]:
         "aside", private(trajectory((140.0, -1.75), (170.0, -8.0), (250.0, -8.0))), time(BEGIN)
     )
     yield _chain("off_road_shoulder", "straight", shoulder, off)
+    void = _chain("off_road_void", "straight", aside, off)
+    yield replace(void, road="void")
 
 
 def _chain(name: str, setting: str, *events: str) -> Case:

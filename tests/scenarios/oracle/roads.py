@@ -97,9 +97,17 @@ def fork() -> str:
 RISE = """<elevation s="0" a="0" b="0" c="0" d="0"/><elevation s="100" a="0" b="0" c="0.0004" d="0"/>
 <elevation s="200" a="4" b="0.08" c="0" d="0"/>"""
 
+# beyond the shoulders lie lanes without a type
+VOID = (
+    network(road((1000.0, LINE)))
+    .replace("<left>", f"<left>{lane(4, 'none', 5.0)}")
+    .replace("</right>", f"{lane(-4, 'none', 5.0)}</right>")
+)
+
 # the curve is 100 m straight, then turns left on a radius of 120 m; two roads cross at (200, 0)
 ROADS = {
     "straight": network(road((1000.0, LINE))),
+    "void": VOID,
     "curve": network(road((100.0, LINE), (300.0, ARC.format(1 / 120)))),
     "hill": network(road((800.0, LINE), heights=RISE)),
     "fork": fork(),

@@ -304,7 +304,8 @@ def time_off_road(actor: Actor, network: Network, t: float) -> float:
     """Return how long an actor has been beside every lane, s; ask in every step."""
     pose = actor.pose
     point = network.map.project(pose.x, pose.y, pose.z, driving=False)
-    if point is not None and abs(point.offset) <= 0.5 * point.width:
+    on_lane = point is not None and abs(point.offset) <= 0.5 * point.width
+    if point is not None and on_lane and not network.is_void(point):
         actor.off_since = None
         return 0.0
     actor.off_since = t if actor.off_since is None else actor.off_since

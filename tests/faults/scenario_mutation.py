@@ -77,10 +77,19 @@ CONTROL = """<ControllerAction><ActivateControllerAction longitudinal="true" lat
 SEEN = '<VisibilityAction graphics="true" sensors="false" traffic="true"/>'
 RELATIVE = ('<RelativeTargetSpeed entityRef="other" value="2" speedTargetValueType="delta" '
             'continuous="false"/>')  # fmt: skip
+STEERED = FOLLOW.replace('"position"', '"follow"')
+LAMP = """<AppearanceAction><LightStateAction><LightType><VehicleLight vehicleLightType="{}"/>
+</LightType><LightState mode="{}" flashingOnDuration="0.2" flashingOffDuration="0.3"/>
+</LightStateAction></AppearanceAction>"""
 ACTIONS = [
     speed(to(3), "linear", 2, "rate"), speed(to("$v"), "cubic", 1), speed(RELATIVE), PROFILE, GAP,
     SIDE, CHANGE, CHANGE_TO, OFFSET, SYNC, FOLLOW.format(LINE, TIMED), FOLLOW.format(CURVE, "<None/>"),
     FOLLOW.format(SPLINE, TIMED), ROUTE, ACQUIRE, CONTROL, SEEN, teleport(on_lane(-2, 140)),
+    STEERED.format(LINE, TIMED), STEERED.format(CURVE, "<None/>"), STEERED.format(SPLINE, TIMED),
+    CHANGE.replace("dynamicsDimension", 'followingMode="follow" dynamicsDimension'),
+    speed(to(12), "cubic", 1).replace("dynamicsDimension", 'followingMode="follow" dynamicsDimension'),
+    speed(to(-3), "step", 0).replace("dynamicsDimension", 'followingMode="follow" dynamicsDimension'),
+    LAMP.format("brakeLights", "flashing"), LAMP.format("lowBeam", "off"),
 ]  # fmt: skip
 GLOBAL = [
     f'<EntityAction entityRef="third"><AddEntityAction>{NEAR}</AddEntityAction></EntityAction>',
@@ -139,6 +148,9 @@ value="1"/></VariableDeclarations>""",
 
 
 FILES = 12
+EASED = vehicle("other").replace(
+    'maxAcceleration="10"', 'maxAcceleration="10" maxAccelerationRate="4" maxDecelerationRate="6"'
+)
 
 
 @cache
@@ -152,7 +164,7 @@ def seeds() -> list[bytes]:
         asked += [time(0.3), state("event", "e0", "startTransition")]
         events = [event(f"e{i}", a, asked[i % len(asked)]) for i, a in enumerate(actions)]
         begin = at("ego", -3, 100) + at("other", -1, 120) + at("third", -2, 80)
-        cars = vehicle("ego", 1.4) + vehicle("other") + vehicle("third")
+        cars = vehicle("ego", 1.4) + EASED + vehicle("third")
         stop = condition(time(5.0)) + condition(asked[0] + "")
         with TemporaryDirectory() as folder:
             path = write(

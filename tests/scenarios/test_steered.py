@@ -116,6 +116,38 @@ def test_rear_first_it_goes_along_the_line_too(tmp_path):
     assert abs(rows[-1].h) == pytest.approx(pi, abs=0.01)
 
 
+def test_with_its_speed_turned_round_it_goes_back_along_the_line(tmp_path):
+    """As in a file of esmini's: rear first to 50 m, then forwards to where it came from."""
+    turn = event("e", private(speed(to(6), "linear", 4)), time(3.0))
+    rows = steered(
+        tmp_path, 100.0, 0.0, pi, -6.0, (100, 0), (200, 0), end=16.0, stories=story(turn)
+    )
+    assert max(row.x for row in rows) == pytest.approx(124.0, abs=0.5)
+    assert rows[-1].speed == pytest.approx(6.0, abs=0.01)
+    assert rows[-1].x < 90.0
+    assert max(abs(row.y) for row in rows) < 0.01
+
+
+def test_times_that_end_standing_are_braked_for_and_stay_standing(tmp_path):
+    """20 m/s for 2 s, then nothing: 4 m/s2 need 50 m. It stands, and does not go back."""
+    slow = vehicle("other").replace('maxDeceleration="10"', 'maxDeceleration="4"')
+    points = (0, 0, None, 0.0), (40, 0, None, 2.0), (40, 0, None, 3.0)
+    parts = {"entities": vehicle("ego") + slow, "end": 12.0}
+    rows = steered(tmp_path, 0.0, 0.0, 0.0, 20.0, *points, timing=RELATIVE, **parts)
+    assert rows[-1].speed == pytest.approx(0.0, abs=1e-6)
+    assert rows[-1].x == pytest.approx(40.0 + 50.0, abs=1.5)
+    assert min(b.speed - a.speed for a, b in pairwise(rows)) >= -4.0 * 0.05 - 1e-6
+
+
+def test_times_that_it_cannot_keep_in_a_bend_leave_it_near_the_line(tmp_path):
+    """20 m/s on a circle of 15 m would be 27 m/s2: it slows down to turn, and gets round."""
+    ring = [(15 * sin(0.1 * k), 15 - 15 * cos(0.1 * k), None, 0.075 * k) for k in range(60)]
+    rows = steered(tmp_path, 0.0, 0.0, 0.0, 20.0, *ring, timing=RELATIVE, end=20.0)
+    away = [abs(hypot(row.x, row.y - 15.0) - 15.0) for row in rows if row.time > 4.0]
+    assert min(row.speed for row in rows) < 12.0
+    assert max(away[:80]) < 15.0
+
+
 def test_at_the_end_it_goes_on_from_where_it_is(tmp_path):
     rows = steered(tmp_path, 20.0, 0.3, 0.0, 10.0, (20, 0), (40, 0), end=6.0)
     for a, b in pairwise(rows):

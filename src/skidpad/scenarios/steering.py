@@ -65,7 +65,7 @@ class SteeredTrack:
     """A line that a vehicle steers along from where it is.
 
     s: length abreast of which it is, beyond the ends of the line along their tangents; v: its speed,
-    negative rear first. Both directions go along the line.
+    negative rear first. It goes along the line in the sense of its first speed, back in the other one.
     """
 
     steered = True
@@ -86,17 +86,24 @@ class SteeredTrack:
         self.line, self.s, self.begin, self.closed, self.timed = line, s, s, closed, timed
         self.pose, self.v, self.t, self.curvature = pose, v, t, 0.0
         self.axles, self.most, self.asked_curvature = axles, most, 0.0
+        self.first = v  # m/s, the first speed that is not 0
         self._project(SEARCH + line.length)
+
+    @property
+    def sense(self) -> float:
+        """Returns 1 along the line, -1 back to its begin; by its times it goes along the line."""
+        return 1.0 if self.timed or self.v * self.first >= 0.0 else -1.0
 
     def at(self, t: float) -> tuple[Pose, float, float]:
         """Returns pose, speed and acceleration (0) at time t, on the arc of this step."""
         pose = move_on_arc(self.pose, self.v * (t - self.t), self.curvature)
-        z = self.point(self.s + abs(self.v) * (t - self.t)).z
+        z = self.point(self.s + self.sense * abs(self.v) * (t - self.t)).z
         return replace(pose, z=z), self.v, 0.0
 
     def way_to(self, place: Pose, t: float) -> float:
         """Returns the way along the line from its place at time t to the point nearest to a place, m."""
-        way = self.line.nearest(place.x, place.y) - self.s - abs(self.v) * (t - self.t)
+        here = self.s + self.sense * abs(self.v) * (t - self.t)
+        way = self.line.nearest(place.x, place.y) - here
         return way % self.line.length if self.closed else way
 
     def skip(self, way: float) -> None:
@@ -117,23 +124,34 @@ class SteeredTrack:
         self.pose, _, _ = self.at(t)
         self._project(SEARCH + 2.0 * abs(self.v) * (t - self.t))
         self.t = t
+        if self.sense < 0.0:
+            return not self.closed and self.s <= SLOW
         return not self.closed and self.s >= self.line.length - SLOW
 
     def aim_at(self, v: float, dt: float) -> None:
         """Turns the wheels to the line and asks for speed v in the coming step."""
         self.v = self._reachable(v, dt)
-        ahead = max(self.s, self.begin) + look_ahead(self.axles, self.v)
+        self.first = self.first or self.v
+        way = look_ahead(self.axles, self.v)
+        ahead = max(self.s, self.begin) + way if self.sense > 0.0 else self.s - way
         sense = self.v if abs(self.v) > SLOW else v
         target = self.point(ahead)
         self.curvature = aim(self.axles, self.pose, target, sense)
-        self.asked_curvature = arc_to(*between(self.pose, target.x, target.y))
+        forward, left = between(self.pose, target.x, target.y)
+        is_ahead = forward * copysign(1.0, sense) > 0.0
+        self.asked_curvature = arc_to(forward, left) if is_ahead else copysign(inf, left)
 
     def pace(self, line_speed: float, line_length: float) -> float:
-        """Returns the speed that brings it to where its times want it, m/s, without going back."""
+        """Returns the speed that brings it to where its times want it, m/s, without going back.
+
+        It is no faster than it can turn to where it aims.
+        """
         late = line_length - self.s
         brake = sqrt(2.0 * self.most.b_max * abs(late)) if self.most.b_max < inf else inf
         v = abs(line_speed) + copysign(min(abs(late) / CATCH_UP, brake), late)
-        return copysign(min(max(v, 0.0), self.most.v_max), line_speed)
+        asked = min(abs(self.asked_curvature), tan(self.axles.steering_max) / self.axles.wheelbase)
+        turn = sqrt(A_LATERAL_MAX / max(asked, STRAIGHT))
+        return copysign(min(max(v, 0.0), self.most.v_max, turn), line_speed)
 
     def _reachable(self, v: float, dt: float) -> float:
         """Returns the speed nearest to v that it can have after dt s."""

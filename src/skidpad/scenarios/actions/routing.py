@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from random import Random
 
 from skidpad.core.geometry import Pose
@@ -210,6 +211,9 @@ class Paced:
         return True
 
 
+SETTLED = 0.1  # m/s beside the last speed of a line with times, at which it is driven to its end
+
+
 class Steered:
     """A trajectory that a vehicle steers along, at its own speed or after its times."""
 
@@ -224,17 +228,24 @@ class Steered:
         there = track.move_to(scene.t)
         v = actor.guide.v if self.times is None else self._pace(self.times, scene.t, scene.dt)
         track.aim_at(v, scene.dt)
-        asked, most = abs(track.asked_curvature), abs(track.curvature)
-        if asked > most and not self.noted:
-            self.noted = True
-            of = "curvature, 1/m, maxSteering or 7 m/s^2 to the side"
-            note_bound(scene, actor, "FollowTrajectoryAction", asked, most, of)
+        self._note(scene)
+        v_end = actor.guide.v
         if self.times is not None:
-            actor.guide.v, actor.guide.a = track.v, 0.0
+            actor.guide.v, actor.guide.a, v_end = track.v, 0.0, self.times.v_end
+            there = there and scene.t >= self.times.end - SLACK
+            there = there and abs(v_end - track.v) < SETTLED
         if there:
-            actor.v_after_track = actor.guide.v
+            actor.v_after_track = v_end
             go_on_after_track(actor, scene.network)
         return there
+
+    def _note(self, scene: Scene) -> None:
+        """Says once where the vehicle cannot turn as the line asks."""
+        asked, most = abs(self.track.asked_curvature), abs(self.track.curvature)
+        if most < asked < inf and not self.noted:
+            self.noted = True
+            of = "curvature, 1/m, maxSteering or 7 m/s^2 to the side"
+            note_bound(scene, self.actor, "FollowTrajectoryAction", asked, most, of)
 
     def _pace(self, times: TimedTrack, t: float, dt: float) -> float:
         """Returns the speed of the coming step that the times of the line ask for."""

@@ -117,12 +117,14 @@ class Allowed:
     binding: Binding
     grip: Grip
     reach: float  # m that is seen
+    v: float = 0.0  # m/s that the car drives
 
     def numbers(self) -> dict[str, float]:
         """Returns the columns of the recording."""
         return {
             "speed_mps": self.speed, "binding": float(self.binding), "grip": self.grip.value,
             "confidence": self.grip.confidence, "prior": self.grip.prior, "reach_m": self.reach,
+            "ego_mps": self.v,
         }  # fmt: skip
 
 
@@ -165,7 +167,7 @@ class Envelope:
         else:
             limits, reach = self._limits(frame, way, grip, stage, v)
             limits = {name: limit for name, limit in limits.items() if name in set_to.limits}
-        return Allowed(*lowest(limits, set_to.most), grip, reach)
+        return Allowed(*lowest(limits, set_to.most), grip, reach, v)
 
     def _limit_by_rss(self, frame: SensorFrame, way: Way | None, v: float) -> dict[Binding, float]:
         limits = {Binding.TABLE: TABLE_KMH[0] / 3.6}

@@ -73,7 +73,9 @@ class ReadingsRecorder(Sink):
             name, title, units = function.name, function.title, function.units
             sensors[name] = RecordedSensor(name, "function", title, units)
         if self._governed is not None:
-            sensors[ENVELOPE] = RecordedSensor(ENVELOPE, "envelope", "Speed envelope", UNITS)
+            watches = self._governed.settings.watches
+            title = "Speed envelope, watching" if watches else "Speed envelope"
+            sensors[ENVELOPE] = RecordedSensor(ENVELOPE, "envelope", title, UNITS)
         return sensors
 
 

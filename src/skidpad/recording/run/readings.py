@@ -74,8 +74,20 @@ def describe_row(
     for name, value in row.items():
         id, _, quantity = name.rpartition(".")
         if id in sensors and value is not None:
-            told.append((f"{sensors[id].title}, {quantity.replace('_', ' ')}", f"{value:.4g}"))
+            words = name_values(sensors[id], quantity)
+            text = words.get(round(value)) or f"{value:.4g}"
+            told.append((f"{sensors[id].title}, {quantity.replace('_', ' ')}", text))
     return told
+
+
+def name_values(sensor: RecordedSensor, quantity: str) -> dict[int, str]:
+    """Returns the words for the values of a quantity, where the units name them.
+
+    They stand there as "...; quantity: 0 word, 1 other word".
+    """
+    _, _, words = sensor.units.partition(f"{quantity}: ")
+    pairs = (word.split(" ", 1) for word in words.split(";")[0].split(", ") if word)
+    return {int(number): name for number, name in pairs}
 
 
 def write_readings(folder: Path, readings: SensorReadings) -> None:

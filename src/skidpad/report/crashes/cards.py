@@ -23,6 +23,7 @@ from skidpad.report.crashes.causes import (
     is_thrown_back,
     write_cause,
 )
+from skidpad.report.crashes.envelope import describe_allowed, draw_allowed, read_allowed
 from skidpad.report.elements.page import Card, Event, Image
 from skidpad.report.elements.replay import replay
 from skidpad.roads.queries import RoadMap
@@ -68,15 +69,18 @@ def severity(crash: Crash) -> tuple[bool, float, float]:
 def crash_card(crash: Crash, drive: Drive, road_map: RoadMap, run: Path) -> Card:
     """The card of one crash of the run in the folder `run`."""
     story = tell_story(drive, crash)
+    allowed = read_allowed(run, drive.log.dt)
+    sentence = "" if allowed is None else describe_allowed(allowed, crash.t)
     return Card(
         title=headline(crash),
         subtitle=f"{run.name} at {crash.t:.2f} s",
         tags=tags(story),
         facts=facts(crash),
-        cause=write_cause(story),
+        cause=" ".join(filter(None, (write_cause(story), sentence))),
         events=timeline(story),
         images=pictures(run, crash.t),
         replay=replay(drive.log, road_map, drive.row(crash.tick), surface=read_run_surface(run)),
+        charts=[] if allowed is None else draw_allowed(allowed, crash.t),
     )
 
 

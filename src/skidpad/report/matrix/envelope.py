@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import polars as pl
 
-from skidpad.recording.run.readings import RecordedSensor, read_readings
+from skidpad.recording.run.readings import name_values, read_readings
 from skidpad.report.elements.page import Block, Cell, Table
 from skidpad.report.matrix.data import Matrix
 
 TYPE = "envelope"  # of the recorded "sensor" that holds the envelope's columns
-UNKNOWN = 0.1  # confidence below which the prior alone speaks
+UNKNOWN = 0.3  # confidence below which the prior alone speaks
 
 
 def envelope_blocks(matrix: Matrix) -> list[Block]:
@@ -22,7 +22,7 @@ def envelope_blocks(matrix: Matrix) -> list[Block]:
         readings = None if folder is None else read_readings(folder)
         for sensor in () if readings is None else readings.sensors:
             if sensor.type == TYPE and readings is not None:
-                names |= binding_names(sensor)
+                names |= name_values(sensor, "binding")
                 table = readings.table.select(pl.col(f"^{sensor.id}\\..*$").name.map(_quantity))
                 found.setdefault((run["config"], run["weather"]), []).append(table)
     rows = [[*map(Cell, cell), *_row(pl.concat(tables), names)] for cell, tables in found.items()]
@@ -36,17 +36,10 @@ def envelope_blocks(matrix: Matrix) -> list[Block]:
     ]
     columns += [
         ("grip, median", "estimated"),
-        ("prior alone, %", "share of time without information from own signals"),
+        ("prior alone, %", "share of the distance without information from own signals"),
     ]
     title = "What limits the speed of governed stacks, all seeds"
     return [Table(tuple(columns), rows, title)] * bool(rows)
-
-
-def binding_names(sensor: RecordedSensor) -> dict[int, str]:
-    """Returns the names of the limits by number, as the recording says them itself."""
-    _, _, words = sensor.units.partition("binding: ")
-    pairs = (word.split(" ", 1) for word in words.split(", ") if word)
-    return {int(number): name for number, name in pairs}
 
 
 def _quantity(column: str) -> str:
@@ -56,7 +49,9 @@ def _quantity(column: str) -> str:
 def _row(ticks: pl.DataFrame, names: dict[int, str]) -> list[Cell]:
     shares = [_number((ticks["binding"] == number).mean()) * 100.0 for number in names]
     speed = _number(ticks["speed_mps"].mean()) * 3.6
-    alone = _number((ticks["confidence"] < UNKNOWN).mean()) * 100.0
+    way = _number(ticks["ego_mps"].sum())
+    blind = ticks.filter(pl.col("confidence") < UNKNOWN)
+    alone = 100.0 * _number(blind["ego_mps"].sum()) / way if way > 0.0 else 0.0
     grip = _number(ticks["grip"].median())
     cells = [Cell(f"{speed:.0f}", speed), *(Cell(f"{s:.0f}", s) for s in shares)]
     return [*cells, Cell(f"{grip:.2f}", grip), Cell(f"{alone:.0f}", alone)]

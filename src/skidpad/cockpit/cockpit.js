@@ -175,7 +175,9 @@ export default {
     },
     strip(h) {
       const H = this.history; if (H.length && (h.t < H[H.length - 1][0] || h.t - H[H.length - 1][0] > 5)) H.length = 0;
-      H.push([h.t, h.motion.speed_kmh, h.stack.distance]); while (H.length && h.t - H[0][0] > STRIP_SECONDS) H.shift();
+      const envelope = (name) => ((h.added || []).find(([k]) => k.startsWith("Speed envelope") && k.endsWith(`, ${name}`)) || [])[1];
+      const limit = envelope("speed mps") === undefined ? null : 3.6 * envelope("speed mps"), by = envelope("binding");
+      H.push([h.t, h.motion.speed_kmh, h.stack.distance, limit]); while (H.length && h.t - H[0][0] > STRIP_SECONDS) H.shift();
       const c = this.$refs.strip, g = c.getContext("2d"), w = c.width, half = c.height / 2;
       g.clearRect(0, 0, w, c.height); g.font = "12px sans-serif";
       const curve = (i, most, top, ink, name) => { g.strokeStyle = "#303944"; g.strokeRect(0.5, top + 0.5, w - 1, half - 4);
@@ -184,6 +186,7 @@ export default {
           const x = w - (h.t - row[0]) / STRIP_SECONDS * w, y = top + (half - 6) * (1 - Math.min(v / most, 1)) + 1;
           if (pen) g.lineTo(x, y); else g.moveTo(x, y); pen = true; }
         g.stroke(); g.lineWidth = 1; g.fillStyle = ink; g.fillText(name, 6, top + 14); };
+      if (limit !== null) curve(3, 160, 0, "#ff8552", ""), g.fillText(`envelope: ${Math.round(limit)} km/h${by && by !== "none" ? `, ${by}` : ""}`, w - 190, 14);
       curve(1, 160, 0, "#4d9dff", "speed, 0 to 160 km/h"); curve(2, 80, half, "#4fce7f", "distance, 0 to 80 m");
     },
     line(h) {

@@ -29,12 +29,11 @@ from skidpad.evidence.statistics import poisson_interval
 from skidpad.physics.presets import find_weather
 from skidpad.stack.configurations import numbered_driver
 
-MAPS = ("figure8", "motorway")
+PLACES = (("figure8", "winter"), ("motorway", "winter"), ("figure8", "summer"))  # maps and tyres
 WEATHERS = ("clear-noon", "rain-noon", "snow", "icy_100")
 LAWS = {"no law": False, "falls with the surface": True}
 SHARES = (0.7, 1.0, 1.3)
-TYRES = ("winter", "summer")
-FIRST_SEED, DURATION = 9101, 90.0
+FIRST_SEED, DURATION = 9101, 60.0
 ICE = 0.13  # share of the friction that a patch leaves: ice under a dry sky
 PATCHES = (150.0, 60.0)  # m from one patch to the next, and their length
 
@@ -58,7 +57,7 @@ def patches_on(map_name: str) -> tuple[SurfacePatch, ...]:
 def drives(seeds: int) -> Iterator[tuple[str, str, str, Estimates]]:
     """Yields law, surface, design stiffness and estimates of every drive."""
     cells = [(w, w, ()) for w in WEATHERS]
-    for map_name, (law, changes), tyres in product(MAPS, LAWS.items(), TYRES):
+    for (map_name, tyres), (law, changes) in product(PLACES, LAWS.items()):
         here = [*cells, ("patches of ice", "clear-noon", patches_on(map_name))]
         for (name, weather, surface), seed in product(here, range(seeds)):
             settings = load_profile("recommended", {"tyre_stiffness": changes, "tyres": tyres})

@@ -20,6 +20,7 @@ from typing import Any
 import polars as pl
 import yaml
 
+import result_envelope
 import result_grip
 import result_matrix
 from result_texts import verdict_rows
@@ -35,7 +36,7 @@ PLAN = RESULTS / "preregistration.yaml"
 CLAIMS = RESULTS / "claims.md"
 REFERENCE = "matrix-figure8"  # what others on the same seeds are held against
 MATRICES = (REFERENCE, "matrix-motorway", "matrix-foreign", "matrix-pixels-two")
-PAGES = ("docs/matrix.md", "docs/grip.md")
+PAGES = ("docs/matrix.md", "docs/grip.md", "docs/envelope-proof.md")
 BLOCK = re.compile(r"(<!-- results: (\S+) (\S+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
 
@@ -103,6 +104,8 @@ def block(name: str, which: str, folder: Path) -> str:
             [path.with_name(name) for name in MATRICES]
         ),
         "adas against": lambda path: result_matrix.against(path.with_name(REFERENCE), path),
+        "adas envelope": result_envelope.rivals,
+        "adas pareto": result_envelope.pareto,
         "grip completion": result_grip.completion,
         "grip claims": result_grip.claims,
         "grip thresholds": result_grip.thresholds,

@@ -1,0 +1,84 @@
+"""Tables of the envelope's proof, made of results that are known, and how far it must be driven."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+
+import envelope_power as power  # noqa: E402
+import result_envelope as proof  # noqa: E402
+
+SEEDS = range(1, 13)
+
+
+def write_runs(folder: Path, contacts: dict[str, int], speed: float = 40.0) -> None:
+    """Twelve seeds of 5 km for each configuration, with so many contacts in each run."""
+    rows = [
+        {
+            "config": config, "weather": weather, "seed": seed, "distance_km": 5.0,
+            "mean_speed_kmh": speed + seed % 3, "serious_contacts": n if weather == "snow" else 0,
+            "road_departures": 0, "rear_ended": 1,
+        }
+        for config, n in contacts.items()
+        for weather in ("snow", "clear-noon")
+        for seed in SEEDS
+    ]  # fmt: skip
+    folder.mkdir(parents=True)
+    pl.DataFrame(rows).write_parquet(folder / "results.parquet")
+
+
+def rows_of(text: str, weather: str) -> dict[str, list[str]]:
+    rows = [[c.strip() for c in line.strip("|\n").split("|")] for line in text.splitlines()]
+    return {row[1]: row for row in rows if row[0] == weather}
+
+
+def test_a_factor_is_printed_only_where_the_bare_stack_has_30_events(tmp_path):
+    write_runs(tmp_path / "envelope-figure8", {"3": 3, "5": 0})
+    snow = rows_of(proof.rivals(tmp_path / "envelope-figure8"), "snow")
+    dry = rows_of(proof.rivals(tmp_path / "envelope-figure8"), "clear-noon")
+    assert snow["bare"][6].startswith("60.0 (")
+    assert snow["envelope"][7] == f"above {power.factor_bound(36, 0):.1f}"
+    assert dry["envelope"][7] == "too few (0)"
+
+
+def test_rivals_lie_beside_and_the_table_is_tested_by_seed(tmp_path):
+    write_runs(tmp_path / "envelope-figure8", {"3": 3, "5": 0})
+    write_runs(tmp_path / "envelope-figure8-table", {"3": 2})
+    snow = rows_of(proof.rivals(tmp_path / "envelope-figure8"), "snow")
+    dry = rows_of(proof.rivals(tmp_path / "envelope-figure8"), "clear-noon")
+    assert float(snow["envelope"][9]) < 0.05
+    assert float(dry["envelope"][9]) == 1.0
+    assert snow["table of three speeds"][4] == "24"
+
+
+def test_the_picture_has_every_driver(tmp_path):
+    folder = tmp_path / "envelope-figure8"
+    write_runs(folder, {"3": 3, "4": 2, "5": 0})
+    assert "pareto.svg" in proof.pareto(folder)
+    svg = (folder / "pareto.svg").read_text(encoding="utf-8")
+    assert all(name in svg for name in ("bare", "fixed 80 km/h", "envelope"))
+
+
+@pytest.mark.parametrize(
+    ("bare", "governed", "low", "high"), [(30, 3, 3.9, 4.2), (10, 10, 0.4, 0.5)]
+)
+def test_the_bound_of_a_factor_is_the_exact_one(bare, governed, low, high):
+    assert low < power.factor_bound(bare, governed) < high
+
+
+def test_more_events_or_a_larger_effect_need_less_distance():
+    rare, often = (power.chance_to_show(rate, 200.0, 10.0, 3.0) for rate in (5.0, 30.0))
+    assert rare < 0.8 < often
+    assert power.chance_to_show(12.0, 200.0, 3.0, 3.0) <= 0.06, "its level holds"
+
+
+def test_the_page_has_the_table_of_the_power():
+    page = (ROOT / "docs" / "envelope-proof.md").read_text(encoding="utf-8")
+    assert "| 30 | 100 | 126 | 142 |" in page
+    assert power.needed_km(30.0, 10.0, 3.0) == pytest.approx(126.0, abs=0.5)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import polars as pl
 import pytest
+from scipy import stats
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
@@ -65,11 +66,11 @@ def test_the_picture_has_every_driver(tmp_path):
     assert all(name in svg for name in ("bare", "fixed 80 km/h", "envelope"))
 
 
-@pytest.mark.parametrize(
-    ("bare", "governed", "low", "high"), [(30, 3, 3.9, 4.2), (10, 10, 0.4, 0.5)]
-)
-def test_the_bound_of_a_factor_is_the_exact_one(bare, governed, low, high):
-    assert low < power.factor_bound(bare, governed) < high
+@pytest.mark.parametrize(("bare", "governed"), [(30, 3), (10, 10), (36, 0)])
+def test_at_the_bound_of_a_factor_as_many_bare_events_have_a_chance_of_5_percent(bare, governed):
+    bound = power.factor_bound(bare, governed)
+    chance = stats.binom.sf(bare - 1, bare + governed, bound / (1.0 + bound))
+    assert chance == pytest.approx(power.LEVEL, rel=1e-6)
 
 
 def test_more_events_or_a_larger_effect_need_less_distance():

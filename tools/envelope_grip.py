@@ -29,7 +29,7 @@ from skidpad.evidence.statistics import poisson_interval
 from skidpad.physics.presets import find_weather
 from skidpad.stack.configurations import numbered_driver
 
-PLACES = (("figure8", "winter"), ("motorway", "winter"), ("figure8", "summer"))  # maps and tyres
+PLACES = (("figure8", "winter"), ("motorway", "summer"))  # maps and tyres
 WEATHERS = ("clear-noon", "rain-noon", "snow", "icy_100")
 LAWS = {"no law": False, "falls with the surface": True}
 SHARES = (0.7, 1.0, 1.3)

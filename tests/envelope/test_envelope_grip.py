@@ -56,6 +56,13 @@ def test_a_car_that_gets_an_eighth_of_what_its_throttle_asks_for_is_at_its_limit
     assert grip.confidence > 0.3
 
 
+def test_an_engine_that_gives_a_third_less_than_its_data_sheet_is_no_ice():
+    """On a dry road wheels slip with the force, too, and no more than the force needs."""
+    estimator = GripEstimator(DT)
+    grip = drive_off(estimator, 0.9, use=0.08, drive=1.5, ticks=400, v=15.0)
+    assert grip.value > 0.6
+
+
 def test_full_brake_on_ice_shows_its_grip_within_a_second():
     estimator, v, mu = GripEstimator(DT), 20.0, 0.12
     for _ in range(40):

@@ -26,6 +26,7 @@ SHORT, SHORT_LEAST, ASK_LEAST = (
     0.6,
 )  # share, m/s^2 that are missing, m/s^2 asked at least
 BLUNT, BLUNT_ASK = 0.5, 1.5  # share and m/s^2, for which wheels need not slip for sure
+SLIPPING = 1.6  # times the slip that the force would need far from the limit
 SLIP_LEAST = 0.004  # of wheels at their limit, beyond its error
 USED_AT_LIMIT, LIMIT_SPREAD = 0.93, 0.12  # of the grip that controls take; relative error of that
 LIMIT_LEAST = 0.04  # of the load; a car that gets less has an engine that drags or rolls
@@ -202,7 +203,9 @@ class GripEstimator:
         short = 0.0 < got < SHORT * abs(asked) and abs(asked) - got > SHORT_LEAST
         # so little that neither engine nor brakes can be the cause
         is_blunt = got < BLUNT * abs(asked) and abs(asked) > BLUNT_ASK and slip > -SLIP_LEAST
-        found = steady and short and (is_blunt or slip > SLIP_LEAST) and along > LIMIT_LEAST
+        linear = along * self.belief.softness / self.stiffness  # slip far from the limit
+        slips = slip > max(SLIP_LEAST, SLIPPING * linear)
+        found = steady and short and (is_blunt or slips) and along > LIMIT_LEAST
         if found:
             self.belief.see_limit(along / USED_AT_LIMIT, LIMIT_SPREAD)
         return found

@@ -69,7 +69,7 @@ def severity(crash: Crash) -> tuple[bool, float, float]:
 def crash_card(crash: Crash, drive: Drive, road_map: RoadMap, run: Path) -> Card:
     """The card of one crash of the run in the folder `run`."""
     story = tell_story(drive, crash)
-    allowed = read_allowed(run, drive.log.dt)
+    allowed = read_allowed(run, drive.log.header.dt)
     sentence = "" if allowed is None else describe_allowed(allowed, crash.t)
     return Card(
         title=headline(crash),

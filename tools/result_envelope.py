@@ -64,10 +64,11 @@ def rivals(folder: Path) -> str:
         for name, runs in drivers.items():
             km, n = float(runs["distance_km"].sum()), events(runs)
             limits = poisson_interval(n, km / 100.0)
-            speed = mean_limits(runs["mean_speed_kmh"])
+            speeds = runs["mean_speed_kmh"].to_numpy()
+            speed, mean = mean_limits(speeds), float(speeds.mean())
             pm = "" if speed is None else f" ({speed.low:.1f} to {speed.high:.1f})"
             rows.append(
-                [weather, name, f"{runs['mean_speed_kmh'].mean():.1f}{pm}", f"{km:.0f}",
+                [weather, name, f"{mean:.1f}{pm}", f"{km:.0f}",
                  str(runs["serious_contacts"].sum()), str(runs["road_departures"].sum()),
                  f"{100.0 * n / km:.1f} ({limits.low:.1f} to {limits.high:.1f})",
                  factor_text(bare, n) if name == ENVELOPE else "",

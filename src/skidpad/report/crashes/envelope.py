@@ -9,12 +9,12 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from skidpad.core.geometry import kmh_from_mps
 from skidpad.recording.run.readings import name_values, read_readings
 from skidpad.report.elements.figures import PALETTE, canvas, svg_of
 from skidpad.report.elements.page import Figure
 
 TYPE, WATCHING = "envelope", "watching"  # type of the recorded "sensor", and word of its title
+KMH = 3.6  # per m/s
 BEFORE, SHOWN = 5.0, 10.0  # s before a crash that the sentence and the chart are about
 ABOVE = 1.0  # km/h above the limit that count
 
@@ -49,7 +49,7 @@ def read_allowed(run: Path, dt: float) -> AllowedSpeeds | None:
     words = tuple(names.get(round(float(b)), "") for b in binding)
     watching = WATCHING in sensor.title
     t = table["tick"].cast(pl.Float64).to_numpy() * dt
-    return AllowedSpeeds(t, kmh_from_mps(limit), kmh_from_mps(v), words, watching)
+    return AllowedSpeeds(t, KMH * limit, KMH * v, words, watching)
 
 
 def describe_allowed(allowed: AllowedSpeeds, t: float) -> str:

@@ -8,8 +8,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from skidpad.simulation.carla_server.catalogue import Family, load_catalogue
-from skidpad.simulation.carla_server.effects import acting, is_produced, load_acting
+from skidpad.simulation.carla_server.actors.catalogue import Family, load_catalogue
+from skidpad.simulation.carla_server.actors.effects import acting, is_produced, load_acting
 from skidpad.simulation.carla_server.methods import TABLES
 
 BEGIN, END = "<!-- coverage: generated -->", "<!-- end of coverage -->"

@@ -143,29 +143,29 @@ def renewed() -> Any:
 @cache
 def served() -> Any:
     from skidpad.simulation.carla_server.options import ServerOptions
+    from skidpad.simulation.carla_server.protocol.streams import StreamHub
     from skidpad.simulation.carla_server.served import Served
-    from skidpad.simulation.carla_server.streams import StreamHub
 
     logging.getLogger("skidpad.carla_server").setLevel(logging.CRITICAL)
     return Served(ServerOptions(map="figure8"), StreamHub())
 
 
 def call(world: Any, name: str, *arguments: Any) -> bytes:
-    from skidpad.simulation.carla_server.codec import Request
+    from skidpad.simulation.carla_server.protocol.codec import Request
 
     return dispatcher(world).answer(Request(1, name, list(arguments), True))
 
 
 def dispatcher(world: Any) -> Any:
     from skidpad.simulation.carla_server.methods import TABLES
-    from skidpad.simulation.carla_server.rpc import Dispatcher
+    from skidpad.simulation.carla_server.protocol.rpc import Dispatcher
 
     return Dispatcher(world, TABLES)
 
 
 def actors_of(world: Any) -> dict[str, int]:
-    from skidpad.simulation.carla_server.actors import Attachment
-    from skidpad.simulation.carla_server.catalogue import Family
+    from skidpad.simulation.carla_server.actors.catalogue import Family
+    from skidpad.simulation.carla_server.actors.registry import Attachment
     from skidpad.simulation.carla_server.episode import Wanted
 
     episode = world.episode
@@ -179,7 +179,7 @@ def actors_of(world: Any) -> dict[str, int]:
 
 def answer_calls(path: Path) -> object:
     """Each call is answered, none by an internal error, and the world goes on."""
-    from skidpad.simulation.carla_server.codec import Decoder, Request
+    from skidpad.simulation.carla_server.protocol.codec import Decoder, Request
 
     world = renewed()
     ids = actors_of(world)
@@ -200,7 +200,7 @@ def _with_ids(value: Any, ids: dict[str, int]) -> Any:
 
 
 def decode_calls(path: Path) -> object:
-    from skidpad.simulation.carla_server.codec import Decoder
+    from skidpad.simulation.carla_server.protocol.codec import Decoder
 
     return list(Decoder().feed(path.read_bytes()))
 

@@ -56,8 +56,8 @@ def read_inputs(path: Path) -> object:
 @cache
 def served() -> Any:
     from skidpad.simulation.carla_server.options import ServerOptions
+    from skidpad.simulation.carla_server.protocol.streams import StreamHub
     from skidpad.simulation.carla_server.served import Served
-    from skidpad.simulation.carla_server.streams import StreamHub
 
     return Served(ServerOptions(map="straight"), StreamHub())
 
@@ -65,7 +65,7 @@ def served() -> Any:
 @cache
 def replays() -> list[bytes]:
     from skidpad.simulation.carla_server.episode import Wanted
-    from skidpad.simulation.carla_server.recorder import Recorder
+    from skidpad.simulation.carla_server.recording.recorder import Recorder
 
     world = served()
     car = world.episode.spawn(Wanted("vehicle.tesla.model3", {}), world.episode.map.spawn_points[0])
@@ -81,8 +81,8 @@ def replays() -> list[bytes]:
 
 def replay(path: Path) -> object:
     """Summed up, and replayed for some ticks."""
-    from skidpad.simulation.carla_server.recorder import Recorder
-    from skidpad.simulation.carla_server.replayer import PLAYED, Replayer
+    from skidpad.simulation.carla_server.recording.recorder import Recorder
+    from skidpad.simulation.carla_server.recording.replayer import PLAYED, Replayer
 
     recorder, player = Recorder(path.parent), Replayer()
     recorder.summary(path.name, show_all=True)

@@ -7,7 +7,7 @@ import pytest
 
 msgpack = pytest.importorskip("msgpack", reason="needs the extra server")
 
-from skidpad.simulation.carla_server.codec import Decoder, ProtocolError, Request  # noqa: E402
+from skidpad.simulation.carla_server.protocol.codec import Decoder, ProtocolError, Request  # noqa: E402
 
 ARRAY_32 = b"\xdd"
 

@@ -25,7 +25,7 @@ from skidpad.scenery.free_ground import outlines_of
 from skidpad.scenery.sides import RoadKind, sides_of
 from skidpad.scenery.sight import sight_triangles
 from skidpad.scenery.signs import LOWER_EDGE, signs_of
-from skidpad.simulation.carla_server.maps import spawn_points
+from skidpad.simulation.carla_server.maps.maps import spawn_points
 from skidpad.simulation.world.actors import PAINT_SHARES, PALETTE, Role, draw_paint
 
 MAPS = (*bundled_maps(), "Town01", "Town02", "Town04", "Town07", "Town10HD")

@@ -20,7 +20,7 @@ def carla_server(options: ServerOptions) -> None:
         import msgpack  # noqa: F401
     except ModuleNotFoundError as error:
         raise MissingExtra("skidpad carla-server", "server") from error
-    from skidpad.simulation.carla_server.maps import MapStore
+    from skidpad.simulation.carla_server.maps.maps import MapStore
 
     require_choice("--map", options.map.rsplit("/", 1)[-1], MapStore(options.maps).names())
     from skidpad.simulation.carla_server.server import CarlaServer, Ports

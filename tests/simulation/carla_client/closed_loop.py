@@ -27,8 +27,8 @@ from skidpad.simulation.backend import Backend
 from skidpad.simulation.carla.backend import CarlaBackend
 from skidpad.simulation.carla.blueprints import STANDS_FOR
 from skidpad.simulation.carla.options import CarlaOptions
-from skidpad.simulation.carla_server.catalogue import load_catalogue
-from skidpad.simulation.carla_server.vehicles import model_of
+from skidpad.simulation.carla_server.actors.catalogue import load_catalogue
+from skidpad.simulation.carla_server.vehicles.vehicles import model_of
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 
 SECONDS = 90.0

@@ -18,8 +18,8 @@ from skidpad.roads.bundled import load_map
 from skidpad.simulation.backend import Backend
 from skidpad.simulation.carla.backend import CarlaBackend
 from skidpad.simulation.carla.options import CarlaOptions
-from skidpad.simulation.carla_server.catalogue import load_catalogue
-from skidpad.simulation.carla_server.vehicles import model_of
+from skidpad.simulation.carla_server.actors.catalogue import load_catalogue
+from skidpad.simulation.carla_server.vehicles.vehicles import model_of
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.simulation.world.ground import NOISE_SALT, ROAD_NOISE
 from skidpad.simulation.world.traffic.path import uniform

@@ -13,8 +13,8 @@ import pytest
 from carla_preface import PREFACE
 from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.process import ServerProcess
+from skidpad.simulation.carla_server.protocol.streams import StreamHub
 from skidpad.simulation.carla_server.served import Served
-from skidpad.simulation.carla_server.streams import StreamHub
 
 CLIENT_LIMIT = 600.0  # s
 

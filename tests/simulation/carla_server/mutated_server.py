@@ -8,7 +8,8 @@ from dataclasses import replace
 from typing import Any
 
 from skidpad.core.geometry import Pose
-from skidpad.simulation.carla_server import filling, wire
+from skidpad.simulation.carla_server import filling
+from skidpad.simulation.carla_server.protocol import wire
 from skidpad.simulation.carla_server.sensing import inertial, pixels, points
 
 Function = Callable[..., Any]

@@ -12,8 +12,8 @@ import msgpack
 import pytest
 
 from skidpad.simulation.carla_server import server as module
-from skidpad.simulation.carla_server import streams
 from skidpad.simulation.carla_server.options import ServerOptions
+from skidpad.simulation.carla_server.protocol import streams
 from skidpad.simulation.carla_server.server import CarlaServer, Ports
 
 Scene = Callable[[CarlaServer, Ports], Awaitable[None]]

@@ -7,8 +7,14 @@ from math import pi
 import pytest
 
 from skidpad.core.geometry import Pose
-from skidpad.simulation.carla_server.bones import NAMES, ROOT, SKELETON, Skeleton, parse_bones
-from skidpad.simulation.carla_server.wire import WireError
+from skidpad.simulation.carla_server.actors.bones import (
+    NAMES,
+    ROOT,
+    SKELETON,
+    Skeleton,
+    parse_bones,
+)
+from skidpad.simulation.carla_server.protocol.wire import WireError
 
 
 def test_every_bone_hangs_on_one_before_it():

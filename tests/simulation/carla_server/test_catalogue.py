@@ -3,14 +3,14 @@ from __future__ import annotations
 import pytest
 
 from skidpad.core.vocabulary import ActorKind
-from skidpad.simulation.carla_server.catalogue import (
+from skidpad.simulation.carla_server.actors.catalogue import (
     AttributeType,
     Family,
     choose_attributes,
     load_catalogue,
 )
-from skidpad.simulation.carla_server.vehicles import model_of
-from skidpad.simulation.carla_server.wire import WireError
+from skidpad.simulation.carla_server.protocol.wire import WireError
+from skidpad.simulation.carla_server.vehicles.vehicles import model_of
 
 
 def test_the_catalogue_has_what_a_0_9_16_server_was_seen_to_offer() -> None:

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from skidpad.simulation.carla_server import codec
-from skidpad.simulation.carla_server.codec import Decoder, ProtocolError, Request
+from skidpad.simulation.carla_server.protocol import codec
+from skidpad.simulation.carla_server.protocol.codec import Decoder, ProtocolError, Request
 
 
 def decoded(data: bytes) -> list[Request]:

@@ -3,8 +3,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from carla_coverage import rewritten
-from skidpad.simulation.carla_server.catalogue import Family, load_catalogue
-from skidpad.simulation.carla_server.effects import Remarks, load_acting
+from skidpad.simulation.carla_server.actors.catalogue import Family, load_catalogue
+from skidpad.simulation.carla_server.actors.effects import Remarks, load_acting
 from skidpad.simulation.carla_server.sensing.producers import PRODUCERS
 
 PAGE = Path(__file__).parents[3] / "docs" / "carla.md"

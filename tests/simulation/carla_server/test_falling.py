@@ -12,11 +12,11 @@ import pytest
 from skidpad.core.constants import G
 from skidpad.core.geometry import Pose
 from skidpad.simulation.carla_server.episode import Wanted
-from skidpad.simulation.carla_server.falling import ground_below
 from skidpad.simulation.carla_server.methods import motion
 from skidpad.simulation.carla_server.options import ServerOptions
+from skidpad.simulation.carla_server.protocol.streams import StreamHub
 from skidpad.simulation.carla_server.served import Served
-from skidpad.simulation.carla_server.streams import StreamHub
+from skidpad.simulation.carla_server.vehicles.falling import ground_below
 
 CAR, WALKER = "vehicle.tesla.model3", "walker.pedestrian.0001"
 DT = 0.05

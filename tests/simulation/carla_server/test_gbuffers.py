@@ -8,11 +8,11 @@ from test_served import Kept
 
 from skidpad.core.geometry import Pose
 from skidpad.sensors.raster.view import View
-from skidpad.simulation.carla_server.actors import Attachment
+from skidpad.simulation.carla_server.actors.registry import Attachment
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.methods import episode as methods
 from skidpad.simulation.carla_server.options import ServerOptions
-from skidpad.simulation.carla_server.rpc import CallError
+from skidpad.simulation.carla_server.protocol.rpc import CallError
 from skidpad.simulation.carla_server.sensing.gbuffers import FARTHEST, Texture
 from skidpad.simulation.carla_server.sensing.normals import camera_normals
 from skidpad.simulation.carla_server.sensing.occlusion import RADIUS, ambient_occlusion

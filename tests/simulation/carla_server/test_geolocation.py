@@ -7,7 +7,7 @@ import re
 import pytest
 
 from skidpad.roads.bundled import load_map, map_file
-from skidpad.simulation.carla_server.maps import ServedMap
+from skidpad.simulation.carla_server.maps.maps import ServedMap
 
 carla = pytest.importorskip("carla")
 PLACES = ((0.0, 0.0), (1450.0, -300.0), (-3000.0, 2000.0), (20_000.0, 40_000.0))

@@ -8,11 +8,11 @@ import pytest
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import LightState
 from skidpad.roads.lanes import SignalKind
-from skidpad.simulation.carla_server.actors import Actor
+from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.options import ServerOptions
+from skidpad.simulation.carla_server.protocol.streams import StreamHub
 from skidpad.simulation.carla_server.served import Served
-from skidpad.simulation.carla_server.streams import StreamHub
 
 CAR = "vehicle.tesla.model3"
 STOP_ROAD, STOP_JUNCTION = 1, 9001  # a road that ends with a stop sign at a road that goes on

@@ -9,12 +9,12 @@ from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import Scenery, SemanticClass
 from skidpad.roads.bundled import load_map, map_file
 from skidpad.sensors.ranging.around import Fan, look_around
-from skidpad.simulation.carla_server import scenery
 from skidpad.simulation.carla_server.episode import Wanted
-from skidpad.simulation.carla_server.landscape import Landscape, objects, pieces, without
+from skidpad.simulation.carla_server.maps import scenery
+from skidpad.simulation.carla_server.maps.landscape import Landscape, objects, pieces, without
 from skidpad.simulation.carla_server.options import ServerOptions
+from skidpad.simulation.carla_server.protocol.streams import StreamHub
 from skidpad.simulation.carla_server.served import Served
-from skidpad.simulation.carla_server.streams import StreamHub
 from skidpad.simulation.world.obstacles import obstacles
 
 FENCE, WALL = SemanticClass.FENCE, SemanticClass.WALL

@@ -8,7 +8,7 @@ from test_served import Kept
 
 from skidpad.core.geometry import Pose
 from skidpad.sensors.raster.view import View, world_to_camera
-from skidpad.simulation.carla_server.actors import Attachment
+from skidpad.simulation.carla_server.actors.registry import Attachment
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.sensing.events_camera import EVENT, Retina, crossings

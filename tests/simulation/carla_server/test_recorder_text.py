@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from skidpad.simulation.carla_server.recorder_text import (
+from skidpad.simulation.carla_server.recording.recorder_text import (
     describe_recording,
     list_blocked,
     list_collisions,

@@ -10,10 +10,10 @@ import pytest
 
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.options import ServerOptions
-from skidpad.simulation.carla_server.replayer import CarlaRecording
-from skidpad.simulation.carla_server.rpc import CallError
+from skidpad.simulation.carla_server.protocol.rpc import CallError
+from skidpad.simulation.carla_server.protocol.streams import StreamHub
+from skidpad.simulation.carla_server.recording.replayer import CarlaRecording
 from skidpad.simulation.carla_server.served import Served
-from skidpad.simulation.carla_server.streams import StreamHub
 
 TICKS = 20
 NAME = "drive.log"

@@ -13,9 +13,9 @@ from skidpad.physics.types import TIRE_FRICTION_REFERENCE
 from skidpad.simulation.carla.grip import V_RATIO
 from skidpad.simulation.carla_server.episode import Episode, Wanted
 from skidpad.simulation.carla_server.options import ServerOptions
+from skidpad.simulation.carla_server.protocol.streams import StreamHub
 from skidpad.simulation.carla_server.served import Served
-from skidpad.simulation.carla_server.streams import StreamHub
-from skidpad.simulation.carla_server.vehicles import Vehicle
+from skidpad.simulation.carla_server.vehicles.vehicles import Vehicle
 from skidpad.simulation.carla_server.weather import PACKED
 
 MU_REF = 0.9

@@ -6,9 +6,9 @@ from typing import Any
 import msgpack
 import pytest
 
-from skidpad.simulation.carla_server.codec import Request
 from skidpad.simulation.carla_server.methods import TABLES
-from skidpad.simulation.carla_server.rpc import CallError, Dispatcher, Shape, Table
+from skidpad.simulation.carla_server.protocol.codec import Request
+from skidpad.simulation.carla_server.protocol.rpc import CallError, Dispatcher, Shape, Table
 from skidpad.simulation.carla_server.served import Served
 
 

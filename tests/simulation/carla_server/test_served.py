@@ -10,15 +10,16 @@ import pytest
 from shapely.errors import GEOSException
 
 from skidpad.core.geometry import Pose
-from skidpad.simulation.carla_server import maps, wire
-from skidpad.simulation.carla_server.actors import Actor, Attachment
-from skidpad.simulation.carla_server.control import Control
+from skidpad.simulation.carla_server.actors.registry import Actor, Attachment
 from skidpad.simulation.carla_server.episode import Wanted
+from skidpad.simulation.carla_server.maps import maps
 from skidpad.simulation.carla_server.options import ServerOptions
-from skidpad.simulation.carla_server.rpc import CallError
+from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.protocol.rpc import CallError
+from skidpad.simulation.carla_server.protocol.streams import StreamHub
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.snapshot import HEADER
-from skidpad.simulation.carla_server.streams import StreamHub
+from skidpad.simulation.carla_server.vehicles.control import Control
 
 CAR = "vehicle.tesla.model3"
 

@@ -5,8 +5,13 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
-from skidpad.simulation.carla_server import streams
-from skidpad.simulation.carla_server.streams import EPISODE_STREAM, TOKEN, StreamHub, canonical
+from skidpad.simulation.carla_server.protocol import streams
+from skidpad.simulation.carla_server.protocol.streams import (
+    EPISODE_STREAM,
+    TOKEN,
+    StreamHub,
+    canonical,
+)
 
 
 class Wire:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from skidpad.simulation.carla_server.actors.touches import touches
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.served import Served
-from skidpad.simulation.carla_server.touches import touches
 
 V = 10.0  # m/s
 AHEAD = 12.0  # m

@@ -12,7 +12,7 @@ import pytest
 from test_served import Kept
 
 from skidpad.core.geometry import Pose
-from skidpad.simulation.carla_server.actors import Attachment, Box
+from skidpad.simulation.carla_server.actors.registry import Attachment, Box
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.sensing import cam

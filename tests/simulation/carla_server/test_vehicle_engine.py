@@ -11,8 +11,14 @@ from msgspec import structs
 from skidpad.core.constants import G
 from skidpad.core.geometry import Pose
 from skidpad.physics.types import vehicle_type
-from skidpad.simulation.carla_server.catalogue import load_catalogue
-from skidpad.simulation.carla_server.engine import (
+from skidpad.simulation.carla_server.actors.catalogue import load_catalogue
+from skidpad.simulation.carla_server.episode import Wanted
+from skidpad.simulation.carla_server.methods.vehicles import get_telemetry_data
+from skidpad.simulation.carla_server.options import ServerOptions
+from skidpad.simulation.carla_server.protocol.streams import StreamHub
+from skidpad.simulation.carla_server.protocol.wire import WireError
+from skidpad.simulation.carla_server.served import Served
+from skidpad.simulation.carla_server.vehicles.engine import (
     RPM,
     Traction,
     at_wheels,
@@ -22,19 +28,13 @@ from skidpad.simulation.carla_server.engine import (
     revolutions,
     shift_speeds,
 )
-from skidpad.simulation.carla_server.episode import Wanted
-from skidpad.simulation.carla_server.methods.vehicles import get_telemetry_data
-from skidpad.simulation.carla_server.options import ServerOptions
-from skidpad.simulation.carla_server.physics_control import (
+from skidpad.simulation.carla_server.vehicles.physics_control import (
     PhysicsControl,
     apply_control,
     parse_physics,
     with_engine,
 )
-from skidpad.simulation.carla_server.served import Served
-from skidpad.simulation.carla_server.streams import StreamHub
-from skidpad.simulation.carla_server.vehicles import model_of
-from skidpad.simulation.carla_server.wire import WireError
+from skidpad.simulation.carla_server.vehicles.vehicles import model_of
 
 MODELS = [model_of(b) for id, b in load_catalogue().items() if id.startswith("vehicle.")]
 MINI = vehicle_type("mini_cooper_s")

@@ -10,8 +10,8 @@ from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.grip import grip_params
 from skidpad.roads.bundled import load_map
-from skidpad.simulation.carla_server.catalogue import load_catalogue
-from skidpad.simulation.carla_server.vehicles import STICKY_SPEED, Vehicles
+from skidpad.simulation.carla_server.actors.catalogue import load_catalogue
+from skidpad.simulation.carla_server.vehicles.vehicles import STICKY_SPEED, Vehicles
 from skidpad.simulation.world.lights import Lights
 from skidpad.simulation.world.world import Conditions, World
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from skidpad.core.setup import DT
-from skidpad.simulation.carla_server import wire
+from skidpad.simulation.carla_server.protocol import wire
 
 SHORTEST_STEP = 1.0e-4  # s
 LONGEST_STEP = 10.0  # s

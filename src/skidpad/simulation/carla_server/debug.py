@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from skidpad.simulation.carla_server import wire
+from skidpad.simulation.carla_server.protocol import wire
 
 KINDS = ("point", "line", "arrow", "box", "text", "hud point", "hud line", "hud arrow", "hud box")
 MOST = 10_000

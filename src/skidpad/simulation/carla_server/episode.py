@@ -8,38 +8,39 @@ from itertools import count
 
 from skidpad.core.geometry import Pose
 from skidpad.sensors.raster.live_scene import scene_of
-from skidpad.simulation.carla_server import filling, shapes
-from skidpad.simulation.carla_server.actors import SOLID, Actor, ActorTable, Attachment
-from skidpad.simulation.carla_server.bones import Skeleton
-from skidpad.simulation.carla_server.catalogue import (
+from skidpad.simulation.carla_server import filling
+from skidpad.simulation.carla_server.actors import shapes
+from skidpad.simulation.carla_server.actors.bones import Skeleton
+from skidpad.simulation.carla_server.actors.catalogue import (
     Blueprint,
     Family,
     choose_attributes,
     make_catalogue,
 )
-from skidpad.simulation.carla_server.clock import Clock
-from skidpad.simulation.carla_server.debug import DebugShapes
-from skidpad.simulation.carla_server.effects import Remarks
-from skidpad.simulation.carla_server.falling import DROP, Falling, ground_below
-from skidpad.simulation.carla_server.giving_way import GivingWay
-from skidpad.simulation.carla_server.landscape import ALL_LAYERS, Landscape
-from skidpad.simulation.carla_server.map_actors import (
+from skidpad.simulation.carla_server.actors.effects import Remarks
+from skidpad.simulation.carla_server.actors.map_actors import (
     light_actor,
     sign_actor,
     signs_of,
     spectator,
 )
-from skidpad.simulation.carla_server.maps import ServedMap
+from skidpad.simulation.carla_server.actors.posts import Posts, posts_of
+from skidpad.simulation.carla_server.actors.registry import SOLID, Actor, ActorTable, Attachment
+from skidpad.simulation.carla_server.actors.walkers import WalkerControl
+from skidpad.simulation.carla_server.clock import Clock
+from skidpad.simulation.carla_server.debug import DebugShapes
+from skidpad.simulation.carla_server.maps.landscape import ALL_LAYERS, Landscape
+from skidpad.simulation.carla_server.maps.maps import ServedMap
 from skidpad.simulation.carla_server.options import ServerOptions
-from skidpad.simulation.carla_server.posts import Posts, posts_of
-from skidpad.simulation.carla_server.rpc import CallError
+from skidpad.simulation.carla_server.protocol.rpc import CallError
+from skidpad.simulation.carla_server.protocol.streams import StreamHub
 from skidpad.simulation.carla_server.sensing.producers import PRODUCERS
 from skidpad.simulation.carla_server.sensing.sensors import SensorSet
 from skidpad.simulation.carla_server.sensing.surroundings import Surroundings
 from skidpad.simulation.carla_server.snapshot import Rows
-from skidpad.simulation.carla_server.streams import StreamHub
-from skidpad.simulation.carla_server.vehicles import Vehicles
-from skidpad.simulation.carla_server.walkers import WalkerControl
+from skidpad.simulation.carla_server.vehicles.falling import DROP, Falling, ground_below
+from skidpad.simulation.carla_server.vehicles.giving_way import GivingWay
+from skidpad.simulation.carla_server.vehicles.vehicles import Vehicles
 from skidpad.simulation.carla_server.weather import Sky
 from skidpad.simulation.world.ground import ground_height
 from skidpad.simulation.world.lights import Lights

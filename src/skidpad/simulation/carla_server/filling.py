@@ -13,13 +13,13 @@ from skidpad.core.lefthanded import (
     vectors_to_carla,
 )
 from skidpad.core.vocabulary import LightState
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.actors import Actor, ActorTable
-from skidpad.simulation.carla_server.catalogue import Family
-from skidpad.simulation.carla_server.posts import Posts
+from skidpad.simulation.carla_server.actors.catalogue import Family
+from skidpad.simulation.carla_server.actors.posts import Posts
+from skidpad.simulation.carla_server.actors.registry import Actor, ActorTable
+from skidpad.simulation.carla_server.actors.walkers import WalkerControl
+from skidpad.simulation.carla_server.protocol import wire
 from skidpad.simulation.carla_server.snapshot import NO_LIGHT_STATE, Rows
-from skidpad.simulation.carla_server.vehicles import Vehicles
-from skidpad.simulation.carla_server.walkers import WalkerControl
+from skidpad.simulation.carla_server.vehicles.vehicles import Vehicles
 
 Signals = NDArray[np.int64]
 Flags = NDArray[np.bool_]

@@ -9,12 +9,12 @@ from skidpad.core.vocabulary import LightState
 from skidpad.simulation.carla_server import snapshot
 from skidpad.simulation.carla_server.clock import Clock, EpisodeSettings
 from skidpad.simulation.carla_server.episode import Episode, Stock
-from skidpad.simulation.carla_server.landscape import ALL_LAYERS
-from skidpad.simulation.carla_server.maps import MapStore
+from skidpad.simulation.carla_server.maps.landscape import ALL_LAYERS
+from skidpad.simulation.carla_server.maps.maps import MapStore
 from skidpad.simulation.carla_server.options import ServerOptions
-from skidpad.simulation.carla_server.recorder import Recorder
-from skidpad.simulation.carla_server.replayer import Replayer
-from skidpad.simulation.carla_server.streams import EPISODE_STREAM, StreamHub
+from skidpad.simulation.carla_server.protocol.streams import EPISODE_STREAM, StreamHub
+from skidpad.simulation.carla_server.recording.recorder import Recorder
+from skidpad.simulation.carla_server.recording.replayer import Replayer
 
 
 @dataclass(slots=True)

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from typing import IO, Any
 
 from skidpad.core.errors import ConfigError
-from skidpad.simulation.carla_server.codec import Decoder, ProtocolError, Request
 from skidpad.simulation.carla_server.methods import TABLES
 from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.pacer import MANAGER_REST, ServerPacer
-from skidpad.simulation.carla_server.rpc import Dispatcher
+from skidpad.simulation.carla_server.protocol.codec import Decoder, ProtocolError, Request
+from skidpad.simulation.carla_server.protocol.rpc import Dispatcher
+from skidpad.simulation.carla_server.protocol.streams import StreamHub
 from skidpad.simulation.carla_server.served import Served
-from skidpad.simulation.carla_server.streams import StreamHub
 from skidpad.simulation.carla_server.waker import Waker, rouse
 from skidpad.simulation.carla_server.warming import Helper, warm_up
 

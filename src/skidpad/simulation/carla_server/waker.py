@@ -19,7 +19,7 @@ from typing import Any, Protocol
 
 import msgpack
 
-from skidpad.simulation.carla_server.codec import REQUEST
+from skidpad.simulation.carla_server.protocol.codec import REQUEST
 
 log = logging.getLogger("skidpad.carla_server")
 PATIENCE = 2.0  # s of silence after a tick; no Traffic Manager works that long

@@ -16,10 +16,11 @@ from multiprocessing.connection import Connection
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import is_kept, kernel_cache
 from skidpad.sensors.raster import rays
-from skidpad.simulation.carla_server.actors import Attachment
-from skidpad.simulation.carla_server.catalogue import Family
+from skidpad.simulation.carla_server.actors.catalogue import Family
+from skidpad.simulation.carla_server.actors.registry import Attachment
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.options import ServerOptions
+from skidpad.simulation.carla_server.protocol.streams import StreamHub
 from skidpad.simulation.carla_server.sensing.gbuffers import (
     ColourCamera,
     Texture,
@@ -27,7 +28,6 @@ from skidpad.simulation.carla_server.sensing.gbuffers import (
 )
 from skidpad.simulation.carla_server.sensing.producers import PRODUCERS
 from skidpad.simulation.carla_server.served import Served
-from skidpad.simulation.carla_server.streams import StreamHub
 from skidpad.simulation.world import step
 from skidpad.simulation.world.ahead import compile_parts
 

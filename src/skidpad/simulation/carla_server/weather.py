@@ -8,7 +8,7 @@ from typing import Any
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import RANGES, Weather
 from skidpad.physics.grip import grip_params
-from skidpad.simulation.carla_server import wire
+from skidpad.simulation.carla_server.protocol import wire
 
 PACKED = (  # order of the wire
     "cloudiness",

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from skidpad.core.geometry import Pose
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.actors import Actor, Attachment
+from skidpad.simulation.carla_server.actors.registry import Actor, Attachment
 from skidpad.simulation.carla_server.episode import Wanted
-from skidpad.simulation.carla_server.rpc import CallError, Table
+from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.protocol.rpc import CallError, Table
 from skidpad.simulation.carla_server.served import Served
 
 TABLE = Table("actors")

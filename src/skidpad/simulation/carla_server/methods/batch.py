@@ -6,10 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 from skidpad.core.errors import SkidpadError
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.actors import Attachment
+from skidpad.simulation.carla_server.actors.registry import Attachment
 from skidpad.simulation.carla_server.methods import actors, lights, motion, vehicles, walkers
-from skidpad.simulation.carla_server.rpc import CallError, Shape, Table
+from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.protocol.rpc import CallError, Shape, Table
 from skidpad.simulation.carla_server.served import Served
 
 TABLE = Table("batch")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.catalogue import Family
+from skidpad.simulation.carla_server.actors.catalogue import Family
 from skidpad.simulation.carla_server.clock import parse_settings
-from skidpad.simulation.carla_server.rpc import CallError, Shape, Table
+from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.protocol.rpc import CallError, Shape, Table
 from skidpad.simulation.carla_server.sensing.gbuffers import (
     ColourCamera,
     Texture,

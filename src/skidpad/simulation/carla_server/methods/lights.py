@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from skidpad.core.vocabulary import LightState
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.catalogue import Family
-from skidpad.simulation.carla_server.rpc import Shape, Table
+from skidpad.simulation.carla_server.actors.catalogue import Family
+from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.protocol.rpc import Shape, Table
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.world.lights import Group, Light, Lights
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.landscape import ALL_LAYERS
-from skidpad.simulation.carla_server.maps import MAX_XODR, PREFIX
-from skidpad.simulation.carla_server.recorder import safe_path
-from skidpad.simulation.carla_server.rpc import CallError, Shape, Table
+from skidpad.simulation.carla_server.maps.landscape import ALL_LAYERS
+from skidpad.simulation.carla_server.maps.maps import MAX_XODR, PREFIX
+from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.protocol.rpc import CallError, Shape, Table
+from skidpad.simulation.carla_server.recording.recorder import safe_path
 from skidpad.simulation.carla_server.served import Served
 
 TABLE = Table("maps")

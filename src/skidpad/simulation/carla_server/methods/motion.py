@@ -7,12 +7,12 @@ from math import cos, sin
 from typing import Any
 
 from skidpad.core.geometry import Pose
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.actors import Actor
-from skidpad.simulation.carla_server.catalogue import Family
-from skidpad.simulation.carla_server.rpc import CallError, Shape, Table
+from skidpad.simulation.carla_server.actors.catalogue import Family
+from skidpad.simulation.carla_server.actors.registry import Actor
+from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.protocol.rpc import CallError, Shape, Table
 from skidpad.simulation.carla_server.served import Served
-from skidpad.simulation.carla_server.vehicles import Vehicle
+from skidpad.simulation.carla_server.vehicles.vehicles import Vehicle
 
 TABLE = Table("motion")
 BELONGS_TO_MAP = (Family.TRAFFIC_LIGHT, Family.TRAFFIC_SIGN)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from skidpad.simulation.carla_server import scenery, wire
-from skidpad.simulation.carla_server.landscape import EnvironmentObject, objects
-from skidpad.simulation.carla_server.rpc import Shape, Table
+from skidpad.simulation.carla_server.maps import scenery
+from skidpad.simulation.carla_server.maps.landscape import EnvironmentObject, objects
+from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.protocol.rpc import Shape, Table
+from skidpad.simulation.carla_server.protocol.wire import Vector
 from skidpad.simulation.carla_server.served import Served
-from skidpad.simulation.carla_server.wire import Vector
 
 TABLE = Table("scenery")
 ANY = 0xFF

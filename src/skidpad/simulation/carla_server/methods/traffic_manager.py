@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from skidpad.simulation.carla_server.rpc import Table
+from skidpad.simulation.carla_server.protocol.rpc import Table
 from skidpad.simulation.carla_server.served import Served
 
 TABLE = Table("traffic manager")

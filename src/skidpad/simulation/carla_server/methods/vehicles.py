@@ -5,23 +5,23 @@ from __future__ import annotations
 from typing import Any
 
 from skidpad.core.constants import G
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.ackermann import (
+from skidpad.simulation.carla_server.actors.catalogue import Family
+from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.protocol.rpc import Shape, Table
+from skidpad.simulation.carla_server.served import Served
+from skidpad.simulation.carla_server.vehicles.ackermann import (
     AckermannDriver,
     AckermannSettings,
     parse_target,
 )
-from skidpad.simulation.carla_server.catalogue import Family
-from skidpad.simulation.carla_server.control import Control
-from skidpad.simulation.carla_server.engine import revolutions
-from skidpad.simulation.carla_server.physics_control import (
+from skidpad.simulation.carla_server.vehicles.control import Control
+from skidpad.simulation.carla_server.vehicles.engine import revolutions
+from skidpad.simulation.carla_server.vehicles.physics_control import (
     apply_control,
     parse_physics,
     with_engine,
 )
-from skidpad.simulation.carla_server.rpc import Shape, Table
-from skidpad.simulation.carla_server.served import Served
-from skidpad.simulation.carla_server.vehicles import Vehicle
+from skidpad.simulation.carla_server.vehicles.vehicles import Vehicle
 
 TABLE = Table("vehicles")
 

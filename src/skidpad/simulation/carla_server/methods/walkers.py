@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.actors import Actor
-from skidpad.simulation.carla_server.bones import Skeleton, parse_bones
-from skidpad.simulation.carla_server.catalogue import Family
-from skidpad.simulation.carla_server.rpc import CallError, Shape, Table
+from skidpad.simulation.carla_server.actors.bones import Skeleton, parse_bones
+from skidpad.simulation.carla_server.actors.catalogue import Family
+from skidpad.simulation.carla_server.actors.registry import Actor
+from skidpad.simulation.carla_server.actors.walkers import WalkerControl
+from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.protocol.rpc import CallError, Shape, Table
 from skidpad.simulation.carla_server.served import Served
-from skidpad.simulation.carla_server.walkers import WalkerControl
 
 TABLE = Table("walkers")
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.rpc import Shape, Table
+from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.protocol.rpc import Shape, Table
 from skidpad.simulation.carla_server.served import Served
 
 TABLE = Table("weather")

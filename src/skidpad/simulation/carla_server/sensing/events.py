@@ -6,13 +6,13 @@ from math import cos, sin
 
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import SemanticClass
-from skidpad.simulation.carla_server import codec, wire
-from skidpad.simulation.carla_server.actors import SOLID, Actor
-from skidpad.simulation.carla_server.catalogue import Blueprint, Family
+from skidpad.simulation.carla_server.actors.catalogue import Blueprint, Family
+from skidpad.simulation.carla_server.actors.registry import SOLID, Actor
+from skidpad.simulation.carla_server.actors.touches import touches
 from skidpad.simulation.carla_server.clock import Clock
+from skidpad.simulation.carla_server.protocol import codec, wire
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
 from skidpad.simulation.carla_server.sensing.surroundings import Surroundings
-from skidpad.simulation.carla_server.touches import touches
 
 MAP_THINGS = {
     SemanticClass.GUARD_RAIL: "static.guardrail",

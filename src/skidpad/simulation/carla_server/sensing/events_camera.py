@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.simulation.carla_server.actors import Actor
+from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.sensing.images import Camera, make_camera
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor

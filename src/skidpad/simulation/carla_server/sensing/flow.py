@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from skidpad.sensors.raster.passes import Pass
 from skidpad.sensors.raster.view import View
-from skidpad.simulation.carla_server.actors import Actor
+from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.sensing.images import Camera, make_camera
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from skidpad.sensors.pictures.blocks import GLOSS, WETTABLE
 from skidpad.sensors.raster.view import View
 from skidpad.sensors.scene.materials import Material
-from skidpad.simulation.carla_server.actors import Actor
+from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.clock import Clock
+from skidpad.simulation.carla_server.protocol.streams import StreamHub
 from skidpad.simulation.carla_server.sensing import pixels
 from skidpad.simulation.carla_server.sensing.flow import Memory
 from skidpad.simulation.carla_server.sensing.images import Camera, make_camera, picture
@@ -30,7 +31,6 @@ from skidpad.simulation.carla_server.sensing.normals import (
 from skidpad.simulation.carla_server.sensing.occlusion import ambient_occlusion
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
 from skidpad.simulation.carla_server.sensing.surroundings import Pictured, Surroundings
-from skidpad.simulation.carla_server.streams import StreamHub
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]

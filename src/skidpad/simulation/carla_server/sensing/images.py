@@ -14,9 +14,9 @@ from skidpad.core.specs import CameraSpec, Modality
 from skidpad.sensors.raster.passes import Pass
 from skidpad.sensors.raster.rasteriser import AUTO_LEVEL
 from skidpad.sensors.raster.view import View, camera_view
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.actors import Actor
+from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.clock import Clock
+from skidpad.simulation.carla_server.protocol import wire
 from skidpad.simulation.carla_server.sensing import pixels
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
 from skidpad.simulation.carla_server.sensing.surroundings import (

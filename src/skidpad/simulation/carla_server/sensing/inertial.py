@@ -5,9 +5,9 @@ from __future__ import annotations
 from skidpad.core.frames import ImuReading
 from skidpad.core.lefthanded import turn_from_carla, vector_from_carla
 from skidpad.sensors import inertial
-from skidpad.simulation.carla_server import codec
-from skidpad.simulation.carla_server.actors import Actor
+from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.clock import Clock
+from skidpad.simulation.carla_server.protocol import codec
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
 from skidpad.simulation.carla_server.sensing.surroundings import Surroundings
 

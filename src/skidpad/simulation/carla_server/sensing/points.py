@@ -16,9 +16,9 @@ from skidpad.core.specs import RadarSpec
 from skidpad.sensors.ranging.around import STEEPEST_DEG, Fan, RayHits, look_around
 from skidpad.sensors.ranging.beam import Beam
 from skidpad.sensors.ranging.radar import Radar
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.actors import Actor
+from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.clock import Clock
+from skidpad.simulation.carla_server.protocol import wire
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
 from skidpad.simulation.carla_server.sensing.surroundings import Surroundings
 

@@ -15,10 +15,10 @@ from math import cos, hypot, log10, pi, sin, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.actors import Actor, Box
-from skidpad.simulation.carla_server.boxes import Boxes
-from skidpad.simulation.carla_server.wire import Vector
+from skidpad.simulation.carla_server.actors.boxes import Boxes
+from skidpad.simulation.carla_server.actors.registry import Actor, Box
+from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.protocol.wire import Vector
 
 LIGHT = 299_792_458.0  # m/s
 PERMITTIVITY = 1.02  # of the ground, relative; CARLA's

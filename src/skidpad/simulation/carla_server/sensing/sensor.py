@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from skidpad.simulation.carla_server.actors import Actor
+from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.sensing.surroundings import Surroundings
 from skidpad.simulation.carla_server.snapshot import SensorType

@@ -7,13 +7,14 @@ from time import sleep
 
 from skidpad.core.geometry import Pose
 from skidpad.core.randomness import stream
-from skidpad.simulation.carla_server import snapshot, wire
-from skidpad.simulation.carla_server.actors import Actor
+from skidpad.simulation.carla_server import snapshot
+from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.clock import Clock
+from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.protocol.streams import StreamHub
 from skidpad.simulation.carla_server.sensing.sensor import Producer, Sensor
 from skidpad.simulation.carla_server.sensing.surroundings import Surroundings
 from skidpad.simulation.carla_server.snapshot import SensorType
-from skidpad.simulation.carla_server.streams import StreamHub
 
 # s. Every stream has a connection of its own, and the client's threads race: a collision gets ahead
 # of what its tick sends afterwards, so that a client that waits for that has the collision too.

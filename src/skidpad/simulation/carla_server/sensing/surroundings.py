@@ -16,14 +16,14 @@ from skidpad.roads.queries import RoadMap
 from skidpad.sensors.pictures.lighting import lighting
 from skidpad.sensors.pictures.shading import Shading
 from skidpad.sensors.raster.live_scene import LiveScene
-from skidpad.simulation.carla_server.actors import SOLID, Actor, ActorTable, Box
-from skidpad.simulation.carla_server.boxes import Boxes
-from skidpad.simulation.carla_server.catalogue import Family
+from skidpad.simulation.carla_server.actors.boxes import Boxes
+from skidpad.simulation.carla_server.actors.catalogue import Family
+from skidpad.simulation.carla_server.actors.registry import SOLID, Actor, ActorTable, Box
 from skidpad.simulation.carla_server.clock import Clock
-from skidpad.simulation.carla_server.landscape import Landscape
-from skidpad.simulation.carla_server.maps import ServedMap
+from skidpad.simulation.carla_server.maps.landscape import Landscape
+from skidpad.simulation.carla_server.maps.maps import ServedMap
 from skidpad.simulation.carla_server.sensing.radio import Air
-from skidpad.simulation.carla_server.vehicles import Vehicles
+from skidpad.simulation.carla_server.vehicles.vehicles import Vehicles
 from skidpad.simulation.carla_server.weather import Sky
 
 WIDEST = 8192  # px

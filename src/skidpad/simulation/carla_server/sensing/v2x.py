@@ -11,10 +11,10 @@ import numpy as np
 from skidpad.core.geometry import Pose
 from skidpad.core.lefthanded import turn_from_carla, vector_from_carla
 from skidpad.sensors import inertial
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.actors import Actor
-from skidpad.simulation.carla_server.catalogue import Family
+from skidpad.simulation.carla_server.actors.catalogue import Family
+from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.clock import Clock
+from skidpad.simulation.carla_server.protocol import wire
 from skidpad.simulation.carla_server.sensing import cam
 from skidpad.simulation.carla_server.sensing.radio import (
     Call,

@@ -12,8 +12,8 @@ from typing import Any
 import yaml
 
 from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind, GripModel, SemanticClass
-from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.options import MU_REF
+from skidpad.simulation.carla_server.protocol import wire
 
 DATA = Path(__file__).with_name("data") / "blueprints.yaml"
 GRIP_BLUEPRINT = "skidpad.weather.grip"  # decisions K-2, R-15

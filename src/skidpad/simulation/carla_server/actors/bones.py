@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from skidpad.core.geometry import Pose
-from skidpad.simulation.carla_server import wire
+from skidpad.simulation.carla_server.protocol import wire
 
 ROOT = "crl_root"
 FINGERS = ("Thumb", "Index", "Middle", "Ring", "Pinky")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.roads.queries import RoadMap
-from skidpad.simulation.carla_server.vehicles import Vehicles
+from skidpad.simulation.carla_server.vehicles.vehicles import Vehicles
 from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.traffic.manager import priority_of
 from skidpad.simulation.world.traffic.priority import STOP, YIELD

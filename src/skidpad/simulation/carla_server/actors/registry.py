@@ -13,10 +13,10 @@ from enum import IntEnum
 from typing import Any, NamedTuple
 
 from skidpad.core.geometry import Pose
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.catalogue import AttributeType, Blueprint, Family
-from skidpad.simulation.carla_server.rpc import CallError
-from skidpad.simulation.carla_server.wire import Vector
+from skidpad.simulation.carla_server.actors.catalogue import AttributeType, Blueprint, Family
+from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.protocol.rpc import CallError
+from skidpad.simulation.carla_server.protocol.wire import Vector
 from skidpad.simulation.world.world import World
 
 TOMBSTONES = 10_000

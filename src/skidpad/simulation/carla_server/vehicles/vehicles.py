@@ -11,12 +11,17 @@ import numpy as np
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import ActorKind
 from skidpad.physics.types import VehicleType, vehicle_type
-from skidpad.simulation.carla_server.ackermann import AckermannDriver, AckermannSettings
-from skidpad.simulation.carla_server.catalogue import Blueprint
-from skidpad.simulation.carla_server.control import Control
-from skidpad.simulation.carla_server.engine import at_wheels, engine_of, gear_at, shift_speeds
-from skidpad.simulation.carla_server.physics_control import PhysicsControl
-from skidpad.simulation.carla_server.wire import Vector
+from skidpad.simulation.carla_server.actors.catalogue import Blueprint
+from skidpad.simulation.carla_server.protocol.wire import Vector
+from skidpad.simulation.carla_server.vehicles.ackermann import AckermannDriver, AckermannSettings
+from skidpad.simulation.carla_server.vehicles.control import Control
+from skidpad.simulation.carla_server.vehicles.engine import (
+    at_wheels,
+    engine_of,
+    gear_at,
+    shift_speeds,
+)
+from skidpad.simulation.carla_server.vehicles.physics_control import PhysicsControl
 from skidpad.simulation.world.rows import Newcomer
 from skidpad.simulation.world.world import World
 

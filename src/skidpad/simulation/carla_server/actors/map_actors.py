@@ -9,9 +9,9 @@ from skidpad.core.geometry import Pose, kmh_from_mps
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import RoadMap
-from skidpad.simulation.carla_server.actors import Actor
-from skidpad.simulation.carla_server.catalogue import Blueprint, Family
-from skidpad.simulation.carla_server.posts import Post
+from skidpad.simulation.carla_server.actors.catalogue import Blueprint, Family
+from skidpad.simulation.carla_server.actors.posts import Post
+from skidpad.simulation.carla_server.actors.registry import Actor
 
 BOX_DEPTH = 1.5  # m, half depth of a trigger volume
 BOX_HEIGHT = 1.0  # m, half

@@ -10,8 +10,8 @@ from typing import Any
 
 from skidpad.physics.fleet import Fleet
 from skidpad.physics.vehicle import steer_share
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.control import Control
+from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.vehicles.control import Control
 
 A_MAX = 3.0  # m/s^2 that the speed controller may ask for
 A_MIN = -6.0

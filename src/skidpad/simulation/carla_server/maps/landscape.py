@@ -21,8 +21,8 @@ from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.roadside import Barrier, Roadside
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.wire import Vector
+from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.protocol.wire import Vector
 from skidpad.simulation.world.obstacles import BARRIERS
 
 FIRST_ID = 1 << 32  # environment ids start beyond all actor ids

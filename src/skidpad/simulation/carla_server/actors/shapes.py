@@ -6,9 +6,9 @@ import numpy as np
 
 from skidpad.core.geometry import Pose
 from skidpad.physics.overlap import Boxes, box_box, corners_room
-from skidpad.simulation.carla_server.actors import Actor
-from skidpad.simulation.carla_server.catalogue import Family
-from skidpad.simulation.carla_server.wire import Vector
+from skidpad.simulation.carla_server.actors.catalogue import Family
+from skidpad.simulation.carla_server.actors.registry import Actor
+from skidpad.simulation.carla_server.protocol.wire import Vector
 from skidpad.simulation.world.rows import Newcomer, Shape
 from skidpad.simulation.world.world import World
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.simulation.carla_server.actors import Box
-from skidpad.simulation.carla_server.wire import Vector
+from skidpad.simulation.carla_server.actors.registry import Box
+from skidpad.simulation.carla_server.protocol.wire import Vector
 
 Floats = NDArray[np.float64]
 

@@ -14,8 +14,8 @@ import msgspec
 import numpy as np
 
 from skidpad.physics.types import VehicleType
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.engine import (
+from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.vehicles.engine import (
     Engine,
     at_wheels,
     engine_of,

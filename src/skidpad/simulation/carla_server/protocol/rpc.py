@@ -10,8 +10,8 @@ from inspect import Parameter, signature
 from typing import Any, TypeVar
 
 from skidpad.core.errors import SkidpadError
-from skidpad.simulation.carla_server import codec
-from skidpad.simulation.carla_server.codec import Request
+from skidpad.simulation.carla_server.protocol import codec
+from skidpad.simulation.carla_server.protocol.codec import Request
 
 log = logging.getLogger("skidpad.carla_server")
 Handler = Callable[..., Any]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from skidpad.core.vocabulary import SemanticClass
-from skidpad.simulation.carla_server.actors import Actor, ActorTable
-from skidpad.simulation.carla_server.wire import Vector
+from skidpad.simulation.carla_server.actors.registry import Actor, ActorTable
+from skidpad.simulation.carla_server.protocol.wire import Vector
 from skidpad.simulation.world.world import World
 
 

@@ -20,7 +20,7 @@ from skidpad.core.constants import G
 from skidpad.core.vocabulary import ActorKind
 from skidpad.physics.types import VehicleType
 from skidpad.physics.wind import AIR_DENSITY
-from skidpad.simulation.carla_server import wire
+from skidpad.simulation.carla_server.protocol import wire
 
 Curve = Sequence[tuple[float, float]]  # rpm and N m
 RPM = 2.0 * pi / 60.0  # rad/s

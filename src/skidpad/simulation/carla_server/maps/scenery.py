@@ -8,10 +8,10 @@ import numpy as np
 
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.queries import RoadMap
-from skidpad.simulation.carla_server.actors import SOLID, ActorTable, Box
-from skidpad.simulation.carla_server.boxes import Boxes
-from skidpad.simulation.carla_server.landscape import Landscape
-from skidpad.simulation.carla_server.wire import Vector
+from skidpad.simulation.carla_server.actors.boxes import Boxes
+from skidpad.simulation.carla_server.actors.registry import SOLID, ActorTable, Box
+from skidpad.simulation.carla_server.maps.landscape import Landscape
+from skidpad.simulation.carla_server.protocol.wire import Vector
 
 GROUND_STEP = 0.5  # m along a ray between looks at the road's height
 LONGEST_RAY = 2000.0  # m

@@ -13,12 +13,12 @@ from itertools import pairwise
 from typing import Any
 
 from skidpad.core.geometry import Pose, wrap_angle
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.actors import Actor
-from skidpad.simulation.carla_server.catalogue import Family
+from skidpad.simulation.carla_server.actors.catalogue import Family
+from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.episode import Episode, Wanted
-from skidpad.simulation.carla_server.rpc import CallError
-from skidpad.simulation.carla_server.wire import Vector
+from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.protocol.rpc import CallError
+from skidpad.simulation.carla_server.protocol.wire import Vector
 
 FORMAT = 2  # of recordings that can be replayed
 PLAYED = (Family.VEHICLE, Family.WALKER)

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from math import dist
 from typing import Any
 
-from skidpad.simulation.carla_server.replayer import HERO
+from skidpad.simulation.carla_server.recording.replayer import HERO
 
 Head = dict[str, Any]
 Tick = list[Any]  # frame, s of the episode, poses, contacts, new actors, controls

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import hypot
 
-from skidpad.simulation.carla_server.actors import STILL
-from skidpad.simulation.carla_server.wire import Vector
+from skidpad.simulation.carla_server.actors.registry import STILL
+from skidpad.simulation.carla_server.protocol.wire import Vector
 
 V_MAX = 15.0  # m/s
 

@@ -18,8 +18,8 @@ from skidpad.roads.queries import RoadMap
 from skidpad.roads.walkable import walk_mesh
 from skidpad.scenery.dressing import dress_map
 from skidpad.sensors.inertial import map_origin
-from skidpad.simulation.carla_server import navmesh
-from skidpad.simulation.carla_server.rpc import CallError
+from skidpad.simulation.carla_server.maps import navmesh
+from skidpad.simulation.carla_server.protocol.rpc import CallError
 
 log = logging.getLogger("skidpad.carla_server")
 PREFIX = "Carla/Maps/"

@@ -11,9 +11,9 @@ import numpy as np
 
 from skidpad.core.constants import G
 from skidpad.roads.queries import RoadMap
-from skidpad.simulation.carla_server.actors import Actor, ActorTable
-from skidpad.simulation.carla_server.catalogue import Family
-from skidpad.simulation.carla_server.vehicles import Vehicles
+from skidpad.simulation.carla_server.actors.catalogue import Family
+from skidpad.simulation.carla_server.actors.registry import Actor, ActorTable
+from skidpad.simulation.carla_server.vehicles.vehicles import Vehicles
 from skidpad.simulation.world.world import World
 
 DROP = 0.6  # m above the ground from which something falls; lower, it stands at once

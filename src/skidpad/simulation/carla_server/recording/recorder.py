@@ -13,19 +13,24 @@ from pathlib import Path
 from typing import IO, Any
 
 from skidpad.core.errors import FileError
-from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.actors import ActorTable
+from skidpad.simulation.carla_server.actors.registry import ActorTable
+from skidpad.simulation.carla_server.actors.touches import touches
 from skidpad.simulation.carla_server.clock import Clock
-from skidpad.simulation.carla_server.recorder_text import (
+from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.protocol.rpc import CallError
+from skidpad.simulation.carla_server.recording.recorder_text import (
     ANY,
     describe_recording,
     list_blocked,
     list_collisions,
 )
-from skidpad.simulation.carla_server.replayer import FORMAT, PLAYED, CarlaRecording, recording
-from skidpad.simulation.carla_server.rpc import CallError
-from skidpad.simulation.carla_server.touches import touches
-from skidpad.simulation.carla_server.vehicles import Vehicle, Vehicles
+from skidpad.simulation.carla_server.recording.replayer import (
+    FORMAT,
+    PLAYED,
+    CarlaRecording,
+    recording,
+)
+from skidpad.simulation.carla_server.vehicles.vehicles import Vehicle, Vehicles
 from skidpad.simulation.world.world import World
 
 MAX_BYTES = 2 * 1024**3

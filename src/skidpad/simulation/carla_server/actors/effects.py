@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 
-from skidpad.simulation.carla_server.catalogue import Blueprint, Family, load_data
+from skidpad.simulation.carla_server.actors.catalogue import Blueprint, Family, load_data
 
 log = logging.getLogger("skidpad.carla_server")
 

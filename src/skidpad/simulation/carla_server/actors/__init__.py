@@ -1,0 +1,1 @@
+"""What is in an episode: actors by id, their blueprints, shapes and contacts; walkers; lights and signs."""

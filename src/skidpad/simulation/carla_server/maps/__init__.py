@@ -1,0 +1,1 @@
+"""Maps: which are served, their objects, rays against them, the mesh that pedestrians walk on."""

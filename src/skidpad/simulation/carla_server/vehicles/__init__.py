@@ -1,0 +1,1 @@
+"""Vehicles: commands, engines and physics settings of clients, falling, giving way at signs."""

@@ -73,16 +73,15 @@ ACTIONS: dict[str, str] = {
         'timeGap="2" freespace="false"', continuous=True, side="ahead", limits=limits(3, 4)
     ),
 }
-FEW = ("speed_linear", "speed_distance", "speed_back", "lane_change", "lane_offset", "gap_once")
 MOST = tuple(ACTIONS)
 PLAN: dict[str, tuple[str, ...]] = {
     "straight": MOST,
     "curve": tuple(a for a in MOST if a not in ("speed_rate", "speed_factor", "lane_offset_step")),
-    "hill": FEW,
-    "reverse": ("speed_linear", "speed_distance", "speed_back", "lane_change", "lane_offset"),
-    "on_foot": ("speed_linear", "speed_distance"),
-    "oncoming": ("speed_linear", "speed_relative", "lane_offset"),
-    "crossing": ("speed_linear", "speed_relative", "lane_offset"),
+    "hill": MOST,
+    "reverse": tuple(a for a in MOST if a != "lane_change_way"),  # esmini looks along the motion
+    "on_foot": tuple(a for a in MOST if a not in ("lane_change", "lane_offset")),
+    "oncoming": tuple(a for a in MOST if a != "gap_once"),  # esmini never ends it there
+    "crossing": tuple(a for a in MOST if a != "gap_once"),
 }
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from math import cos, hypot, pi, sin
 
 from tests.scenarios.files import (
     by_entity,
@@ -111,7 +112,51 @@ CONDITIONS: dict[str, tuple[str, str, str]] = {
 }
 
 
+# where ego and other are at t s: x, y and velocity at 0 s, and how the other one looks
+COURSES = {
+    "straight": ((100.0, -5.25, 12.0, 0.0), (130.0, -1.75, 10.0, 0.0), 0.0),
+    "hill": ((60.0, -5.25, 12.0, 0.0), (90.0, -1.75, 10.0, 0.0), 0.0),
+    "reverse": ((100.0, -5.25, 8.0, 0.0), (200.0, -1.75, -6.0, 0.0), 0.0),
+    "on_foot": ((100.0, -5.25, 8.0, 0.0), (130.0, -1.75, 1.5, 0.0), 0.0),
+    "oncoming": ((100.0, -1.75, 12.0, 0.0), (300.0, 1.75, -10.0, 0.0), pi),
+    "crossing": ((100.0, -1.75, 12.0, 0.0), (201.75, -110.0, 0.0, 10.0), pi / 2),
+}
+MOMENT = 3.03  # s, between two steps
+
+
+def apart(setting: str, kind: str, t: float) -> float:
+    """The distance of the two in the axes of the other one, m."""
+    ego, other, h = COURSES[setting]
+    dx, dy = (other[k] + other[k + 2] * t - ego[k] - ego[k + 2] * t for k in (0, 1))
+    parts = {
+        "euclidianDistance": hypot(dx, dy),
+        "longitudinal": abs(dx * cos(h) + dy * sin(h)),
+        "lateral": abs(dy * cos(h) - dx * sin(h)),
+    }
+    return parts[kind]
+
+
+def measured_everywhere() -> Iterator[Case]:
+    """Every distance in every setting in which it changes, and the way that the other one went."""
+    for setting, (_, other, _) in COURSES.items():
+        for kind in ("euclidianDistance", "longitudinal", "lateral"):
+            now, later = apart(setting, kind, MOMENT), apart(setting, kind, MOMENT + 0.01)
+            if abs(now - later) < 1e-6:
+                continue
+            rule = "lessThan" if later < now else "greaterThan"
+            condition = by_entity(near(round(now, 3), kind, rule=rule), "other")
+            yield case(f"when_apart_{kind[:4]}", setting, STOP, when=condition)
+        way = hypot(other[2], other[3]) * MOMENT
+        travelled = by_entity(f'<TraveledDistanceCondition value="{way:.3f}"/>', "other")
+        yield case("when_went", setting, STOP, when=travelled)
+
+
 def conditions() -> Iterator[Case]:
+    yield from measured_everywhere()
+    yield from conditions_by_hand()
+
+
+def conditions_by_hand() -> Iterator[Case]:
     """The other one brakes, or drives on, when a condition of either holds."""
     for name, (setting, body, by) in CONDITIONS.items():
         yield case(f"when_{name}", setting, STOP, when=by_entity(body, by))

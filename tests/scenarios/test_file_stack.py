@@ -143,6 +143,20 @@ def test_a_property_out_of_its_range_is_one_sentence(tmp_path, given, told):
     assert f"controller '{NAME}'" in text
 
 
+def test_its_sensors_see_through_the_weather_that_events_set(tmp_path):
+    fog = """<GlobalAction><EnvironmentAction><Environment name="fog"><Weather><Fog visualRange="30"/>
+</Weather></Environment></EnvironmentAction></GlobalAction>"""
+    file = file_of(
+        tmp_path, with_controller(NAME), stories=story(event("fog", fog, time(0.475))), end=1.0
+    )
+    scenario = skidpad.Scenario(file, stack="ideal")
+    limits = []
+    while scenario.step():
+        limits.append(scenario.player.actors["other"].controller.inner._view.suite.limit)
+    assert limits[2] > 100.0
+    assert limits[-1] < 40.0
+
+
 class Coaster:
     """Brakes gently, whatever comes."""
 

@@ -15,6 +15,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.campaign.driving.outdoors import weather_of
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import Pose, kmh_from_mps, mps_from_kmh
@@ -22,6 +23,7 @@ from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.states import ActorStates, ActorTable, EgoEstimate, VehicleCommand, WorldTruth
 from skidpad.core.told import describe_value
 from skidpad.core.vocabulary import RangeModel
+from skidpad.core.weather import Weather
 from skidpad.envelope.govern import EnvelopeSettings, govern
 from skidpad.physics.presets import find_weather
 from skidpad.physics.types import EGO_TYPE
@@ -51,6 +53,7 @@ class PilotConditions:
     seed: int = 0
     profile: str = "recommended"
     settings: Mapping[str, Any] = field(default_factory=dict)  # of the stack
+    weather_of_file: bool = False  # events of the file change what its sensors see through
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +90,7 @@ class StackPilot:
         self.conditions = conditions
         self._stack: Stack | None = None
         self._view: View | None = None
+        self._environments = 0  # of the file's events that it has seen
 
     def drive(self, scene: Scene, name: str) -> VehicleCommand:
         """Returns what the stack does with what the actor's sensors see."""
@@ -101,7 +105,24 @@ class StackPilot:
             setup = replace(setup, specs=(*setup.specs, *more), asked=asked)
             seed = self.conditions.seed ^ crc32(name.encode())
             self._view = _make_view(truth.table, actor.row, scene.network.map, setup, seed)
+        if self.conditions.weather_of_file:
+            self._view = self._change_weather(self._view, scene)
         return self._stack.tick(_frame(self._view, truth, scene))
+
+    def _change_weather(self, view: View, scene: Scene) -> View:
+        """Returns the view through the weather that events have set since the last tick."""
+        new, self._environments = scene.environments[self._environments :], len(scene.environments)
+        if not new:
+            return view
+        asked = view.asked
+        weather = asked.setup.weather
+        for environment in new:
+            weather = weather_of(environment, weather, NAME)
+        setup = replace(asked.setup, weather=weather)
+        view.suite.see_through(_limiting_weather(setup), None)
+        return view._replace(
+            asked=AskedSensors(scene.network.map, asked.table, setup, seed=asked.seed)
+        )
 
     def _make_stack(self, setup: Setup, scene: Scene, v: float) -> Stack:
         c, driver = self.conditions, numbered_driver(self.number)
@@ -114,6 +135,11 @@ class StackPilot:
             "cruise_kmh": max(kmh_from_mps(v_cruise), CRUISE_RANGE[0]),
         }
         return kind(setup.specs, scene.network.map, settings)
+
+
+def _limiting_weather(setup: Setup) -> Weather | None:
+    """Returns the weather that limits the ranges of cameras and radar; None: it does not."""
+    return setup.weather if setup.range_model is RangeModel.PHYSICAL else None
 
 
 def _usual_setup(dt: float) -> Setup:
@@ -133,9 +159,14 @@ def _make_view(table: ActorTable, row: int, map: RoadMap, setup: Setup, seed: in
         height=table.height[order],
         rgb=table.rgb[order],
     )
-    limited = setup.weather if setup.range_model is RangeModel.PHYSICAL else None
     suite = ObjectSuite(
-        map.roadside, own, setup.specs, seed, setup.dt, weather=limited, lanes=map.held
+        map.roadside,
+        own,
+        setup.specs,
+        seed,
+        setup.dt,
+        weather=_limiting_weather(setup),
+        lanes=map.held,
     )
     asked = AskedSensors(map, own, setup, seed=seed)
     return View(order, ActorStates.empty(n), suite, asked)

@@ -212,7 +212,11 @@ def _pilot_conditions(spec: RunSpec) -> PilotConditions:
     nobody = ActorSetup(name="", type=EGO_TYPE, place=Pose(0.0, 0.0))
     settings = spec.settings
     return PilotConditions(
-        setup_of(spec, "", nobody), spec.seed, settings.profile, settings.stack.to_plain()
+        setup_of(spec, "", nobody),
+        spec.seed,
+        settings.profile,
+        settings.stack.to_plain(),
+        isinstance(spec.course, Scenario) and spec.course.weather_of_file,
     )
 
 

@@ -104,7 +104,7 @@ def make_world(data: Path, database: str | None) -> World:
     from skidpad.fleet.service import Places, open_fleet
     from skidpad.fleet.store.accounts import add_person, add_vehicle
     from skidpad.fleet.words import Role
-    from skidpad.scenarios.hazard_export import export_hazard
+    from skidpad.scenarios.export.hazard_export import export_hazard
 
     clock = Clock()
     fleet = open_fleet(Places(data=data, database=database), clock, exporter=export_hazard)

@@ -20,10 +20,10 @@ from pathlib import Path
 
 from skidpad.core.errors import SkidpadError
 from skidpad.core.setup import DT
-from skidpad.scenarios.document import Node, parse
-from skidpad.scenarios.findings import HARMLESS, Finding, Kind
+from skidpad.scenarios.playing.stage import played
+from skidpad.scenarios.reading.document import Node, parse
+from skidpad.scenarios.reading.findings import HARMLESS, Finding, Kind
 from skidpad.scenarios.scenario import check
-from skidpad.scenarios.stage import played
 
 COLUMNS = (
     "files", "excluded", "copies", "others", "scenarios", "invalid", "lacking", "valid", "clean", "played",

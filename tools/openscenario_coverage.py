@@ -14,10 +14,10 @@ from skidpad.scenarios.actions.private import GROUPS, PRIVATE
 from skidpad.scenarios.actions.traffic import MOST, TRAFFIC
 from skidpad.scenarios.actions.world import GLOBAL
 from skidpad.scenarios.conditions.by_value import BY_VALUE
-from skidpad.scenarios.positions import POSITIONS
+from skidpad.scenarios.places.positions import POSITIONS
+from skidpad.scenarios.places.trajectories import SHAPES
+from skidpad.scenarios.reading.schema import schema_file
 from skidpad.scenarios.scenario import FURTHER_POSITIONS
-from skidpad.scenarios.schema import schema_file
-from skidpad.scenarios.trajectories import SHAPES
 from skidpad.scenarios.triggers import ENTITY_CONDITIONS
 
 XS = "{http://www.w3.org/2001/XMLSchema}"

@@ -23,8 +23,8 @@ from xml.etree import ElementTree
 from scenariogeneration import xosc
 
 from skidpad.roads.bundled import map_file
+from skidpad.scenarios.export.writer import OscVersion
 from skidpad.scenarios.shipped import FOLDER
-from skidpad.scenarios.writer import OscVersion
 
 ROAD = "straight"
 EPOCH = datetime(2026, 1, 1)  # noqa: DTZ001  # the library writes naive times

@@ -40,8 +40,8 @@ from tests.scenarios.oracle.reference import (  # noqa: E402
 
 from skidpad.core.errors import SkidpadError  # noqa: E402
 from skidpad.scenarios import registry  # noqa: E402
+from skidpad.scenarios.playing.stage import PlayedScenario, played  # noqa: E402
 from skidpad.scenarios.scenario import compile_scenario  # noqa: E402
-from skidpad.scenarios.stage import PlayedScenario, played  # noqa: E402
 
 STEP, SAMPLE = 0.05, 0.2  # s, of the players and of what is stored
 OPTIONS = f"--fixed_timestep {STEP} --disable_controllers"

@@ -28,10 +28,10 @@ from tests.scenarios.oracle.reference import deviations, file_hash  # noqa: E402
 from openscenario_corpus import breaks, content, lacking  # noqa: E402
 from scenario_oracle import LEAST_WAY, run_esmini  # noqa: E402
 from skidpad.core.errors import SkidpadError  # noqa: E402
-from skidpad.scenarios.document import parse  # noqa: E402
-from skidpad.scenarios.findings import HARMLESS  # noqa: E402
+from skidpad.scenarios.playing.stage import PlayedScenario, played  # noqa: E402
+from skidpad.scenarios.reading.document import parse  # noqa: E402
+from skidpad.scenarios.reading.findings import HARMLESS  # noqa: E402
 from skidpad.scenarios.scenario import check  # noqa: E402
-from skidpad.scenarios.stage import PlayedScenario, played  # noqa: E402
 
 STEP, END = 0.05, 20.0  # s
 MOST = 60  # files of one repository

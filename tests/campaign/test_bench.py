@@ -13,8 +13,8 @@ from skidpad.campaign.bench.tick import TickCost, bench_run, tick_cost
 from skidpad.campaign.bench.traffic import measure
 from skidpad.campaign.bench.traffic_options import TrafficBench
 from skidpad.core.vocabulary import SensorLevel
+from skidpad.scenarios.playing.stage import played
 from skidpad.scenarios.scenario import compile_scenario
-from skidpad.scenarios.stage import played
 
 
 @pytest.mark.req("A-269")

@@ -20,8 +20,8 @@ from skidpad.evidence.shadow import Foresight
 from skidpad.recording.channels.cycles import cycles
 from skidpad.recording.hazards.records import HazardRecord
 from skidpad.recording.run.log_files import read_log
-from skidpad.scenarios.hazard_export import export_hazard
-from skidpad.scenarios.writer import OscVersion
+from skidpad.scenarios.export.hazard_export import export_hazard
+from skidpad.scenarios.export.writer import OscVersion
 from skidpad.stack.configurations import functions_of
 
 REFERENCE = ReferenceDriver()

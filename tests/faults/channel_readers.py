@@ -79,7 +79,7 @@ def read_page(path: Path) -> object:
 
 def read_hazards(path: Path) -> object:
     from skidpad.recording.hazards.records import read_hazards
-    from skidpad.scenarios.hazard_export import export_hazard
+    from skidpad.scenarios.export.hazard_export import export_hazard
 
     return [export_hazard(r, path.parent / "scenarios") for r in read_hazards(path.parent)]
 

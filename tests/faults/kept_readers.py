@@ -52,7 +52,7 @@ def catalogs() -> list[bytes]:
 
 def read_catalog(path: Path) -> object:
     """A scenario that takes a vehicle and a manoeuvre from it, played; a new folder each time."""
-    from skidpad.scenarios.stage import played
+    from skidpad.scenarios.playing.stage import played
 
     with TemporaryDirectory(dir=path.parent) as name, np.errstate(all="ignore"):
         folder = Path(name)

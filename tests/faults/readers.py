@@ -273,7 +273,7 @@ def story_of(path: Path) -> Any:
 
 def tell_story(path: Path) -> object:
     """Everything as the file says, where it compiles."""
-    from skidpad.scenarios.stage import played
+    from skidpad.scenarios.playing.stage import played
 
     beside(path)
     scenario = story_of(path).scenario

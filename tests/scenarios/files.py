@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from skidpad.scenarios.playing.stage import PlayedScenario, played
 from skidpad.scenarios.scenario import Scenario, compile_scenario
-from skidpad.scenarios.stage import PlayedScenario, played
 
 HEAD = """<?xml version='1.0'?>
 <OpenSCENARIO>

@@ -24,11 +24,11 @@ from tests.scenarios.files import (
 
 from skidpad.core.run import ActorMode
 from skidpad.roads.bundled import load_map
-from skidpad.scenarios.network import network_of
-from skidpad.scenarios.player import Player
-from skidpad.scenarios.routes import random_roads
+from skidpad.scenarios.movement.network import network_of
+from skidpad.scenarios.places.routes import random_roads
+from skidpad.scenarios.playing.player import Player
+from skidpad.scenarios.playing.stage import IdealWorld, played
 from skidpad.scenarios.scenario import check
-from skidpad.scenarios.stage import IdealWorld, played
 
 STOP = private(speed(to(0)))
 LIGHTS = """<RoadNetwork><LogicFile filepath="straight.xodr"/><TrafficSignals>

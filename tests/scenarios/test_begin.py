@@ -23,7 +23,7 @@ from tests.scenarios.files import (
 )
 
 from skidpad.roads.bundled import FOLDER as MAPS
-from skidpad.scenarios.findings import Kind, ScenarioError
+from skidpad.scenarios.reading.findings import Kind, ScenarioError
 from skidpad.scenarios.scenario import check
 
 

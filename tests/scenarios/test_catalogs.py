@@ -17,7 +17,7 @@ from tests.scenarios.files import (
     vehicle,
 )
 
-from skidpad.scenarios.findings import ScenarioError
+from skidpad.scenarios.reading.findings import ScenarioError
 
 CATALOG = document('<Catalog name="{name}">{entries}</Catalog>')
 LONG = VEHICLE.format(x=1).replace('name="v"', 'name="long"').replace('length="4.2"', 'length="$L"')

@@ -10,7 +10,7 @@ import pytest
 from tests.scenarios.files import document, write
 
 from skidpad.core.errors import FileError
-from skidpad.scenarios.distributions import choices, is_distribution
+from skidpad.scenarios.reading.distributions import choices, is_distribution
 
 FILE = document(
     '<ParameterValueDistribution><ScenarioFile filepath="x.xosc"/>{}</ParameterValueDistribution>'

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from skidpad.scenarios.playing.stage import played
 from skidpad.scenarios.scenario import compile_scenario
-from skidpad.scenarios.stage import played
 
 FILES = sorted(Path(__file__).with_name("esmini").glob("*.xosc"))
 NEAR = 0.1  # m

@@ -29,9 +29,9 @@ from typer.testing import CliRunner
 from skidpad.cli.main import app
 from skidpad.core.errors import FileError
 from skidpad.roads.opendrive.bake import bake
-from skidpad.scenarios.findings import Kind, ScenarioError
+from skidpad.scenarios.playing.stage import played
+from skidpad.scenarios.reading.findings import Kind, ScenarioError
 from skidpad.scenarios.scenario import check, compile_scenario
-from skidpad.scenarios.stage import played
 
 CATALOG = """<?xml version='1.0'?><OpenSCENARIO><FileHeader revMajor="{0}" revMinor="{1}"
 date="2026-01-01T00:00:00" description="x" author="x"/><Catalog name="acts">{2}</Catalog>

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from tests.scenarios.files import at, compiled
 
-from skidpad.scenarios.expressions import ExpressionError, evaluate
-from skidpad.scenarios.findings import ScenarioError
+from skidpad.scenarios.reading.expressions import ExpressionError, evaluate
+from skidpad.scenarios.reading.findings import ScenarioError
 
 SCOPE = {"a": "7", "b": "2.5", "word": "wet", "yes": "true"}
 

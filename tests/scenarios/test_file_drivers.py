@@ -23,7 +23,7 @@ from skidpad.campaign.driving.file_drivers import FollowingDriver
 from skidpad.campaign.driving.run_setup import load_scenario
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import Scenario
-from skidpad.scenarios.stage import played
+from skidpad.scenarios.playing.stage import played
 from skidpad.stack.reference.following import GAP_MIN
 from skidpad.stack.reference.person import person_of
 

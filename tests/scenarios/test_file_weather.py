@@ -15,7 +15,7 @@ from skidpad.core.weather import Weather
 from skidpad.physics.grip import rain_rate
 from skidpad.physics.optics import sight
 from skidpad.recording.run.log_files import read_log
-from skidpad.scenarios.environment import Environment, Fall, Wetness
+from skidpad.scenarios.reading.environment import Environment, Fall, Wetness
 
 
 def environment(friction: float | None = None, rain: float = 0.0, clouds: str = "sixOktas") -> str:

@@ -26,7 +26,7 @@ from tests.scenarios.files import (
 )
 
 from skidpad.core.errors import FileError
-from skidpad.scenarios.document import parse
+from skidpad.scenarios.reading.document import parse
 from skidpad.scenarios.scenario import check
 
 STOP = private(speed(to(0)))

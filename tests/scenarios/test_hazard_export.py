@@ -23,8 +23,8 @@ from skidpad.recording.hazards.records import (
     decode_record,
     encode_record,
 )
-from skidpad.scenarios.hazard_export import export_hazard
-from skidpad.scenarios.writer import OscVersion
+from skidpad.scenarios.export.hazard_export import export_hazard
+from skidpad.scenarios.export.writer import OscVersion
 
 CHECKER = Path(__file__).with_name("asam_check.py")
 JUNCTION_RULE = 1  # of two junction rules that exclude each other, one is always skipped

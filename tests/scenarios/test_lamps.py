@@ -33,7 +33,7 @@ from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.recording.run.lamps import FILE, Lamp, LampChange, LampMode, read_lamps, write_lamps
 from skidpad.scenarios.actions.lights import beam_of_ego
-from skidpad.scenarios.findings import ScenarioError
+from skidpad.scenarios.reading.findings import ScenarioError
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 
 

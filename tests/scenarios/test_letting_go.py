@@ -21,9 +21,9 @@ from tests.scenarios.files import (
 from skidpad.core.geometry import Pose
 from skidpad.core.run import ActorMode
 from skidpad.core.setup import DT, ActorCommand
-from skidpad.scenarios.motion import Guide
-from skidpad.scenarios.player import Player
-from skidpad.scenarios.stage import IdealWorld
+from skidpad.scenarios.movement.motion import Guide
+from skidpad.scenarios.playing.player import Player
+from skidpad.scenarios.playing.stage import IdealWorld
 from skidpad.simulation.scripted import Motion
 
 V_EGO = 20.0  # m/s, twice what its file says

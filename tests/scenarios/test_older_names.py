@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from skidpad.scenarios.playing.stage import played
 from skidpad.scenarios.scenario import check
-from skidpad.scenarios.stage import played
 
 CAR = """<Object name="{0}"><Vehicle name="v" category="car"><ParameterDeclaration/>
 <Performance maxSpeed="60" maxDeceleration="10" mass="1500"/><BoundingBox><Center x="1.4" y="0"

@@ -12,8 +12,8 @@ import pytest
 from tests.scenarios.oracle.cases import CASES
 from tests.scenarios.oracle.reference import OWN, deviations, file_hash, read_reference, write_case
 
+from skidpad.scenarios.playing.stage import played
 from skidpad.scenarios.scenario import compile_scenario
-from skidpad.scenarios.stage import played
 
 DOCS = Path(__file__).parents[2] / "docs" / "openscenario.md"
 # where the standard decides against esmini; docs/openscenario.md names what decides

@@ -15,7 +15,7 @@ from skidpad.core.errors import ConfigError
 from skidpad.recording.formats.osi_udp import PART, message_parts, read_address, send_osi
 from skidpad.roads.bundled import load_map
 from skidpad.roads.lanes import LaneKind, Marking, SignalKind
-from skidpad.scenarios.osi_road import FIRST_LANE, STEP, Tilt, road_truth
+from skidpad.scenarios.export.osi_road import FIRST_LANE, STEP, Tilt, road_truth
 
 
 @pytest.fixture(scope="module")

@@ -13,11 +13,11 @@ from runs import scenario_run
 from skidpad.campaign.runs.run import run
 from skidpad.core.run import ActorMode, Passenger, Scenario
 from skidpad.core.vocabulary import Outcome, SemanticClass
-from skidpad.scenarios.hazard_export import export_hazard, road_under
+from skidpad.scenarios.export.hazard_export import export_hazard, road_under
+from skidpad.scenarios.export.tracks import Track, tracks
+from skidpad.scenarios.export.writer import OscVersion, Sheet, write_element, write_scenario
+from skidpad.scenarios.playing.stage import played
 from skidpad.scenarios.scenario import compile_scenario
-from skidpad.scenarios.stage import played
-from skidpad.scenarios.tracks import Track, tracks
-from skidpad.scenarios.writer import OscVersion, Sheet, write_element, write_scenario
 
 T = np.round(np.arange(0.0, 12.01, 0.1), 3)
 MOTIONS = {

@@ -15,8 +15,8 @@ from skidpad.core.run import ActorMode, Passenger, Scenario, StackDriver
 from skidpad.core.vocabulary import Outcome
 from skidpad.evidence.grip.scores import npc_contact_row
 from skidpad.physics.presets import preset
-from skidpad.scenarios.findings import HARMLESS, Kind
-from skidpad.scenarios.motion import Shape, Transition
+from skidpad.scenarios.movement.motion import Shape, Transition
+from skidpad.scenarios.reading.findings import HARMLESS, Kind
 from skidpad.scenarios.scenario import check, compile_scenario
 
 HEAD = """<?xml version='1.0'?>

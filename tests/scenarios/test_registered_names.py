@@ -29,10 +29,10 @@ from skidpad.campaign.driving.run_setup import load_scenario
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import RunSpec, Scenario
-from skidpad.scenarios.findings import ScenarioError
+from skidpad.scenarios.playing.stage import played
+from skidpad.scenarios.reading.findings import ScenarioError
 from skidpad.scenarios.registry import Acc, Names
 from skidpad.scenarios.scenario import check
-from skidpad.scenarios.stage import played
 from skidpad.simulation.world.traffic.idm import GAP_MIN, Character
 
 ACTIVATE = """<ControllerAction><ActivateControllerAction longitudinal="true" lateral="false"/>

@@ -20,9 +20,9 @@ from skidpad.campaign.runs.play import run_to
 from skidpad.cli.main import app
 from skidpad.core.run import Passenger, Roads
 from skidpad.recording.run.log_files import read_log
-from skidpad.scenarios.run_export import log_tracks, road_of
+from skidpad.scenarios.export.run_export import log_tracks, road_of
+from skidpad.scenarios.playing.stage import played
 from skidpad.scenarios.scenario import compile_scenario
-from skidpad.scenarios.stage import played
 
 
 def exported(folder: Path, *options: str) -> Path:

@@ -7,8 +7,8 @@ from math import hypot
 import pytest
 from tests.scenarios.files import at, compiled, condition, event, on_lane, story, time, told, write
 
+from skidpad.scenarios.playing.stage import played
 from skidpad.scenarios.scenario import check
-from skidpad.scenarios.stage import played
 
 CARS = """<TrafficDefinition name="t"><VehicleCategoryDistribution><VehicleCategoryDistributionEntry
 category="car" weight="3"/><VehicleCategoryDistributionEntry category="truck" weight="1"/>

@@ -13,7 +13,8 @@ from lxml import etree
 
 from scenario_catalogue import SCENARIOS, file_name, write
 from skidpad.roads.bundled import FOLDER as MAPS
-from skidpad.scenarios.findings import Kind
+from skidpad.scenarios.export.writer import OscVersion
+from skidpad.scenarios.reading.findings import Kind
 from skidpad.scenarios.scenario import check
 from skidpad.scenarios.shipped import FOLDER, NAMES
 from skidpad.scenarios.variation import (
@@ -24,7 +25,6 @@ from skidpad.scenarios.variation import (
     variant_parameters,
     variations,
 )
-from skidpad.scenarios.writer import OscVersion
 
 CHECKER = Path(__file__).with_name("asam_check.py")
 FILES = [FOLDER / file_name(s.name, v) for s in SCENARIOS for v in OscVersion]

@@ -9,9 +9,9 @@ import pytest
 from skidpad.campaign.driving.outdoors import environment_of, weather_of
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.physics.presets import preset
+from skidpad.scenarios.export.tracks import Track
+from skidpad.scenarios.export.writer import OscVersion, Sheet, write_scenario
 from skidpad.scenarios.scenario import check
-from skidpad.scenarios.tracks import Track
-from skidpad.scenarios.writer import OscVersion, Sheet, write_scenario
 
 
 def exported(folder, weather, version):

@@ -14,8 +14,8 @@ from skidpad.cli.main import app
 from skidpad.core.run import ActorMode
 from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.log_files import read_log
-from skidpad.scenarios.player import Player
-from skidpad.scenarios.stage import IdealWorld
+from skidpad.scenarios.playing.player import Player
+from skidpad.scenarios.playing.stage import IdealWorld
 
 HIDE = private('<VisibilityAction graphics="true" sensors="{}" traffic="true"/>')
 

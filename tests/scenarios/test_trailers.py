@@ -21,7 +21,7 @@ from tests.scenarios.files import (
 )
 
 from skidpad.core.geometry import Pose
-from skidpad.scenarios.entities import Body, Box, Coupling, Entity
+from skidpad.scenarios.reading.entities import Body, Box, Coupling, Entity
 from skidpad.scenarios.trailers import towed_pose
 
 HITCH, COUPLER = -1.1, 3.2

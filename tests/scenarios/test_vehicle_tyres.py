@@ -3,8 +3,8 @@
 import pytest
 from tests.scenarios.files import at, compiled, vehicle
 
-from skidpad.scenarios.findings import ScenarioError
-from skidpad.scenarios.player import setups
+from skidpad.scenarios.playing.player import setups
+from skidpad.scenarios.reading.findings import ScenarioError
 
 
 def shod(name, tyres):

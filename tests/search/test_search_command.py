@@ -88,7 +88,7 @@ def test_a_kept_failure_is_the_drive_of_its_trial(found):
 
 
 def test_failures_are_a_file_that_play_reads(found):
-    from skidpad.scenarios.distributions import choices
+    from skidpad.scenarios.reading.distributions import choices
 
     out, _ = found
     kept = [t for g in read_findings(out).groups for t in g.failures]

@@ -118,7 +118,7 @@ def test_a_file_of_distributions_is_a_space_and_failures_become_such_a_file(tmp_
     values = {"gap": 1.5, "who": "van", "weather": "icy_30"}
     trial = Trial(number=0, unit=(0.1, 0.9, 0.5), values=values, margin=-1.0)
     write_choices(tmp_path / "f.xosc", "s.xosc", [trial])
-    from skidpad.scenarios.distributions import choices
+    from skidpad.scenarios.reading.distributions import choices
 
     (found,) = choices(tmp_path / "f.xosc")
     assert dict(found.parameters) == {"gap": "1.5", "who": "van"}

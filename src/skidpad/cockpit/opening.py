@@ -14,8 +14,8 @@ from skidpad.core.run import ActorMode, Passenger, RunSpec, Scenario
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.recording.hazards.records import TEXT_FILE, HazardRecord, read_hazards
 from skidpad.recording.run.log_files import TICKS
-from skidpad.scenarios.hazard_export import export_hazard
-from skidpad.scenarios.writer import OscVersion
+from skidpad.scenarios.export.hazard_export import export_hazard
+from skidpad.scenarios.export.writer import OscVersion
 
 RECORDING = ".mcap"
 REPLAYS, SCENARIOS = "replays", "scenarios"  # folders within that of the hazards

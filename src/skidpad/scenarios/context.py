@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from skidpad.roads.opendrive.document import id_number
-from skidpad.scenarios.catalogs import Catalogs
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.entities import Entity
-from skidpad.scenarios.findings import Fault, Finding, Kind
-from skidpad.scenarios.network import Network
+from skidpad.scenarios.movement.network import Network
+from skidpad.scenarios.reading.catalogs import Catalogs
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.entities import Entity
+from skidpad.scenarios.reading.findings import Fault, Finding, Kind
 
 Made = TypeVar("Made")
 ROADS_NAMED = 12  # ids of a map that a fault names

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from skidpad.recording.run.staging import FileCriterion
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.findings import Fault
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.findings import Fault
 
 PREFIX, SUFFIX = "criteria_", "Test"  # in 2019 without the prefix
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.entities import LOCK_MAX
-from skidpad.scenarios.findings import Fault, Finding, Kind
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.entities import LOCK_MAX
+from skidpad.scenarios.reading.findings import Fault, Finding, Kind
 
 V_MAX = 150.0  # m/s, 540 km/h: faster is no road vehicle
 

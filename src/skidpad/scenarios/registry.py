@@ -15,8 +15,8 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.registry import Registry
 from skidpad.core.states import VehicleCommand
 from skidpad.core.told import describe_value
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.findings import Finding, Kind
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.findings import Finding, Kind
 from skidpad.scenarios.scene import Scene
 from skidpad.scenarios.traffic import lead_of
 from skidpad.simulation.world.traffic.idm import Character, idm

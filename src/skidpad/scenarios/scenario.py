@@ -13,25 +13,25 @@ from skidpad.roads.bundled import bundled_maps, load_map
 from skidpad.roads.map_files import is_made_map, map_file
 from skidpad.roads.queries import RoadMap
 from skidpad.scenarios.actions.controllers import Activate, Several
-from skidpad.scenarios.catalogs import Catalogs
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.criteria import file_criteria
-from skidpad.scenarios.document import Node, parse
-from skidpad.scenarios.entities import Entity, choose_ego, compile_entities, spectator
-from skidpad.scenarios.findings import HARMLESS, Fault, Finding, Kind, ScenarioError
-from skidpad.scenarios.lenient import fill_in
-from skidpad.scenarios.network import Network, network_of
+from skidpad.scenarios.movement.network import Network, network_of
 from skidpad.scenarios.oddities import oddities
-from skidpad.scenarios.parameters import root_values, variables
+from skidpad.scenarios.places.routes import route_position
+from skidpad.scenarios.places.trajectories import trajectory_position
+from skidpad.scenarios.reading.catalogs import Catalogs
+from skidpad.scenarios.reading.document import Node, parse
+from skidpad.scenarios.reading.entities import Entity, choose_ego, compile_entities, spectator
+from skidpad.scenarios.reading.findings import HARMLESS, Fault, Finding, Kind, ScenarioError
+from skidpad.scenarios.reading.lenient import fill_in
+from skidpad.scenarios.reading.parameters import root_values, variables
+from skidpad.scenarios.reading.schema import violations
 from skidpad.scenarios.registry import ControllerOf, Names, controller_of
-from skidpad.scenarios.routes import route_position
-from skidpad.scenarios.schema import violations
 from skidpad.scenarios.shipped import FOLDER
 from skidpad.scenarios.signals import SignalController, compile_signals
 from skidpad.scenarios.start import Begin, Start, compile_start
 from skidpad.scenarios.storyboard import Storyboard, compile_storyboard
 from skidpad.scenarios.trailers import line_up, spare_own_trailers
-from skidpad.scenarios.trajectories import trajectory_position
 
 NOTHING: Mapping[str, float | str] = {}
 FURTHER_POSITIONS = {

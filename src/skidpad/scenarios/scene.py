@@ -14,13 +14,13 @@ from skidpad.core.setup import ActorCommand
 from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import LightState
 from skidpad.recording.run.lamps import LampChange
-from skidpad.scenarios.entities import Entity
-from skidpad.scenarios.environment import Clock, Environment
-from skidpad.scenarios.measures import Point, corners, overlap
-from skidpad.scenarios.motion import Guide
-from skidpad.scenarios.network import Network, Place
-from skidpad.scenarios.steering import LaneSteering
-from skidpad.scenarios.tracking import Track, track_demand
+from skidpad.scenarios.movement.measures import Point, corners, overlap
+from skidpad.scenarios.movement.motion import Guide
+from skidpad.scenarios.movement.network import Network, Place
+from skidpad.scenarios.movement.steering import LaneSteering
+from skidpad.scenarios.movement.tracking import Track, track_demand
+from skidpad.scenarios.reading.entities import Entity
+from skidpad.scenarios.reading.environment import Clock, Environment
 from skidpad.simulation.scripted import ActorDriver, Motion
 
 STANDING = 0.05, 1e-3  # m/s, of what drives on tyres, and of what is where the file says

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from skidpad.core.vocabulary import LightState
 from skidpad.roads.opendrive.document import id_number
-from skidpad.scenarios.document import Node
+from skidpad.scenarios.reading.document import Node
 from skidpad.scenarios.scene import Scene
 
 LAMPS = (LightState.RED, LightState.YELLOW, LightState.GREEN)  # from the top, as esmini reads three

@@ -26,13 +26,13 @@ from skidpad.scenarios.actions.world import (
     user_defined,
 )
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.environment import Environment
-from skidpad.scenarios.findings import Fault, Kind
-from skidpad.scenarios.measures import Point, corners
-from skidpad.scenarios.motion import Guide, Shape
-from skidpad.scenarios.network import Network, Place
-from skidpad.scenarios.positions import Position
+from skidpad.scenarios.movement.measures import Point, corners
+from skidpad.scenarios.movement.motion import Guide, Shape
+from skidpad.scenarios.movement.network import Network, Place
+from skidpad.scenarios.places.positions import Position
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.environment import Environment
+from skidpad.scenarios.reading.findings import Fault, Kind
 from skidpad.scenarios.scene import Actor, Scene
 
 ORIGIN = Pose(0.0, 0.0)

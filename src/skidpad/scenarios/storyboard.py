@@ -12,9 +12,9 @@ from skidpad.scenarios.actions.base import GlobalAction, PrivateAction
 from skidpad.scenarios.actions.private import private_action
 from skidpad.scenarios.actions.world import global_action, user_defined
 from skidpad.scenarios.context import Context, Path
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.findings import Fault, Kind
-from skidpad.scenarios.parameters import inner
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.findings import Fault, Kind
+from skidpad.scenarios.reading.parameters import inner
 from skidpad.scenarios.triggers import Trigger, compile_trigger
 
 

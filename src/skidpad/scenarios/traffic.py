@@ -12,10 +12,10 @@ import numpy as np
 
 from skidpad.core.setup import ActorCommand
 from skidpad.roads.queries import LanePoint, RoadMap
-from skidpad.scenarios.measures import between
-from skidpad.scenarios.network import Place
+from skidpad.scenarios.movement.measures import between
+from skidpad.scenarios.movement.network import Place
+from skidpad.scenarios.places.spots import Disc, Mask, Region, Spots, along, spot_at, spots_of
 from skidpad.scenarios.scene import Actor, Scene
-from skidpad.scenarios.spots import Disc, Mask, Region, Spots, along, spot_at, spots_of
 from skidpad.simulation.world.traffic.idm import B_COMFORT, Character, idm
 
 LOOK = 80.0  # m ahead within which somebody may be followed; assumption

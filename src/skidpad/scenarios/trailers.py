@@ -13,8 +13,8 @@ from math import atan2, cos, sin
 from skidpad.core.geometry import Pose
 from skidpad.core.setup import ActorCommand
 from skidpad.scenarios.actions.trailers import can_tow, train_of
-from skidpad.scenarios.entities import GHOST, Entity
-from skidpad.scenarios.network import Network
+from skidpad.scenarios.movement.network import Network
+from skidpad.scenarios.reading.entities import GHOST, Entity
 from skidpad.scenarios.scene import Actor
 from skidpad.scenarios.start import Begin, Start
 

@@ -12,7 +12,7 @@ from skidpad.scenarios.conditions.by_entity import BY_ENTITY
 from skidpad.scenarios.conditions.by_value import BY_VALUE, Never
 from skidpad.scenarios.conditions.distances import DISTANCES
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.document import Node
+from skidpad.scenarios.reading.document import Node
 from skidpad.scenarios.scene import Happening, Path, Scene
 
 ENTITY_CONDITIONS = {**BY_ENTITY, **DISTANCES}

@@ -10,9 +10,9 @@ from xml.etree import ElementTree
 from skidpad.core.space import Choice, Law, Normal, Space, Uniform, Variable
 from skidpad.recording.campaign.searches import Trial
 from skidpad.recording.files import write_bytes
-from skidpad.scenarios.distributions import scenario_of_choices
-from skidpad.scenarios.document import Node, parse
-from skidpad.scenarios.parameters import inner
+from skidpad.scenarios.reading.distributions import scenario_of_choices
+from skidpad.scenarios.reading.document import Node, parse
+from skidpad.scenarios.reading.parameters import inner
 from skidpad.search.space import SEED, WEATHER, check_space
 
 TOP = "ParameterValueDistribution"

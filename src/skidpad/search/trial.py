@@ -19,7 +19,7 @@ from skidpad.recording.campaign.searches import FRONT, Trial
 from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.motion import motion_hash
 from skidpad.roads.bundled import load_map
-from skidpad.scenarios.measures import between
+from skidpad.scenarios.movement.measures import between
 from skidpad.search.margin import NO_CONFLICT, Closeness, closeness
 from skidpad.search.space import apply_values
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from tests.scenarios.oracle.cases import CASES
 from tests.scenarios.oracle.roads import ROADS
 
-from skidpad.scenarios.stage import PlayedScenario
+from skidpad.scenarios.playing.stage import PlayedScenario
 
 HERE = Path(__file__).parent
 OWN, OTHERS = HERE / "references", HERE / "corpus"

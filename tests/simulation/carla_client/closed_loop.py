@@ -20,7 +20,7 @@ from skidpad.evidence.grip.scores import grip_metrics
 from skidpad.physics import types
 from skidpad.physics.presets import find_weather
 from skidpad.roads.bundled import load_map
-from skidpad.scenarios.player import setups
+from skidpad.scenarios.playing.player import setups
 from skidpad.scenarios.scenario import compile_scenario
 from skidpad.scenarios.shipped import scenario_file
 from skidpad.simulation.backend import Backend

@@ -18,8 +18,8 @@ from skidpad.campaign.runs.run import run
 from skidpad.core.run import ActorMode, Passenger, RunSpec, Scenario
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import SensorLevel
+from skidpad.scenarios.playing.stage import played
 from skidpad.scenarios.scenario import check, compile_scenario
-from skidpad.scenarios.stage import played
 
 REPEATS = 5
 SECONDS = 60.0  # s simulated per measurement

@@ -19,8 +19,8 @@ from skidpad.core.weather import RANGES, Weather
 from skidpad.physics.grip import RAIN_FULL
 from skidpad.physics.optics import V_CLEAR, V_FOG
 from skidpad.scenarios.actions.lights import beam_of_ego, lit_brake_lamps
-from skidpad.scenarios.environment import Environment, Fall, Wetness
-from skidpad.scenarios.player import Player
+from skidpad.scenarios.playing.player import Player
+from skidpad.scenarios.reading.environment import Environment, Fall, Wetness
 from skidpad.scenarios.signals import held_lights
 from skidpad.simulation.backend import Backend
 

@@ -43,7 +43,7 @@ from skidpad.physics.wind import wind_of_intensity
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
 from skidpad.scenarios import scenario as scenarios
-from skidpad.scenarios.player import Player, setups
+from skidpad.scenarios.playing.player import Player, setups
 from skidpad.scenarios.registry import Names
 from skidpad.scenarios.shipped import NAMES, scenario_file
 from skidpad.sensors.pictures.overlay import Lens

@@ -20,8 +20,8 @@ from skidpad.campaign.recipes.recipe import nothing_else
 from skidpad.core.errors import FileError
 from skidpad.core.run import Friction, RunSpec, Scenario
 from skidpad.core.weather import Weather
-from skidpad.scenarios.distributions import choices, is_distribution
-from skidpad.scenarios.document import holds
+from skidpad.scenarios.reading.distributions import choices, is_distribution
+from skidpad.scenarios.reading.document import holds
 
 RECIPE = replace(recipe(keep_all=True), command="play", finish=nothing_else)
 

@@ -18,7 +18,7 @@ from skidpad.recording.campaign.results import Timing
 from skidpad.recording.files import output_error, write_bytes
 from skidpad.recording.run.log_files import write_log
 from skidpad.recording.run.readings import write_readings
-from skidpad.scenarios.results import write_results
+from skidpad.scenarios.playing.results import write_results
 
 if TYPE_CHECKING:
     from skidpad.campaign.runs.run import Run

@@ -48,7 +48,7 @@ from skidpad.recording.run.log import LogHeader, RunLog
 from skidpad.recording.run.readings import SensorReadings
 from skidpad.recording.run.ticks import TickLog
 from skidpad.roads.queries import RoadMap
-from skidpad.scenarios.player import Played
+from skidpad.scenarios.playing.player import Played
 from skidpad.simulation.backend import Backend
 from skidpad.stack.interface import Stack
 from skidpad.stack.loading import load_stack

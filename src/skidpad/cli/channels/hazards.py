@@ -79,8 +79,8 @@ def export(
     from skidpad.recording.hazards.records import read_hazards
 
     chosen = _choose_ids({record.id: record for record in read_hazards(folder)}, id)
-    from skidpad.scenarios.hazard_export import export_hazard
-    from skidpad.scenarios.writer import OscVersion
+    from skidpad.scenarios.export.hazard_export import export_hazard
+    from skidpad.scenarios.export.writer import OscVersion
 
     for record in chosen:
         scenario, road = export_hazard(record, folder / "scenarios", OscVersion(osc.value), world)

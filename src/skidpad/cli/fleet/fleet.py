@@ -92,7 +92,7 @@ def serve(
         from skidpad.fleet.mqtt import BatchListener
         from skidpad.fleet.server import Listen, run
         from skidpad.fleet.service import open_fleet
-    from skidpad.scenarios.hazard_export import export_hazard
+    from skidpad.scenarios.export.hazard_export import export_hazard
 
     _check_exposure(host, certificate, key)
     places, known_maps = _places(data, database, blobs), open_maps(maps)

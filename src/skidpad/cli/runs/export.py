@@ -13,7 +13,7 @@ from skidpad.cli.channels.hazards import Osc
 if TYPE_CHECKING:
     from skidpad.recording.formats.osi import World
     from skidpad.recording.run.log import RunLog
-    from skidpad.scenarios.environment import Environment
+    from skidpad.scenarios.reading.environment import Environment
 
 
 def export(
@@ -41,8 +41,8 @@ def export(
     from skidpad.recording.formats.osi import send_run, write_osi
     from skidpad.recording.formats.osi_udp import read_address
     from skidpad.recording.run.log_files import read_log
-    from skidpad.scenarios.run_export import export_run
-    from skidpad.scenarios.writer import OscVersion
+    from skidpad.scenarios.export.run_export import export_run
+    from skidpad.scenarios.export.writer import OscVersion
 
     address = None if osi_udp is None else read_address(osi_udp)
     log = read_log(run)
@@ -83,8 +83,8 @@ def _world(run: Path, log: RunLog) -> World:
     from skidpad.recording.formats.osi import World
     from skidpad.recording.run.lamps import read_lamps
     from skidpad.roads.bundled import load_map
-    from skidpad.scenarios.osi_road import Tilt, road_truth
-    from skidpad.scenarios.run_export import road_of
+    from skidpad.scenarios.export.osi_road import Tilt, road_truth
+    from skidpad.scenarios.export.run_export import road_of
 
     try:
         rain = rain_rate(read_run(run.resolve()).weather)

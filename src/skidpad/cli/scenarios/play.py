@@ -78,7 +78,7 @@ def play(
     if out is None:
         raise ConfigError("play needs --out DIR for the run, or --check")
     from skidpad.campaign.runs.play import run_to
-    from skidpad.scenarios.distributions import is_distribution
+    from skidpad.scenarios.reading.distributions import is_distribution
 
     if file.is_dir() or is_distribution(file):
         how = CampaignOptions(out=out, **structs.asdict(driving))

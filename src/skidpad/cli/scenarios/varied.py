@@ -99,7 +99,7 @@ def _read_varied(file: Path) -> tuple[Path, tuple[Variable, ...]]:
     """Return the scenario that a file is or names, and what the file itself says that varies."""
     from skidpad.cli.scenarios.play import find_scenario
     from skidpad.core.errors import FileError
-    from skidpad.scenarios.distributions import is_distribution
+    from skidpad.scenarios.reading.distributions import is_distribution
     from skidpad.search.files import read_space
 
     file = find_scenario(file)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.motion import STEEPEST, Shape
+from skidpad.scenarios.movement.motion import STEEPEST, Shape
+from skidpad.scenarios.reading.document import Node
 from skidpad.scenarios.scene import DONE, Actor, Running, Scene
 
 

@@ -10,9 +10,9 @@ from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.roads.queries import LanePoint
 from skidpad.scenarios.actions.distance import SPRING
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.measures import Axes, between
-from skidpad.scenarios.motion import SLOW
+from skidpad.scenarios.movement.measures import Axes, between
+from skidpad.scenarios.movement.motion import SLOW
+from skidpad.scenarios.reading.document import Node
 from skidpad.scenarios.scene import Actor, Running, Scene
 
 ASKEW = 0.1  # cosine between a lane and an entity, below which the one is not beside the other

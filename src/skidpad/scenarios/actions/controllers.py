@@ -10,8 +10,8 @@ from types import MappingProxyType
 from skidpad.core.run import ActorMode
 from skidpad.scenarios.actions.base import NoEffect, PrivateAction
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.findings import Fault, Kind
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.findings import Fault, Kind
 from skidpad.scenarios.registry import ControllerOf, controller_of
 from skidpad.scenarios.scene import DONE, Actor, Running, Scene
 

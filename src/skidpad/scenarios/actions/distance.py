@@ -8,9 +8,9 @@ from math import copysign, inf, sqrt
 
 from skidpad.scenarios.actions.base import note_bound
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.entities import Performance
-from skidpad.scenarios.measures import Axes, along_road, between
+from skidpad.scenarios.movement.measures import Axes, along_road, between
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.entities import Performance
 from skidpad.scenarios.scene import Actor, Running, Scene
 
 SPRING = 0.4  # 1/m, of the controller that closes a gap (esmini's, so that files play alike)

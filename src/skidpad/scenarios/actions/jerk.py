@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import copysign, inf, sqrt
 
-from skidpad.scenarios.motion import SLOW
+from skidpad.scenarios.movement.motion import SLOW
 from skidpad.scenarios.scene import Actor, Scene
 
 

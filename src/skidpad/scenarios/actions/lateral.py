@@ -7,12 +7,12 @@ from math import cos, sqrt
 
 from skidpad.scenarios.actions.base import Dimension, Dynamics, Following, dynamics, note_bound
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.entities import Axles
-from skidpad.scenarios.motion import SHARPEST, SLOW, Guide, Shape, Transition
-from skidpad.scenarios.network import next_lane_id
+from skidpad.scenarios.movement.motion import SHARPEST, SLOW, Guide, Shape, Transition
+from skidpad.scenarios.movement.network import next_lane_id
+from skidpad.scenarios.movement.steering import LaneSteering, look_ahead
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.entities import Axles
 from skidpad.scenarios.scene import DONE, Actor, Running, Scene
-from skidpad.scenarios.steering import LaneSteering, look_ahead
 
 A_LATERAL = 1.0  # m/s^2, of a change of offset for which the file gives no limit
 

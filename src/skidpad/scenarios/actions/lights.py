@@ -8,8 +8,8 @@ from skidpad.core.inputs import Beam
 from skidpad.recording.run.lamps import FLASH, Lamp, LampChange, LampMode, newest
 from skidpad.scenarios.actions.base import NoEffect, PrivateAction
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.findings import Kind
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.findings import Kind
 from skidpad.scenarios.scene import DONE, Actor, Running, Scene
 
 LONGEST = 3600.0  # s of a flash

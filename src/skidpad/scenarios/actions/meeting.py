@@ -11,11 +11,11 @@ from enum import Enum, auto
 from math import cos, inf, sqrt
 
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.network import Place
-from skidpad.scenarios.positions import Position, position
+from skidpad.scenarios.movement.network import Place
+from skidpad.scenarios.places.positions import Position, position
+from skidpad.scenarios.places.ways import way_to
+from skidpad.scenarios.reading.document import Node
 from skidpad.scenarios.scene import Actor, Running, Scene
-from skidpad.scenarios.ways import way_to
 
 ARRIVED = 0.0  # m, where a file gives no tolerance
 V_LEAST = 1e-6  # m/s

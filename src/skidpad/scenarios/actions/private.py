@@ -21,8 +21,8 @@ from skidpad.scenarios.actions.routing import (
 from skidpad.scenarios.actions.speed import compile_profile, compile_speed
 from skidpad.scenarios.actions.trailers import compile_trailer
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.findings import Kind
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.findings import Kind
 
 Compile = Callable[[Node, Context], PrivateAction]
 

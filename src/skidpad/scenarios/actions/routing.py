@@ -9,17 +9,22 @@ from random import Random
 from skidpad.core.geometry import Pose
 from skidpad.scenarios.actions.base import Following, note_bound
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.entities import Entity
-from skidpad.scenarios.lines import Line
-from skidpad.scenarios.motion import Guide
-from skidpad.scenarios.network import Network, Place
-from skidpad.scenarios.positions import Position, position
-from skidpad.scenarios.routes import ScenarioRoute, compile_route, random_roads, roads_through
+from skidpad.scenarios.movement.lines import Line
+from skidpad.scenarios.movement.motion import Guide
+from skidpad.scenarios.movement.network import Network, Place
+from skidpad.scenarios.movement.steering import SteeredTrack
+from skidpad.scenarios.movement.tracking import PacedTrack, TimedTrack
+from skidpad.scenarios.places.positions import Position, position
+from skidpad.scenarios.places.routes import (
+    ScenarioRoute,
+    compile_route,
+    random_roads,
+    roads_through,
+)
+from skidpad.scenarios.places.trajectories import Trajectory, compile_trajectory
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.entities import Entity
 from skidpad.scenarios.scene import DONE, Actor, Running, Scene
-from skidpad.scenarios.steering import SteeredTrack
-from skidpad.scenarios.tracking import PacedTrack, TimedTrack
-from skidpad.scenarios.trajectories import Trajectory, compile_trajectory
 
 SLACK = 1e-6  # s before the last point that is there
 

@@ -17,9 +17,9 @@ from skidpad.scenarios.actions.jerk import (
     smooth_pieces,
 )
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.entities import Performance
-from skidpad.scenarios.motion import SLOW, STEEPEST, Shape, Transition
+from skidpad.scenarios.movement.motion import SLOW, STEEPEST, Shape, Transition
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.entities import Performance
 from skidpad.scenarios.scene import Actor, Running, Scene
 
 ELEMENT, PROFILE = "SpeedAction", "SpeedProfileAction"

@@ -10,12 +10,12 @@ from math import ceil, inf
 from skidpad.roads.opendrive.document import id_number
 from skidpad.scenarios.actions.base import GlobalAction
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.entities import Entity, compile_entity_object, of_category
-from skidpad.scenarios.findings import Kind
-from skidpad.scenarios.positions import position
+from skidpad.scenarios.places.positions import position
+from skidpad.scenarios.places.spots import Disc, Outline, Oval, Region, Stretch, Stretches
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.entities import Entity, compile_entity_object, of_category
+from skidpad.scenarios.reading.findings import Kind
 from skidpad.scenarios.scene import DONE, Flow, Running, Scene
-from skidpad.scenarios.spots import Disc, Outline, Oval, Region, Stretch, Stretches
 from skidpad.scenarios.traffic import Directions, Filling, Pool, Sinking, Sourcing, Speeds
 
 MOST = 100  # vehicles of one action at a time; the standard allows fewer than asked for

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.entities import Entity
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.entities import Entity
 from skidpad.scenarios.scene import DONE, Actor, Running, Scene
 
 

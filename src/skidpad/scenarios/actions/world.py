@@ -10,10 +10,10 @@ from skidpad.core.setup import ActorCommand
 from skidpad.scenarios.actions.base import GlobalAction, NoEffect
 from skidpad.scenarios.actions.traffic import compile_traffic
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.environment import Environment, compile_environment
-from skidpad.scenarios.expressions import as_text
-from skidpad.scenarios.positions import Position, position
+from skidpad.scenarios.places.positions import Position, position
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.environment import Environment, compile_environment
+from skidpad.scenarios.reading.expressions import as_text
 from skidpad.scenarios.scene import DONE, Running, Scene
 
 

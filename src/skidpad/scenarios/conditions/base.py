@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.parameters import RULES
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.parameters import RULES
 from skidpad.scenarios.scene import Scene
 
 Probe = Callable[[Scene], bool]

@@ -11,13 +11,13 @@ from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.roads.queries import LanePoint
 from skidpad.scenarios.conditions.base import EntityCondition, Rule, rule
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.entities import Body
-from skidpad.scenarios.measures import Axes, along_road, between
-from skidpad.scenarios.network import Network, next_lane_id
-from skidpad.scenarios.positions import Position, position
+from skidpad.scenarios.movement.measures import Axes, along_road, between
+from skidpad.scenarios.movement.network import Network, next_lane_id
+from skidpad.scenarios.movement.tracking import Track, course
+from skidpad.scenarios.places.positions import Position, position
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.entities import Body
 from skidpad.scenarios.scene import Actor, Scene
-from skidpad.scenarios.tracking import Track, course
 
 SOME = 1e-9  # s, what has begun to last
 

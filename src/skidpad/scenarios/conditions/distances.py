@@ -9,8 +9,7 @@ from math import hypot, inf
 from skidpad.core.geometry import Pose
 from skidpad.scenarios.conditions.base import EntityCondition, Rule, rule
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.measures import (
+from skidpad.scenarios.movement.measures import (
     Axes,
     Direction,
     along_road,
@@ -18,7 +17,8 @@ from skidpad.scenarios.measures import (
     clearance,
     extent_gap,
 )
-from skidpad.scenarios.positions import Position, position
+from skidpad.scenarios.places.positions import Position, position
+from skidpad.scenarios.reading.document import Node
 from skidpad.scenarios.scene import Actor, Scene
 
 EUCLIDEAN = (Direction.EUCLIDEAN, Direction.CARTESIAN)

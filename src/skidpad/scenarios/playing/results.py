@@ -12,10 +12,10 @@ from skidpad.recording.files import write_bytes
 from skidpad.recording.run.lamps import write_lamps
 from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.staging import write_staging
-from skidpad.scenarios.entities import Box
-from skidpad.scenarios.player import Played
+from skidpad.scenarios.playing.player import Played
+from skidpad.scenarios.playing.stage import Row, rows_csv
+from skidpad.scenarios.reading.entities import Box
 from skidpad.scenarios.scene import Happening
-from skidpad.scenarios.stage import Row, rows_csv
 
 TRAJECTORIES, STORY = "trajectories.csv", "storyboard.csv"
 

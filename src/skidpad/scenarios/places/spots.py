@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from skidpad.core.geometry import Pose
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import LanePoint, RoadMap
-from skidpad.scenarios.measures import between
-from skidpad.scenarios.positions import Position
+from skidpad.scenarios.movement.measures import between
+from skidpad.scenarios.places.positions import Position
 from skidpad.scenarios.scene import Actor, Scene
 
 SPACING = 5  # samples, each at most 1 m, from one spot to the next

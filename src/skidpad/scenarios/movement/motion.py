@@ -8,7 +8,7 @@ from math import atan2, cos, pi, sin, sqrt
 
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.roads.queries import LanePoint
-from skidpad.scenarios.network import Network, Place
+from skidpad.scenarios.movement.network import Network, Place
 from skidpad.simulation.scripted import Demand, Motion
 
 SLOW = 1e-6  # m/s, nothing moves

@@ -15,9 +15,9 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.roads.projection import map_place
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.findings import Kind
-from skidpad.scenarios.network import END_SLACK, Place, next_lane_id
+from skidpad.scenarios.movement.network import END_SLACK, Place, next_lane_id
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.findings import Kind
 from skidpad.scenarios.scene import Scene
 
 

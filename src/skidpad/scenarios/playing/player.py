@@ -14,15 +14,15 @@ from skidpad.core.vocabulary import Control
 from skidpad.recording.run.lamps import LampChange
 from skidpad.recording.run.staging import Staging
 from skidpad.scenarios.actions.routing import go_on_after_track
-from skidpad.scenarios.entities import TYRES, Box
-from skidpad.scenarios.motion import Guide
-from skidpad.scenarios.network import Place
-from skidpad.scenarios.piloting import control
+from skidpad.scenarios.movement.motion import Guide
+from skidpad.scenarios.movement.network import Place
+from skidpad.scenarios.playing.piloting import control
+from skidpad.scenarios.playing.staging import staging_of
+from skidpad.scenarios.playing.telling import Telling
+from skidpad.scenarios.reading.entities import TYRES, Box
 from skidpad.scenarios.scenario import Scenario
 from skidpad.scenarios.scene import Actor, Happening, Running, Scene
 from skidpad.scenarios.signals import SignalPlan
-from skidpad.scenarios.staging import staging_of
-from skidpad.scenarios.telling import Telling
 from skidpad.scenarios.traffic import drive
 from skidpad.scenarios.trailers import connect_at_begin, tow_command, tractors_first
 from skidpad.simulation.scripted import ActorDriver, Motion

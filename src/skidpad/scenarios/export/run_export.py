@@ -14,10 +14,10 @@ from skidpad.core.vocabulary import ActorKind, SemanticClass
 from skidpad.recording.files import write_bytes
 from skidpad.recording.run.log import RunLog
 from skidpad.roads.bundled import FOLDER, load_map
-from skidpad.scenarios.environment import Environment
-from skidpad.scenarios.hazard_export import road_under
-from skidpad.scenarios.tracks import Track
-from skidpad.scenarios.writer import OscVersion, Sheet, write_element, write_scenario
+from skidpad.scenarios.export.hazard_export import road_under
+from skidpad.scenarios.export.tracks import Track
+from skidpad.scenarios.export.writer import OscVersion, Sheet, write_element, write_scenario
+from skidpad.scenarios.reading.environment import Environment
 
 DATE = datetime(1970, 1, 1)  # noqa: DTZ001  # the library writes naive times
 EGO = 0  # row of the log's tables

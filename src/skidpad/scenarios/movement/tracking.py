@@ -8,7 +8,7 @@ from math import atan2, cos, hypot, pi, sin
 from typing import Protocol
 
 from skidpad.core.geometry import Pose, wrap_angle
-from skidpad.scenarios.lines import Line
+from skidpad.scenarios.movement.lines import Line
 from skidpad.simulation.scripted import Demand, Motion
 
 NEAR = 1e-6  # m, nothing moves

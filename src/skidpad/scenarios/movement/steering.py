@@ -11,10 +11,10 @@ from dataclasses import replace
 from math import copysign, cos, inf, sin, sqrt, tan
 
 from skidpad.core.geometry import Pose, wrap_angle
-from skidpad.scenarios.entities import Axles, Performance
-from skidpad.scenarios.lines import Line
-from skidpad.scenarios.measures import between
-from skidpad.scenarios.motion import SLOW, Guide
+from skidpad.scenarios.movement.lines import Line
+from skidpad.scenarios.movement.measures import between
+from skidpad.scenarios.movement.motion import SLOW, Guide
+from skidpad.scenarios.reading.entities import Axles, Performance
 from skidpad.simulation.scripted import A_LATERAL_MAX
 
 LOOK_TIME = 0.8  # s that a driver looks ahead, at least one wheelbase; assumption

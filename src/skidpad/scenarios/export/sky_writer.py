@@ -7,7 +7,7 @@ from typing import Any
 
 from scenariogeneration import xosc
 
-from skidpad.scenarios.environment import CELSIUS, HEAVY, Environment, Fall, Wetness
+from skidpad.scenarios.reading.environment import CELSIUS, HEAVY, Environment, Fall, Wetness
 
 NOON, MIDNIGHT = 12, 0  # h; where the sun stands is said beside it
 LIGHT = 100_000.0  # lx of a sun in the zenith

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from skidpad.core.states import VehicleCommand
+from skidpad.scenarios.movement.tracking import track_demand
 from skidpad.scenarios.scene import Actor, Controlling, Scene
-from skidpad.scenarios.tracking import track_demand
 
 
 def control(scene: Scene) -> None:

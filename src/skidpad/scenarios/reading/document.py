@@ -12,9 +12,9 @@ from typing import Any, TypeVar
 from lxml import etree
 
 from skidpad.core.errors import FileError
-from skidpad.scenarios.expressions import ExpressionError, evaluate
-from skidpad.scenarios.findings import Fault, Finding, Kind
-from skidpad.scenarios.older import renew
+from skidpad.scenarios.reading.expressions import ExpressionError, evaluate
+from skidpad.scenarios.reading.findings import Fault, Finding, Kind
+from skidpad.scenarios.reading.older import renew
 
 SIZE_MAX = 64_000_000  # bytes
 TRUE, FALSE = ("true", "1"), ("false", "0")

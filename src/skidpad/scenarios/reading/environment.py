@@ -7,8 +7,8 @@ from enum import Enum
 from math import degrees
 from typing import Any
 
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.moments import moment
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.moments import moment
 
 CELSIUS = 273.15  # K at 0 deg C
 CLOUDS = {  # share of the sky, by both vocabularies

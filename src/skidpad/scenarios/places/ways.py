@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import hypot
 
 from skidpad.roads.queries import LanePoint
-from skidpad.scenarios.network import Network, Place
+from skidpad.scenarios.movement.network import Network, Place
 from skidpad.scenarios.scene import Actor, Scene
 
 

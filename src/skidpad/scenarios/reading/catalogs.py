@@ -6,10 +6,10 @@ from functools import lru_cache
 from pathlib import Path
 
 from skidpad.core.errors import FileError
-from skidpad.scenarios.document import Node, parse
-from skidpad.scenarios.findings import Finding, Kind
-from skidpad.scenarios.parameters import assignments, inner, read_declarations
-from skidpad.scenarios.schema import violations
+from skidpad.scenarios.reading.document import Node, parse
+from skidpad.scenarios.reading.findings import Finding, Kind
+from skidpad.scenarios.reading.parameters import assignments, inner, read_declarations
+from skidpad.scenarios.reading.schema import violations
 
 DEPTH_MAX = 8  # references from entry to entry
 LEVELS_UP = 6  # folders above the file's, from which relative paths may have been meant

@@ -19,8 +19,8 @@ from skidpad.core.run import ActorMode
 from skidpad.core.setup import DT, ActorCommand
 from skidpad.core.states import ActorStates, ActorTable, WorldTruth
 from skidpad.core.vocabulary import ActorKind
-from skidpad.scenarios.entities import Body
-from skidpad.scenarios.player import Player, setups
+from skidpad.scenarios.playing.player import Player, setups
+from skidpad.scenarios.reading.entities import Body
 from skidpad.scenarios.scenario import Scenario
 
 KINDS = {

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from skidpad.scenarios.document import Node, holds, parse
-from skidpad.scenarios.expressions import as_text
-from skidpad.scenarios.parameters import assignments, inner
+from skidpad.scenarios.reading.document import Node, holds, parse
+from skidpad.scenarios.reading.expressions import as_text
+from skidpad.scenarios.reading.parameters import assignments, inner
 
 CHOICES_MAX = 100_000
 TRIES_MAX = 10_000  # draws until one lies in its range

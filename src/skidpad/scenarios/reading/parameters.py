@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from skidpad.core.errors import FileError
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.expressions import as_text
-from skidpad.scenarios.moments import moment
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.expressions import as_text
+from skidpad.scenarios.reading.moments import moment
 
 NUMBERS = ("double", "integer", "int", "unsignedInt", "unsignedShort")
 RULES: Mapping[str, Callable[[float | str, float | str], bool]] = {

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from lxml import etree
 
-from skidpad.scenarios.findings import Finding, Kind
+from skidpad.scenarios.reading.findings import Finding, Kind
 
 FILES = {  # by minor revision; 0.9 has no schema that its files follow
     "0": "OpenSCENARIO_1_0.xsd",

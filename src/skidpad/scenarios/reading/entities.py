@@ -10,9 +10,9 @@ from math import inf
 from skidpad.core.told import describe_value
 from skidpad.core.tyres import REFERENCE, known_tyres
 from skidpad.core.vocabulary import ActorKind
-from skidpad.scenarios.catalogs import Catalogs
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.findings import Fault, Finding, Kind
+from skidpad.scenarios.reading.catalogs import Catalogs
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.findings import Fault, Finding, Kind
 from skidpad.simulation.scripted import nearest_type, steering_geometry
 
 EGO_NAMES = ("ego", "hero", "ego_vehicle")

@@ -19,11 +19,11 @@ from scenariogeneration import xosc
 
 from skidpad.core.vocabulary import SemanticClass, class_of
 from skidpad.recording.files import write_bytes
-from skidpad.scenarios.entities import GHOST
-from skidpad.scenarios.environment import Environment
-from skidpad.scenarios.pieces import Vertex, pieces
-from skidpad.scenarios.sky_writer import environment_action
-from skidpad.scenarios.tracks import Track
+from skidpad.scenarios.export.pieces import Vertex, pieces
+from skidpad.scenarios.export.sky_writer import environment_action
+from skidpad.scenarios.export.tracks import Track
+from skidpad.scenarios.reading.entities import GHOST
+from skidpad.scenarios.reading.environment import Environment
 
 HEIGHTS = {SemanticClass.TRUCK: 3.5, SemanticClass.BUS: 3.2, SemanticClass.PEDESTRIAN: 1.75}
 EARLY = 0.005  # s that triggers fire before their time, so that rounding delays none

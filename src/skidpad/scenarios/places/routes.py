@@ -9,10 +9,10 @@ from itertools import pairwise
 from skidpad.roads.queries import LanePoint
 from skidpad.roads.routing import shortest_route
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.measures import between
-from skidpad.scenarios.network import Network, Place
-from skidpad.scenarios.positions import Fixed, Orientation, Position, orientation, position
+from skidpad.scenarios.movement.measures import between
+from skidpad.scenarios.movement.network import Network, Place
+from skidpad.scenarios.places.positions import Fixed, Orientation, Position, orientation, position
+from skidpad.scenarios.reading.document import Node
 from skidpad.scenarios.scene import Scene
 
 ROADS_MAX = 200  # of a way that nobody has planned

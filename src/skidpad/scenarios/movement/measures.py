@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from skidpad.core.geometry import Pose
 from skidpad.roads.routing import shortest_route
-from skidpad.scenarios.entities import Box
-from skidpad.scenarios.network import Network
+from skidpad.scenarios.movement.network import Network
+from skidpad.scenarios.reading.entities import Box
 
 Point = tuple[float, float]
 Some = TypeVar("Some", float, NDArray[Any])

@@ -10,10 +10,10 @@ from lxml import etree
 
 from skidpad.core.geometry import Pose
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.lines import Line, Vertex, clothoid, even_knots, nurbs
-from skidpad.scenarios.network import Place
-from skidpad.scenarios.positions import Fixed, Orientation, Position, orientation, position
+from skidpad.scenarios.movement.lines import Line, Vertex, clothoid, even_knots, nurbs
+from skidpad.scenarios.movement.network import Place
+from skidpad.scenarios.places.positions import Fixed, Orientation, Position, orientation, position
+from skidpad.scenarios.reading.document import Node
 from skidpad.scenarios.scene import Scene
 
 CLOTHOIDS = ("Clothoid", "ClothoidSpline")  # the place of one says how the line begins

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 
 from lxml import etree
 
-from skidpad.scenarios.document import Node
-from skidpad.scenarios.findings import Finding, Kind
+from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.findings import Finding, Kind
 
 ZERO: Mapping[str, tuple[str, ...]] = {  # attributes whose absence can only mean 0
     "RelativeWorldPosition": ("dx", "dy"),

@@ -1,0 +1,1 @@
+"""Runs and hazards as OpenSCENARIO, OpenDRIVE and ASAM OSI."""

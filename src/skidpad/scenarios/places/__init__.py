@@ -1,0 +1,1 @@
+"""Where: positions, routes, trajectories, places for traffic."""

@@ -1,0 +1,1 @@
+"""From files to elements: XML, parameters, expressions, catalogs, entities; findings by line."""

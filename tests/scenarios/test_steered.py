@@ -27,8 +27,10 @@ from tests.scenarios.files import (
     trajectory,
     vehicle,
     world,
+    write,
 )
 
+import skidpad
 from skidpad.core.geometry import wrap_angle
 
 RADIUS_MIN = 2.7 / tan(0.5)
@@ -210,3 +212,15 @@ def test_an_impossible_axle_is_that_of_the_usual_vehicle(tmp_path):
     assert 0.3 < other.axles.steering_max < 1.5
     notes = [str(f) for f in scenario.findings]
     assert any("maxSteering: 30" in note and "between 0 and 1.5 rad" in note for note in notes)
+
+
+def test_through_its_tyres_it_begins_where_it_stands_too(tmp_path):
+    """0.4 m beside the line: it is not put on it at the begin, and is there after 6 s."""
+    path = trajectory((20, 0), (300, 0), following="follow")
+    begins = init("other", teleport(world(20.0, 0.4, 0.0)), speed(to(10)), path)
+    file = write(tmp_path, init=at("ego", -3, 100, 0) + begins, end=6.0)
+    scenario, away = skidpad.Scenario(file, stack="ideal", actors="physical"), []
+    while scenario.step():
+        away.append(scenario.states["other"].y)
+    assert away[0] == pytest.approx(0.4, abs=1e-3)
+    assert abs(away[-1]) < 0.05

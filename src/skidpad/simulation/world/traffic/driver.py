@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import cos
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,13 +106,13 @@ def turn_to(view: View, d: Drivers, i: int, lane: int, s: float) -> None:
 @inner_kernel
 def acceleration_along(
     view: View, d: Drivers, i: int, path: Ints, s: float, v_desired: float
-) -> tuple[float, float]:
-    """IDM acceleration of i on `path` at `s`, and the gap to its leader there."""
+) -> tuple[float, float, int]:
+    """IDM acceleration of i on `path` at `s`, the gap to its leader there, and that one."""
     leader, gap = occ_.find_ahead(view.streets.net, view.occ, view.placed, path, s, i, REACH_AHEAD)
     v_lead = view.placed[leader].v if leader != NOBODY else 0.0
     v, trait = view.placed[i].speed, d.trait[i]
     c = character(view.care, v, trait.headway, trait.a_max)
-    return idm(v, v_desired, gap, v_lead, c), gap
+    return idm(v, v_desired, gap, v_lead, c), gap, leader
 
 
 @inner_kernel
@@ -130,7 +131,7 @@ def change_gain(view: View, d: Drivers, i: int, lane: int, a_now: float, v_desir
     me, v = d.state[i], view.placed[i].speed
     s = occ_.beside(view.streets.net, d.path[i, 0], me.s, lane)
     straight_path(view.streets.net, lane, d.aside)
-    a_new, gap_ahead = acceleration_along(view, d, i, d.aside, s, v_desired)
+    a_new, gap_ahead, _ = acceleration_along(view, d, i, d.aside, s, v_desired)
     behind, gap_behind = occ_.find_behind(
         view.streets.net, view.occ, view.placed, lane, s, i, REACH_BEHIND
     )
@@ -189,17 +190,28 @@ def consider_change(
 
 
 @inner_kernel
-def held_by(gap: float, gap_merge: float, stops: tuple[float, float, float, float]) -> int:
-    """What of leader, merging traffic and places to stop is nearest and close, as `state.Held`."""
-    nearest, cause = CAUSE_GAP, 0
-    if gap <= nearest:
-        nearest, cause = gap, 1
-    if gap_merge < nearest:
-        nearest, cause = gap_merge, 2
+def note_cause(
+    me: Any,
+    leader: tuple[float, int],
+    merging: tuple[float, int],
+    stops: tuple[float, float, float, float],
+    yielding: tuple[int, int],
+) -> None:
+    """Note what of leader, merging traffic and places to stop is nearest and close, and whose it is.
+
+    leader, merging: gap in m and row. stops: gaps to light, road's end, right of way and zebra.
+    yielding: for what (`state.Held`) and whom the driver waits at the third of them.
+    """
+    nearest, me.held, me.blocker = CAUSE_GAP, 0, NOBODY
+    if leader[0] <= nearest:
+        nearest, me.held, me.blocker = leader[0], 1, leader[1]
+    if merging[0] < nearest:
+        nearest, me.held, me.blocker = merging[0], 2, merging[1]
     for k in range(4):
         if stops[k] < nearest:
-            nearest, cause = stops[k], 3 + k
-    return cause
+            nearest, me.held, me.blocker = stops[k], 3 + k, NOBODY
+    if me.held == 5:
+        me.held, me.blocker = yielding
 
 
 @inner_kernel
@@ -210,22 +222,20 @@ def plan(view: View, d: Drivers, i: int) -> None:
         me.v_desired = desired_speed(view.streets.net, me, trait, d.path[i], body.speed, view.care)
     v, v_desired = body.speed, me.v_desired
     c = character(view.care, v, trait.headway, trait.a_max)
-    a, gap = acceleration_along(view, d, i, d.path[i], me.s, v_desired)
+    a, gap, leader = acceleration_along(view, d, i, d.path[i], me.s, v_desired)
     if body.lane >= 0 and body.lane != d.path[i, 0] and me.change < LEFT_BEHIND * CHANGE_TIME:
         straight_path(view.streets.net, body.lane, d.aside)
-        a_old, gap_old = acceleration_along(view, d, i, d.aside, body.s, v_desired)
-        a, gap = min(a, a_old), min(gap, gap_old)
+        a_old, gap_old, leader_old = acceleration_along(view, d, i, d.aside, body.s, v_desired)
+        a = min(a, a_old)
+        if gap_old < gap:
+            gap, leader = gap_old, leader_old
     merging, gap_merge = merge_gap(view, d, i)
     if merging != NOBODY:
         v_merging = view.placed[merging].v
         a = min(a, idm(v, v_desired, gap_merge, v_merging, c))
     a_lane = a  # what the lane allows, without what holds on every lane
-    stops = (
-        stop_gap(view, d, i),
-        end_gap(view, d, i),
-        right_of_way_gap(view, d, i),
-        zebra_gap(view, d, i),
-    )
+    gap_yield, cause, other = right_of_way_gap(view, d, i)
+    stops = (stop_gap(view, d, i), end_gap(view, d, i), gap_yield, zebra_gap(view, d, i))
     gap_stop = min(stops)
     if gap_stop < np.inf:
         stop = Character(HEADWAY_STOP, c.a_max, c.b, c.a_min)
@@ -240,7 +250,7 @@ def plan(view: View, d: Drivers, i: int) -> None:
         me.stood += view.dt
     elif is_clear_of_line(view, d, i):
         me.stood = 0.0
-    me.held = held_by(gap, gap_merge, stops)
+    note_cause(me, (gap, leader), (gap_merge, merging), stops, (cause, other))
     standing = v < STUCK_SPEED and me.held == 0
     wrong_way = cos(body.yaw - me.heading) < WRONG_WAY
     if standing or (strayed and me.change > CHANGE_TIME) or wrong_way:

@@ -18,8 +18,10 @@ from skidpad.simulation.world.traffic.care import bend_speed_sq, drive_limit, re
 from skidpad.simulation.world.traffic.occupancy import NOBODY, SLOTS, find_ahead
 from skidpad.simulation.world.traffic.path import PATH
 from skidpad.simulation.world.traffic.priority import LIGHT, STOP, YIELD
-from skidpad.simulation.world.traffic.state import Drivers, Streets, View
+from skidpad.simulation.world.traffic.state import Drivers, Held, Streets, View
 
+FREE, COMING, STOP_SIGN = int(Held.NOTHING), int(Held.RIGHT_OF_WAY), int(Held.STOP_SIGN)
+EXIT_TAKEN, AREA_TAKEN = int(Held.EXIT_TAKEN), int(Held.AREA_TAKEN)
 REACH = 60.0  # m before a junction from which a driver looks
 DECIDE = 25.0  # m before it from which gaps are judged; before, a driver is only ready to stop
 V_THROUGH = 8.0  # m/s through a junction
@@ -43,8 +45,9 @@ INDICATED = 5  # lanes ahead that others can guess
 
 
 @inner_kernel
-def right_of_way_gap(view: View, d: Drivers, i: int) -> float:
-    """m from the front bumper to where driver i has to wait for others; inf: nowhere."""
+def right_of_way_gap(view: View, d: Drivers, i: int) -> tuple[float, int, int]:
+    """m from the front bumper to where driver i has to wait for others (inf: nowhere), and for what
+    (`state.Held`) and whom (NOBODY: none of the actors)."""
     body, me = view.placed[i], d.state[i]
     start = -me.s - body.half_length  # from the front to the beginning of path[k]
     far = reach(view.care, body.speed, REACH)
@@ -61,25 +64,28 @@ def right_of_way_gap(view: View, d: Drivers, i: int) -> float:
             if line > -0.5:
                 if before.control == LIGHT and view.lights[before.signal] <= 1:
                     me.waited = 0.0  # the light is what it waits for
-                    return np.inf
-                if _waits(view, d, i, k, start, line, before.control):
+                    return np.inf, FREE, NOBODY
+                cause, other = _waits(view, d, i, k, start, line, before.control)
+                if cause != FREE:
                     me.waited += view.dt
-                    return max(line, 0.1)
+                    return max(line, 0.1), cause, other
             else:
                 me.halted = NOBODY if k == 0 else me.halted  # the stop is over
-                blocked = _gap_within(view, d, i, k, start, True)
+                blocked, cause, other = _gap_within(view, d, i, k, start, True)
                 me.waited = me.waited + view.dt if blocked < np.inf else 0.0
                 if me.waited >= TAKEN_TIME:
-                    blocked = _gap_within(view, d, i, k, start, False)
+                    blocked, cause, other = _gap_within(view, d, i, k, start, False)
                 if blocked < np.inf:
-                    return max(blocked, 0.1)
+                    return max(blocked, 0.1), cause, other
         start += view.streets.net.lane[lane].length
-    return np.inf
+    return np.inf, FREE, NOBODY
 
 
 @inner_kernel
-def _waits(view: View, d: Drivers, i: int, k: int, start: float, line: float, control: int) -> bool:
-    """Whether driver i, not yet past the line before path[k], must be ready to stop there."""
+def _waits(
+    view: View, d: Drivers, i: int, k: int, start: float, line: float, control: int
+) -> tuple[int, int]:
+    """For what and whom driver i, not yet past the line before path[k], must be ready to stop there."""
     me, body = d.state[i], view.placed[i]
     lane = d.path[i, k]
     junction = view.streets.entry[lane].junction
@@ -87,26 +93,30 @@ def _waits(view: View, d: Drivers, i: int, k: int, start: float, line: float, co
         if line < HALT_GAP and body.speed < HALTED:
             me.halted = junction
         else:
-            return True
+            return STOP_SIGN, NOBODY
     if line > reach(view.care, body.speed, DECIDE):
-        return control == YIELD and body.speed > V_THROUGH
-    if _queue_behind(view, d, i, k, start):
-        return True
+        return (COMING if control == YIELD and body.speed > V_THROUGH else FREE), NOBODY
+    other = _queue_behind(view, d, i, k, start)
+    if other != NOBODY:
+        return EXIT_TAKEN, other
     entry = view.streets.entry[lane]
     for c in range(entry.first, entry.first + entry.size):
         conflict = view.streets.conflict[c]
-        if _is_occupied(view, i, conflict.other, conflict.other_start, conflict.other_end):
-            return True
+        other = _on_area(view, i, conflict.other, conflict.other_start, conflict.other_end)
+        if other != NOBODY:
+            return AREA_TAKEN, other
         if not conflict.yields:
-            if control == LIGHT and _lets_turn(view, d, i, conflict.other):
-                return True
+            other = _lets_turn(view, d, i, conflict.other) if control == LIGHT else NOBODY
+            if other != NOBODY:
+                return COMING, other
             continue
         margin = JOIN_MARGIN if conflict.joins else GAP_MARGIN
         way = max(start + conflict.end + 2.0 * body.half_length, 1.0)
         clear = _time_through(view, d, i, way, entry.bend) + margin
-        if _is_coming(view, d, i, conflict.other, conflict.other_start, clear):
-            return True
-    return False
+        other = _coming(view, d, i, conflict.other, conflict.other_start, clear)
+        if other != NOBODY:
+            return COMING, other
+    return FREE, NOBODY
 
 
 @inner_kernel
@@ -131,37 +141,39 @@ def _is_impatient(view: View, d: Drivers, i: int) -> bool:
 
 
 @inner_kernel
-def _lets_turn(view: View, d: Drivers, i: int, lane: int) -> bool:
-    """Whether driver i, who need not yield, lets somebody turn over `lane` who has stood long.
+def _lets_turn(view: View, d: Drivers, i: int, lane: int) -> int:
+    """The driver who has stood long and whom driver i, who need not yield, lets turn over `lane`.
 
     Without it nobody who turns left gets through while the stream that comes the other way fills
     each green: on ice a queue needs all of it to start.
     """
     if not view.care.on or left_at(view.care.grip, 0.0) >= SLIPPERY or _is_impatient(view, d, i):
-        return False
-    if _holds_impatient(view, d, lane, lane, np.inf):
-        return True
+        return NOBODY
+    found = _impatient_on(view, d, lane, lane, np.inf)
+    if found != NOBODY:
+        return found
     row = view.streets.net.lane[lane]
     for p in range(row.prev_first, row.prev_first + row.prevs):
         before = view.streets.net.prev_lane[p]
         entry = view.streets.entry[before]
         green = entry.control == LIGHT and view.lights[entry.signal] == 2  # LightState.GREEN
-        if green and _holds_impatient(view, d, before, lane, HALT_GAP):
-            return True
-    return False
+        found = _impatient_on(view, d, before, lane, HALT_GAP) if green else NOBODY
+        if found != NOBODY:
+            return found
+    return NOBODY
 
 
 @inner_kernel
-def _holds_impatient(view: View, d: Drivers, here: int, lane: int, reach: float) -> bool:
-    """Whether somebody on lane `here`, at most `reach` m from its line, is impatient to go over `lane`."""
+def _impatient_on(view: View, d: Drivers, here: int, lane: int, reach: float) -> int:
+    """Driver on lane `here`, at most `reach` m from its line, who is impatient to go over `lane`."""
     entry = view.occ.head[here]
     while entry != NOBODY:
         j = entry // SLOTS
         turns = _is_impatient(view, d, j) and d.path[j, 0] == here and leads_to(d, j, lane)
         if turns and _gap_to_line(view, d, j) < reach:
-            return True
+            return j
         entry = view.occ.next[entry]
-    return False
+    return NOBODY
 
 
 @inner_kernel
@@ -188,79 +200,88 @@ def _travel_time(v: float, way: float, a: float, v_max: float) -> float:
 
 
 @inner_kernel
-def _is_occupied(view: View, i: int, lane: int, start: float, end: float) -> bool:
-    """Whether a body other than i's is on [start, end] of a lane."""
+def _on_area(view: View, i: int, lane: int, start: float, end: float) -> int:
+    """An actor other than i whose body is on [start, end] of a lane; NOBODY: none."""
     entry = view.occ.head[lane]
     while entry != NOBODY:
         j = entry // SLOTS
         half = view.placed[j].half_length
         if j != i and view.occ.s[entry] + half > start and view.occ.s[entry] - half < end:
-            return True
+            return j
         entry = view.occ.next[entry]
-    return False
+    return NOBODY
 
 
 @inner_kernel
-def _gap_within(view: View, d: Drivers, i: int, k: int, start: float, keeps_out: bool) -> float:
-    """m to the nearest shared area on path[k] that a driver in the junction must not enter; inf: none.
+def _gap_within(
+    view: View, d: Drivers, i: int, k: int, start: float, keeps_out: bool
+) -> tuple[float, int, int]:
+    """m to the nearest shared area on path[k] that a driver in the junction must not enter (inf: none),
+    and for what and whom.
 
     keeps_out: of areas in which another stands. A driver that has almost stopped judges gaps anew.
     """
     entry, body = view.streets.entry[d.path[i, k]], view.placed[i]
-    nearest = np.inf
+    nearest, cause, by = np.inf, FREE, NOBODY
     for c in range(entry.first, entry.first + entry.size):
         conflict = view.streets.conflict[c]
         gap = start + conflict.start
         if gap < 0.0 or gap > nearest:
             continue
-        if keeps_out and _is_occupied(
-            view, i, conflict.other, conflict.other_start, conflict.other_end
-        ):
-            nearest = gap
+        other = NOBODY
+        if keeps_out:
+            other = _on_area(view, i, conflict.other, conflict.other_start, conflict.other_end)
+        if other != NOBODY:
+            nearest, cause, by = gap, AREA_TAKEN, other
         elif conflict.yields and body.speed < V_ANEW:
             way = max(start + conflict.end + 2.0 * body.half_length, 1.0)
             clear = _time_through(view, d, i, way, entry.bend) + GAP_MARGIN
-            if _is_coming(view, d, i, conflict.other, conflict.other_start, clear):
-                nearest = gap
-    return nearest
+            other = _coming(view, d, i, conflict.other, conflict.other_start, clear)
+            if other != NOBODY:
+                nearest, cause, by = gap, COMING, other
+    return nearest, cause, by
 
 
 @inner_kernel
-def _queue_behind(view: View, d: Drivers, i: int, k: int, start: float) -> bool:
-    """Whether a queue leaves no room behind the junction lane path[k]."""
+def _queue_behind(view: View, d: Drivers, i: int, k: int, start: float) -> int:
+    """The last of a queue that leaves no room behind the junction lane path[k]; NOBODY: none."""
     body, me = view.placed[i], d.state[i]
     room = start + view.streets.net.lane[d.path[i, k]].length + 2.0 * body.half_length + EXIT_ROOM
     if d.path[i, k + 1] >= 0 and view.streets.entry[d.path[i, k + 1]].size > 0:
-        return False  # in roundabouts junctions follow each other
+        return NOBODY  # in roundabouts junctions follow each other
     leader, gap = find_ahead(
         view.streets.net, view.occ, view.placed, d.path[i], me.s, i, room + body.half_length
     )
-    return leader != NOBODY and gap < room and view.placed[leader].v < V_QUEUE
+    if leader != NOBODY and gap < room and view.placed[leader].v < V_QUEUE:
+        return leader
+    return NOBODY
 
 
 @inner_kernel
-def _is_coming(view: View, d: Drivers, i: int, lane: int, zone: float, clear: float) -> bool:
-    """Whether somebody arrives at `zone` m along `lane` within `clear` s."""
-    if _arrives(view, d, i, lane, lane, zone, clear):
-        return True
+def _coming(view: View, d: Drivers, i: int, lane: int, zone: float, clear: float) -> int:
+    """An actor that arrives at `zone` m along `lane` within `clear` s; NOBODY: none."""
+    found = _arrives(view, d, i, lane, lane, zone, clear)
+    if found != NOBODY:
+        return found
     row = view.streets.net.lane[lane]
     for p in range(row.prev_first, row.prev_first + row.prevs):
         first = view.streets.net.prev_lane[p]
         if _held_by_light(view, first):
             continue
         way = zone + view.streets.net.lane[first].length
-        if _arrives(view, d, i, first, lane, way, clear):
-            return True
+        found = _arrives(view, d, i, first, lane, way, clear)
+        if found != NOBODY:
+            return found
         if way > _watch_distance(view, V_COMING, clear):
             continue
         row_2 = view.streets.net.lane[first]
         for q in range(row_2.prev_first, row_2.prev_first + row_2.prevs):
             second = view.streets.net.prev_lane[q]
-            if _arrives(
-                view, d, i, second, lane, way + view.streets.net.lane[second].length, clear
-            ):
-                return True
-    return False
+            before = way + view.streets.net.lane[second].length
+            found = _arrives(view, d, i, second, lane, before, clear)
+            if found != NOBODY:
+                return found
+    return NOBODY
 
 
 @inner_kernel
@@ -279,8 +300,8 @@ def _held_by_light(view: View, lane: int) -> bool:
 @inner_kernel
 def _arrives(
     view: View, d: Drivers, i: int, lane: int, target: int, way: float, clear: float
-) -> bool:
-    """Whether somebody on `lane`, `way` m before the area from its beginning, gets there in time."""
+) -> int:
+    """An actor on `lane`, `way` m before the area from its beginning, that gets there in time."""
     entry = view.occ.head[lane]
     while entry != NOBODY:
         j = entry // SLOTS
@@ -299,8 +320,8 @@ def _arrives(
         if view.occ.s[entry_now] > way:
             continue
         if _travel_time(v, max(distance, 0.0), 1.0, max(v, V_THROUGH)) < clear:
-            return True
-    return False
+            return j
+    return NOBODY
 
 
 @inner_kernel

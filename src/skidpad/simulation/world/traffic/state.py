@@ -26,8 +26,11 @@ class Held(IntEnum):
     MERGING = 2  # traffic of another branch
     LIGHT = 3
     ROAD_END = 4
-    RIGHT_OF_WAY = 5
+    RIGHT_OF_WAY = 5  # of others who come
     ZEBRA = 6
+    STOP_SIGN = 7  # until it has stopped
+    EXIT_TAKEN = 8  # a queue leaves no room behind the junction
+    AREA_TAKEN = 9  # another stands on the way through the junction
 
 
 CHANGE_TIME = 5.0  # s for one lane; naturalistic mean 4 to 6 s (Toledo and Zohar 2007)
@@ -52,6 +55,7 @@ DRIVER = np.dtype(
         ("stood", "f8"),  # s before a line, kept until the junction behind it is passed
         ("stuck", "f8"),  # s stopped, off the lane or wrong-way without a cause ahead
         ("held", "i4"),  # Held: what is nearest of that for which it slows down or stands
+        ("blocker", "i4"),  # row of the actor that is the cause, -1: none
     ],
     align=True,
 )

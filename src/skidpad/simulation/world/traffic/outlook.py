@@ -29,6 +29,7 @@ MERGE_REACH = 60.0  # m before a merge within which the streams watch each other
 MERGE_TIME = 6.0  # s before it, at speed: a gap then opens at 2 m/s^2, comfortably
 MERGE_LANES = 4  # of the other branch that are searched backwards: maps cut a road into short lanes
 YELLOW_BRAKE = 3.0  # m/s^2, drivers stop at yellow if this is enough
+STANDS = 0.5  # m/s, slower ones wait
 STOP_MARGIN = 1.0  # m kept to a stop line, beside the IDM's standstill gap
 PREVIEW_STEP = 5.0  # m between two looks at limit and bend
 STRAIGHT = 1.0e-5  # 1/m, less is no bend
@@ -102,6 +103,36 @@ def end_gap(view: View, d: Drivers, i: int) -> float:
 
 
 @inner_kernel
+def _right_of_way_decides(
+    view: View, d: Drivers, i: int, j: int, lanes: tuple[int, int, int], before: float
+) -> bool:
+    """Whether right of way and not the order of arrival decides between drivers i and j at a merge.
+
+    Whoever has priority does not follow one that can still wait for it, and whoever yields waits at its
+    line (`right_of_way`) instead of following one that stands at its own: each would wait for the other.
+
+    lanes: my lane of the junction, theirs, and the one on which j is. before: m from the front of j to
+    the beginning of theirs, negative on it.
+    """
+    mine, theirs, here = lanes
+    entry, other = view.streets.entry[mine], view.placed[j]
+    if not view.care.on:
+        return False
+    for c in range(entry.first, entry.first + entry.size):
+        row = view.streets.conflict[c]
+        if row.other != theirs or not row.joins:
+            continue
+        if row.yields:
+            inside = view.streets.entry[d.path[i, 0]].junction == entry.junction
+            return bool(here != theirs and (not inside or other.speed < STANDS))
+        if here == theirs:
+            return bool(other.speed < STANDS and -before < row.other_start)
+        firm = firm_braking(view.care, other.speed, YELLOW_BRAKE)
+        return bool(other.speed < STANDS or other.speed**2 <= 2.0 * firm * max(before, 0.0))
+    return False
+
+
+@inner_kernel
 def merge_gap(view: View, d: Drivers, i: int) -> tuple[int, float]:
     """Who arrives at a merge ahead just before driver i on another branch, and the gap to it."""
     net, occ = view.streets.net, view.occ
@@ -117,6 +148,7 @@ def merge_gap(view: View, d: Drivers, i: int) -> tuple[int, float]:
             other_lane = net.prev_lane[p]
             if other_lane == d.path[i, k - 1]:
                 continue
+            lane_before = net.lane[other_lane].length
             way, here = (
                 0.0,
                 other_lane,
@@ -131,7 +163,10 @@ def merge_gap(view: View, d: Drivers, i: int) -> tuple[int, float]:
                         here == other_lane or not d.state[j].active or leads_to(d, j, other_lane)
                     )
                     if j != i and comes and start - gap < far and 0.0 < gap < best_gap:
-                        best, best_gap = j, gap
+                        before = start - gap - lane_before - view.placed[j].half_length
+                        lanes = (d.path[i, k - 1], other_lane, here)
+                        if not _right_of_way_decides(view, d, i, j, lanes, before):
+                            best, best_gap = j, gap
                     entry = occ.next[entry]
                 way += row.length
                 if way > far or row.prevs != 1:

@@ -12,7 +12,6 @@ from math import cos, sin, sqrt
 import numpy as np
 
 from skidpad.core.jit import inner_kernel
-from skidpad.physics.grip import left_at
 from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.traffic.care import bend_speed_sq, drive_limit, reach
 from skidpad.simulation.world.traffic.occupancy import NOBODY, SLOTS, find_ahead
@@ -33,8 +32,7 @@ HALTED = 0.5  # m/s
 HALT_GAP = 4.5  # m to the line within which standing counts as a stop
 PATIENCE = 4.0  # s, then who stands on the other side no longer counts
 QUEUE_REACH = 26.0  # m before the area; who stands farther away stands in a queue
-IMPATIENT = 40.0  # s of standing at a light after which those who come the other way let one turn
-SLIPPERY = 0.5  # of the dry road's friction; with more a queue starts within a green
+IMPATIENT = 40.0  # s of standing, about a cycle of lights, after which others let one go first
 TAKEN_TIME = 20.0  # s after which a driver in a junction creeps on
 EXIT_ROOM = 3.0  # m to be free behind the junction beside the own length
 V_QUEUE = 2.0  # m/s, slower leaders make a queue
@@ -106,7 +104,7 @@ def _waits(
         if other != NOBODY:
             return AREA_TAKEN, other
         if not conflict.yields:
-            other = _lets_turn(view, d, i, conflict.other) if control == LIGHT else NOBODY
+            other = _first_to_go(view, d, i, conflict.other)
             if other != NOBODY:
                 return COMING, other
             continue
@@ -136,41 +134,47 @@ def _gap_to_line(view: View, d: Drivers, i: int) -> float:
 @inner_kernel
 def _is_impatient(view: View, d: Drivers, i: int) -> bool:
     """Whether driver i has stood so long that others let it go first."""
-    slippery = view.care.on and left_at(view.care.grip, 0.0) < SLIPPERY
-    return bool(slippery and d.state[i].active and d.state[i].stood > IMPATIENT)
+    return bool(view.care.on and d.state[i].active and d.state[i].stood > IMPATIENT)
 
 
 @inner_kernel
-def _lets_turn(view: View, d: Drivers, i: int, lane: int) -> int:
-    """The driver who has stood long and whom driver i, who need not yield, lets turn over `lane`.
+def _first_to_go(view: View, d: Drivers, i: int, lane: int) -> int:
+    """The driver who has stood for long, longer than driver i, who need not yield, and is let go over
+    `lane` first; NOBODY: none.
 
     Without it nobody who turns left gets through while the stream that comes the other way fills
-    each green: on ice a queue needs all of it to start.
+    each green, nor anybody who yields to an endless stream.
     """
-    if not view.care.on or left_at(view.care.grip, 0.0) >= SLIPPERY or _is_impatient(view, d, i):
+    if not view.care.on:
         return NOBODY
-    found = _impatient_on(view, d, lane, lane, np.inf)
+    longest = max(IMPATIENT, d.state[i].stood)
+    found = _impatient_on(view, d, lane, lane, np.inf, longest)
     if found != NOBODY:
         return found
     row = view.streets.net.lane[lane]
     for p in range(row.prev_first, row.prev_first + row.prevs):
         before = view.streets.net.prev_lane[p]
         entry = view.streets.entry[before]
-        green = entry.control == LIGHT and view.lights[entry.signal] == 2  # LightState.GREEN
-        found = _impatient_on(view, d, before, lane, HALT_GAP) if green else NOBODY
+        if entry.control != LIGHT or view.lights[entry.signal] == 2:  # LightState.GREEN
+            found = _impatient_on(view, d, before, lane, HALT_GAP, longest)
         if found != NOBODY:
             return found
     return NOBODY
 
 
 @inner_kernel
-def _impatient_on(view: View, d: Drivers, here: int, lane: int, reach: float) -> int:
-    """Driver on lane `here`, at most `reach` m from its line, who is impatient to go over `lane`."""
+def _impatient_on(
+    view: View, d: Drivers, here: int, lane: int, reach: float, longest: float
+) -> int:
+    """Driver on lane `here`, at most `reach` m from its line, who has stood for more than `longest` s to
+    go over `lane`, unless it waits for room behind the junction: that may depend on who lets it go."""
     entry = view.occ.head[here]
     while entry != NOBODY:
         j = entry // SLOTS
-        turns = _is_impatient(view, d, j) and d.path[j, 0] == here and leads_to(d, j, lane)
-        if turns and _gap_to_line(view, d, j) < reach:
+        other = d.state[j]
+        turns = other.active and d.path[j, 0] == here and leads_to(d, j, lane)
+        waits = other.stood > longest and other.held != EXIT_TAKEN
+        if turns and waits and _gap_to_line(view, d, j) < reach:
             return j
         entry = view.occ.next[entry]
     return NOBODY

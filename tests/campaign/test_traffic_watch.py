@@ -8,7 +8,9 @@ import pytest
 from skidpad.campaign.bench.headways import headways_of
 from skidpad.campaign.bench.traffic import background_world
 from skidpad.campaign.bench.traffic_options import TrafficBench
+from skidpad.campaign.bench.traffic_waits import root_of, wait_circles
 from skidpad.campaign.bench.traffic_watch import (
+    CIRCLE,
     LONG,
     TrafficCounts,
     Watch,
@@ -131,3 +133,43 @@ def test_who_stands_long_is_listed_with_the_cause() -> None:
     watch.end()
     (stand,) = seen.stands
     assert (stand.actor, stand.cause, stand.seconds) == (0, "light", pytest.approx(121.0))
+
+
+def test_a_circle_of_those_who_wait_is_found_and_a_queue_ends_at_its_first() -> None:
+    blocker = np.array([1, 2, 0, 2, 5, -1, 4, 9, -1, 7], dtype=np.int32)
+    stands = np.array([True] * 7 + [False, True, True])
+    assert wait_circles(blocker, stands) == [(0, 1, 2)]
+    assert root_of(blocker, stands, 6) == 5
+    assert root_of(blocker, stands, 9) == 9, "the one that it waits for drives"
+    assert root_of(blocker, stands, 3) in (0, 1, 2)
+
+
+@pytest.mark.req("C-210")
+def test_a_circle_that_stood_for_a_minute_is_listed_once() -> None:
+    world, seen = world_of(vehicles=3), TrafficCounts()
+    watch = Watch(world, seen, "clear-noon", 1)
+    assert world.traffic is not None
+    driver = world.traffic.drivers.state
+    for tick in range(round(CIRCLE / world.dt) + 60):
+        world.tick = tick
+        driver["held"][:2], driver["blocker"][:2] = Held.MERGING, (1, 0)
+        world.states.present[:2], driver["active"][:2] = True, True
+        world.placed["speed"][:2] = 0.0
+        watch.look()
+    (circle,) = seen.circles
+    assert [line.split(": ")[1] for line in circle] == ["merging of 1", "merging of 0"]
+
+
+def test_a_driver_notes_whom_it_follows() -> None:
+    world = world_of("figure8", 60)
+    assert world.traffic is not None
+    driver, lane, found = world.traffic.drivers.state, world.placed["lane"], 0
+    for _ in range(600):
+        world.step()
+        follows = np.flatnonzero(world.states.present & (driver["held"] == Held.LEADER))
+        other = driver["blocker"][follows]
+        assert (other >= 0).all()
+        same = (lane[follows] == lane[other]) & (driver["change"][follows] > 20.0)
+        assert (other == leaders(world)[0][follows])[same].all()
+        found += int(same.sum())
+    assert found > 100

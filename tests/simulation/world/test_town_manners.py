@@ -61,16 +61,54 @@ def test_who_stopped_in_a_junction_judges_gaps_anew():
     assert speed[-1, 2] > 2.0, "and then goes"
 
 
-@pytest.mark.parametrize(("weather", "lets_go"), [("icy_30", True), ("clear-noon", False)])
-def test_on_ice_who_stood_long_at_a_light_is_let_go_first(weather, lets_go):
+@pytest.mark.parametrize("weather", ["clear-noon", "icy_30"])
+def test_who_is_on_the_roundabout_does_not_follow_one_that_waits_to_enter(weather):
+    """The one that waits is nearer to the merge by a car's length."""
+    around, waits = (112, 18.0, 2.0, (112, 106, 115, 107, 108)), (36, 95.2, 0.0, (36, 117, 107))
+    world = drivers_at(weather, around, waits)
+    speed, lane, contacts = drive(world, 25.0)
+    assert contacts == 0
+    passed = np.flatnonzero(lane[:, 1] == 107)
+    assert len(passed), "who has priority passes"
+    assert speed[: passed[0], 1].min() > 1.5, "without slowing down"
+    assert speed[: passed[0] - 20, 2].max() < 0.5, "and the other one waits"
+
+
+@pytest.mark.parametrize("weather", ["clear-noon", "snow", "icy_30"])
+def test_two_who_turn_left_do_not_wait_for_the_second_in_each_others_queue(weather):
+    """Each queue: first one that turns left, then one that turns right into the other's exit."""
+    line = 157.0
+    places = []
+    for lane, left, right in ((0, (41, 14), (42, 18)), (6, (45, 18), (44, 14))):
+        places += [(lane, line - 4.0, 0.0, (lane, *left)), (lane, line - 11.0, 0.0, (lane, *right))]
+    _, lane, contacts = drive(drivers_at(weather, *places), 60.0)
+    assert contacts == 0
+    assert all(np.isin(lane[:, i], (14, 18)).any() for i in (1, 2, 3, 4)), "all get through"
+
+
+@pytest.mark.parametrize("weather", ["clear-noon", "icy_30"])
+@pytest.mark.parametrize("stood", [60.0, 0.0])
+def test_who_stood_long_at_a_light_is_let_go_first(weather, stood):
     line = 157.0
     turner, coming = (0, line - 4.0, 0.0, (0, 41)), (6, line - 40.0, 5.0, (6, 43))
     world = drivers_at(weather, turner, coming)
-    world.traffic.drivers.state["stood"][1] = 60.0
+    world.traffic.drivers.state["stood"][1] = stood
     _, lane, contacts = drive(world, 60.0)
     assert contacts == 0
     first_in = [np.flatnonzero(lane[:, i] == way)[0] for i, way in ((1, 41), (2, 43))]
-    assert (first_in[0] < first_in[1]) == lets_go
+    assert (first_in[0] < first_in[1]) == (stood > 0.0)
+
+
+def test_who_stood_long_before_an_endless_stream_is_let_go_first():
+    """A left turn out of the main road, before right turns that come one after another."""
+    coming = [(38, 95.0 - 25.0 * k, 8.0, (38, 68, 6)) for k in range(4)]
+    world = drivers_at("clear-noon", (30, 301.0, 0.0, (30, 66, 6)), *coming)
+    world.traffic.drivers.state["stood"][1] = 60.0
+    speed, lane, contacts = drive(world, 30.0)
+    assert contacts == 0
+    through = [np.flatnonzero(lane[:, i] == 6)[0] for i in (1, 2, 3)]
+    assert through[1] < through[0] < through[2], "the second of the stream stops for it"
+    assert (speed[10:] - speed[:-10]).min() / 0.5 > -4.0, "and none brakes hard"
 
 
 @pytest.mark.parametrize(

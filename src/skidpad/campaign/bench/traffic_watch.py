@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.campaign.bench.headways import field_sources, headways_of, judge
+from skidpad.campaign.bench.traffic_waits import cause_name, root_of, wait_circles, wait_graph
 from skidpad.simulation.world.traffic.manager import CHECK_PERIOD
 from skidpad.simulation.world.traffic.state import Held
 from skidpad.simulation.world.world import World
@@ -32,13 +33,15 @@ LOOK = 10  # ticks between two looks at headways
 FAST_ROAD = 80.0 / 3.6 - 0.1  # m/s: limits from here on are those of motorways
 STANDING = 0.5  # m/s
 LONG = 120.0  # s of standing that are listed
+CIRCLE = 60.0  # s for which all of a circle have stood; longer than a cycle of lights
+CAUSE_LOOK = 20  # ticks between two looks at causes
 STOREY = 2.5  # m of height between roads that cross
 CLOSE = 3.0  # s between neighbours, either may be the follower
 
 
 @dataclass(frozen=True, slots=True)
 class Stand:
-    """A vehicle that stood long, and for what most of the time."""
+    """A vehicle that stood long, and for what the first of its queue stood most of the time."""
 
     weather: str
     seed: int
@@ -62,6 +65,8 @@ class TrafficCounts:
     followers_fast_fronts: list[float] = field(default_factory=list)  # likewise, front to front
     followers_slow: list[float] = field(default_factory=list)
     stands: list[Stand] = field(default_factory=list)
+    longest_stand: float = 0.0  # s
+    circles: list[list[str]] = field(default_factory=list)  # of vehicles that wait for each other
 
     def summary(self) -> dict[str, Any]:
         """Returns plain data for JSON: headways as quantiles, everything else as it is."""
@@ -75,7 +80,9 @@ class TrafficCounts:
             "followers_fast_fronts": headways_of(self.followers_fast_fronts),
             "followers_town": headways_of(self.followers_slow),
             "field": self.beside_field(),
+            "longest_stand_s": round(self.longest_stand, 1),
             "stands": [asdict(stand) for stand in self.stands],
+            "circles": self.circles,
         }
 
     def beside_field(self) -> list[dict[str, Any]]:
@@ -100,6 +107,7 @@ class Watch:
         self._steady, self._leader = np.zeros(n), np.full(n, -1)
         self._stood = np.zeros(n)
         self._causes = np.zeros((n, len(Held)), dtype=np.int64)
+        self._circles: set[tuple[int, ...]] = set()
         self._before = world.states.copy()
         self._times = np.full(n, np.inf)  # s to neighbours before the tick in which some are moved
 
@@ -137,12 +145,26 @@ class Watch:
         for i in np.flatnonzero(~stands & (self._stood > 0.0)).tolist():
             self._close_stand(i)
         self._stood[stands] += w.dt
-        rows = np.flatnonzero(stands)
-        self._causes[rows, w.traffic.drivers.state["held"][rows]] += 1
+        self.seen.longest_stand = max(self.seen.longest_stand, float(self._stood.max()))
+        if w.tick % CAUSE_LOOK == 0:
+            self._note_causes(stands)
+
+    def _note_causes(self, stands: NDArray[np.bool_]) -> None:
+        """Note for what each queue stands, and circles of vehicles that wait for each other."""
+        assert self.world.traffic is not None
+        driver = self.world.traffic.drivers.state
+        for i in np.flatnonzero(stands).tolist():
+            root = root_of(driver["blocker"], stands, i)
+            self._causes[i, driver["held"][root]] += 1
+        circles = set(wait_circles(driver["blocker"], self._stood > CIRCLE))
+        for circle in circles - self._circles:
+            standing = np.isin(np.arange(len(stands)), circle)
+            self.seen.circles.append([str(wait) for wait in wait_graph(self.world, standing)])
+        self._circles = circles
 
     def _close_stand(self, i: int) -> None:
         if self._stood[i] > LONG:
-            cause = Held(int(self._causes[i].argmax())).name.lower().replace("_", " ")
+            cause = cause_name(Held(int(self._causes[i].argmax())))
             x, y = float(self._before.x[i]), float(self._before.y[i])
             seconds = round(float(self._stood[i]), 1)
             self.seen.stands.append(Stand(self.weather, self.seed, i, seconds, cause, x, y))

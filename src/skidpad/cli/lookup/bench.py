@@ -153,6 +153,8 @@ def _describe_seen(seen: TrafficCounts) -> Iterator[str]:
             f"vehicle {s.actor} of seed {s.seed} stood {s.seconds:.0f} s (more than {LONG:.0f}) at "
             f"({s.x:.0f}, {s.y:.0f}): {s.cause}"
         )
+    for circle in seen.circles:
+        yield f"vehicles that wait for each other: {'; '.join(circle)}"
 
 
 def _scenarios(seconds: float, quiet: bool) -> dict[str, Any]:

@@ -13,7 +13,12 @@ import numpy as np
 
 from skidpad.core.jit import inner_kernel
 from skidpad.simulation.world.placed import Places
-from skidpad.simulation.world.traffic.care import bend_speed_sq, drive_limit, reach
+from skidpad.simulation.world.traffic.care import (
+    bend_speed_sq,
+    drive_limit,
+    firm_braking,
+    reach,
+)
 from skidpad.simulation.world.traffic.occupancy import NOBODY, SLOTS, find_ahead
 from skidpad.simulation.world.traffic.path import PATH
 from skidpad.simulation.world.traffic.priority import LIGHT, STOP, YIELD
@@ -33,6 +38,7 @@ HALT_GAP = 4.5  # m to the line within which standing counts as a stop
 PATIENCE = 4.0  # s, then who stands on the other side no longer counts
 QUEUE_REACH = 26.0  # m before the area; who stands farther away stands in a queue
 IMPATIENT = 40.0  # s of standing, about a cycle of lights, after which others let one go first
+COURTESY_BRAKE = 3.0  # m/s^2, for which one does so
 TAKEN_TIME = 20.0  # s after which a driver in a junction creeps on
 EXIT_ROOM = 3.0  # m to be free behind the junction beside the own length
 V_QUEUE = 2.0  # m/s, slower leaders make a queue
@@ -98,13 +104,15 @@ def _waits(
     if other != NOBODY:
         return EXIT_TAKEN, other
     entry = view.streets.entry[lane]
+    firm = firm_braking(view.care, body.speed, COURTESY_BRAKE)
+    can_wait = body.speed * body.speed <= 2.0 * firm * max(line, 0.1)
     for c in range(entry.first, entry.first + entry.size):
         conflict = view.streets.conflict[c]
         other = _on_area(view, i, conflict.other, conflict.other_start, conflict.other_end)
         if other != NOBODY:
             return AREA_TAKEN, other
         if not conflict.yields:
-            other = _first_to_go(view, d, i, conflict.other)
+            other = _first_to_go(view, d, i, conflict.other) if can_wait else NOBODY
             if other != NOBODY:
                 return COMING, other
             continue

@@ -121,7 +121,7 @@ def drivers(n: int) -> Drivers:
     """n inactive drivers."""
     state = np.zeros(n, dtype=DRIVER)
     state["change"] = state["cap"] = np.inf
-    state["halted"] = -1
+    state["halted"] = state["blocker"] = -1
     return Drivers(
         state,
         np.zeros(n, dtype=TRAIT),

@@ -57,8 +57,15 @@ def measure(asked: TrafficBench, weather: str) -> TrafficRow:
     row, seed = TrafficRow(weather), FIRST_SEED
     while row.km < asked.km:
         world = background_world(asked, weather, seed)
-        _drive(row, world, asked.km, Watch(world, row.seen, weather, seed))
+        _drive(row, world, DRIVE, asked.km, Watch(world, row.seen, weather, seed))
         seed += 1
+    return row
+
+
+def measure_drive(asked: TrafficBench, weather: str, seed: int, seconds: float) -> TrafficRow:
+    """Drive one seed for that long, however far the vehicles get."""
+    row, world = TrafficRow(weather), background_world(asked, weather, seed)
+    _drive(row, world, seconds, np.inf, Watch(world, row.seen, weather, seed))
     return row
 
 
@@ -74,11 +81,11 @@ def background_world(asked: TrafficBench, weather: str, seed: int) -> World:
     return world
 
 
-def _drive(row: TrafficRow, world: World, km: float, watch: Watch) -> None:
+def _drive(row: TrafficRow, world: World, seconds: float, km: float, watch: Watch) -> None:
     assert world.traffic is not None
     drivers = world.traffic.drivers.state
     before = drivers["change"].copy()
-    for _ in range(round(DRIVE / DT)):
+    for _ in range(round(seconds / DT)):
         world.step()
         watch.look()
         there = world.states.present

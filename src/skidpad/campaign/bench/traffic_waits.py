@@ -1,4 +1,4 @@
-"""Who waits for whom among vehicles of background traffic, as the drivers themselves note it."""
+"""The graph of vehicles of background traffic that wait for each other, as their drivers note it."""
 
 from __future__ import annotations
 

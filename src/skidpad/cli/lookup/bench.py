@@ -131,7 +131,7 @@ def _matrix(seconds: float, run: bool, quiet: bool) -> dict[str, Any]:
 
 
 def _describe_seen(seen: TrafficCounts) -> Iterator[str]:
-    """Headways in steady following, and who stood long and for what."""
+    """Headways in steady following, vehicles that stood long and for what, and circles of such."""
     from skidpad.campaign.bench.headways import headways_of
     from skidpad.campaign.bench.traffic_watch import LONG
 

@@ -108,8 +108,8 @@ def _right_of_way_decides(
 ) -> bool:
     """Whether right of way and not the order of arrival decides between drivers i and j at a merge.
 
-    Whoever has priority does not follow one that can still wait for it, and whoever yields waits at its
-    line (`right_of_way`) instead of following one that stands at its own: each would wait for the other.
+    A driver with priority does not follow one that can still wait for it. A driver that yields waits at
+    its line (`right_of_way`) and does not follow one that stands at its own: each would wait for the other.
 
     lanes: my lane of the junction, theirs, and the one on which j is. before: m from the front of j to
     the beginning of theirs, negative on it.

@@ -1,6 +1,6 @@
 """Waiting for others at junctions and zebras: stop lines, gap acceptance, areas that are taken.
 
-A driver decides before the junction: it enters when its way through is free, when nobody to whom
+A driver decides before the junction: it enters when its way through is free, when no vehicle to which
 it yields arrives too soon, and when there is room behind the junction. Once in, it keeps out of areas
 in which another stands, and judges gaps anew when it had to stop.
 """
@@ -31,14 +31,14 @@ DECIDE = 25.0  # m before it from which gaps are judged; before, a driver is onl
 V_THROUGH = 8.0  # m/s through a junction
 GAP_MARGIN = 1.0  # s beyond leaving the shared area: critical gaps near 4 to 7 s (HCM 2010)
 JOIN_MARGIN = 2.5  # s, who joins must not be caught up at once
-V_COMING = 15.0  # m/s, of those who come, where they are not looked at one by one
+V_COMING = 15.0  # m/s, of others that come, where they are not looked at one by one
 WATCH = 70.0  # m before the shared area in which others matter
 HALTED = 0.5  # m/s
 HALT_GAP = 4.5  # m to the line within which standing counts as a stop
 PATIENCE = 4.0  # s, then who stands on the other side no longer counts
 QUEUE_REACH = 26.0  # m before the area; who stands farther away stands in a queue
 IMPATIENT = 40.0  # s of standing, about a cycle of lights, after which others let one go first
-COURTESY_BRAKE = 3.0  # m/s^2, for which one does so
+COURTESY_BRAKE = 3.0  # m/s^2 at most, to let one go first
 TAKEN_TIME = 20.0  # s after which a driver in a junction creeps on
 EXIT_ROOM = 3.0  # m to be free behind the junction beside the own length
 V_QUEUE = 2.0  # m/s, slower leaders make a queue
@@ -50,8 +50,8 @@ INDICATED = 5  # lanes ahead that others can guess
 
 @inner_kernel
 def right_of_way_gap(view: View, d: Drivers, i: int) -> tuple[float, int, int]:
-    """m from the front bumper to where driver i has to wait for others (inf: nowhere), and for what
-    (`state.Held`) and whom (NOBODY: none of the actors)."""
+    """m from the front bumper to where driver i has to wait for others (inf: nowhere), for what
+    (`state.Held`), and the row of the actor that is the cause (NOBODY: there is none)."""
     body, me = view.placed[i], d.state[i]
     start = -me.s - body.half_length  # from the front to the beginning of path[k]
     far = reach(view.care, body.speed, REACH)
@@ -89,7 +89,8 @@ def right_of_way_gap(view: View, d: Drivers, i: int) -> tuple[float, int, int]:
 def _waits(
     view: View, d: Drivers, i: int, k: int, start: float, line: float, control: int
 ) -> tuple[int, int]:
-    """For what and whom driver i, not yet past the line before path[k], must be ready to stop there."""
+    """For what driver i, not yet past the line before path[k], must be ready to stop there, and the row of
+    the actor that is the cause."""
     me, body = d.state[i], view.placed[i]
     lane = d.path[i, k]
     junction = view.streets.entry[lane].junction
@@ -147,11 +148,11 @@ def _is_impatient(view: View, d: Drivers, i: int) -> bool:
 
 @inner_kernel
 def _first_to_go(view: View, d: Drivers, i: int, lane: int) -> int:
-    """The driver who has stood for long, longer than driver i, who need not yield, and is let go over
-    `lane` first; NOBODY: none.
+    """Row of a driver that waits to go over `lane` and that driver i, though it need not yield, lets go
+    first: it has stood for long, and longer than i.
 
-    Without it nobody who turns left gets through while the stream that comes the other way fills
-    each green, nor anybody who yields to an endless stream.
+    Without it no left turn gets through while the stream that comes the other way fills each green,
+    nor does any vehicle that yields to an endless stream.
     """
     if not view.care.on:
         return NOBODY
@@ -174,8 +175,11 @@ def _first_to_go(view: View, d: Drivers, i: int, lane: int) -> int:
 def _impatient_on(
     view: View, d: Drivers, here: int, lane: int, reach: float, longest: float
 ) -> int:
-    """Driver on lane `here`, at most `reach` m from its line, who has stood for more than `longest` s to
-    go over `lane`, unless it waits for room behind the junction: that may depend on who lets it go."""
+    """Row of a driver on lane `here`, at most `reach` m from its line, that has stood for more than
+    `longest` s and goes over `lane`.
+
+    One that waits for room behind the junction does not count: that room may depend on driver i.
+    """
     entry = view.occ.head[here]
     while entry != NOBODY:
         j = entry // SLOTS
@@ -213,7 +217,7 @@ def _travel_time(v: float, way: float, a: float, v_max: float) -> float:
 
 @inner_kernel
 def _on_area(view: View, i: int, lane: int, start: float, end: float) -> int:
-    """An actor other than i whose body is on [start, end] of a lane; NOBODY: none."""
+    """Row of an actor other than i whose body is on [start, end] of a lane."""
     entry = view.occ.head[lane]
     while entry != NOBODY:
         j = entry // SLOTS
@@ -229,7 +233,7 @@ def _gap_within(
     view: View, d: Drivers, i: int, k: int, start: float, keeps_out: bool
 ) -> tuple[float, int, int]:
     """m to the nearest shared area on path[k] that a driver in the junction must not enter (inf: none),
-    and for what and whom.
+    for what, and the row of the actor that is the cause.
 
     keeps_out: of areas in which another stands. A driver that has almost stopped judges gaps anew.
     """
@@ -256,7 +260,7 @@ def _gap_within(
 
 @inner_kernel
 def _queue_behind(view: View, d: Drivers, i: int, k: int, start: float) -> int:
-    """The last of a queue that leaves no room behind the junction lane path[k]; NOBODY: none."""
+    """Row of the last in a queue that leaves no room behind the junction lane path[k]."""
     body, me = view.placed[i], d.state[i]
     room = start + view.streets.net.lane[d.path[i, k]].length + 2.0 * body.half_length + EXIT_ROOM
     if d.path[i, k + 1] >= 0 and view.streets.entry[d.path[i, k + 1]].size > 0:
@@ -271,7 +275,7 @@ def _queue_behind(view: View, d: Drivers, i: int, k: int, start: float) -> int:
 
 @inner_kernel
 def _coming(view: View, d: Drivers, i: int, lane: int, zone: float, clear: float) -> int:
-    """An actor that arrives at `zone` m along `lane` within `clear` s; NOBODY: none."""
+    """Row of an actor that arrives at `zone` m along `lane` within `clear` s."""
     found = _arrives(view, d, i, lane, lane, zone, clear)
     if found != NOBODY:
         return found
@@ -313,7 +317,7 @@ def _held_by_light(view: View, lane: int) -> bool:
 def _arrives(
     view: View, d: Drivers, i: int, lane: int, target: int, way: float, clear: float
 ) -> int:
-    """An actor on `lane`, `way` m before the area from its beginning, that gets there in time."""
+    """Row of an actor on `lane`, `way` m before the area from its beginning, that gets there in time."""
     entry = view.occ.head[lane]
     while entry != NOBODY:
         j = entry // SLOTS

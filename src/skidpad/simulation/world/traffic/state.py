@@ -26,7 +26,7 @@ class Held(IntEnum):
     MERGING = 2  # traffic of another branch
     LIGHT = 3
     ROAD_END = 4
-    RIGHT_OF_WAY = 5  # of others who come
+    RIGHT_OF_WAY = 5  # of others that come
     ZEBRA = 6
     STOP_SIGN = 7  # until it has stopped
     EXIT_TAKEN = 8  # a queue leaves no room behind the junction

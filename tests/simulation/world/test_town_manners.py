@@ -87,6 +87,18 @@ def test_two_who_turn_left_do_not_wait_for_the_second_in_each_others_queue(weath
 
 
 @pytest.mark.parametrize("weather", ["clear-noon", "icy_30"])
+@pytest.mark.parametrize(("s", "passes"), [(18.8, False), (30.0, True)])
+def test_who_waits_within_a_junction_never_creeps_into_one_that_stands_there(weather, s, passes):
+    """It stood for 20 s before an area that it shares with the other, which does not move."""
+    waits, stands = (71, 8.9, 0.0, (71, 30)), (72, s, 0.0, (72, 16))
+    world = drivers_at(weather, waits, stands)
+    world.traffic.release(2)
+    _, lane, contacts = drive(world, 45.0)
+    assert contacts == 0
+    assert (lane[:, 1] == 30).any() == passes
+
+
+@pytest.mark.parametrize("weather", ["clear-noon", "icy_30"])
 @pytest.mark.parametrize("stood", [60.0, 0.0])
 def test_who_stood_long_at_a_light_is_let_go_first(weather, stood):
     line = 157.0

@@ -27,8 +27,8 @@ from skidpad.simulation.world.traffic.care import Care
 from skidpad.simulation.world.traffic.driver import drive_all
 from skidpad.simulation.world.traffic.occupancy import Occupancy
 from skidpad.simulation.world.traffic.path import wrapped
-from skidpad.simulation.world.traffic.right_of_way import note_walkers
 from skidpad.simulation.world.traffic.state import Drivers, Streets, View
+from skidpad.simulation.world.traffic.zebras import note_walkers
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

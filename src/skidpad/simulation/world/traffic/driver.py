@@ -41,10 +41,10 @@ from skidpad.simulation.world.traffic.path import (
 from skidpad.simulation.world.traffic.right_of_way import (
     is_clear_of_line,
     right_of_way_gap,
-    zebra_gap,
 )
 from skidpad.simulation.world.traffic.state import CHANGE_TIME, Drivers, View
 from skidpad.simulation.world.traffic.tracking import pedals, steer
+from skidpad.simulation.world.traffic.zebras import zebra_gap
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]

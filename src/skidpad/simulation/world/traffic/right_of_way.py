@@ -1,4 +1,4 @@
-"""Waiting for others at junctions and zebras: stop lines, gap acceptance, areas that are taken.
+"""Waiting for others at junctions: stop lines, gap acceptance, areas that are taken.
 
 A driver decides before the junction: it enters when its way through is free, when no vehicle to which
 it yields arrives too soon, and when there is room behind the junction. Once in, it keeps out of areas
@@ -12,7 +12,6 @@ from math import cos, sin, sqrt
 import numpy as np
 
 from skidpad.core.jit import inner_kernel
-from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.traffic.care import (
     bend_speed_sq,
     drive_limit,
@@ -22,7 +21,7 @@ from skidpad.simulation.world.traffic.care import (
 from skidpad.simulation.world.traffic.occupancy import NOBODY, SLOTS, find_ahead
 from skidpad.simulation.world.traffic.path import PATH
 from skidpad.simulation.world.traffic.priority import LIGHT, STOP, YIELD
-from skidpad.simulation.world.traffic.state import Drivers, Held, Streets, View
+from skidpad.simulation.world.traffic.state import Drivers, Held, View
 
 FREE, COMING, STOP_SIGN = int(Held.NOTHING), int(Held.RIGHT_OF_WAY), int(Held.STOP_SIGN)
 EXIT_TAKEN, AREA_TAKEN = int(Held.EXIT_TAKEN), int(Held.AREA_TAKEN)
@@ -39,12 +38,11 @@ PATIENCE = 4.0  # s, then who stands on the other side no longer counts
 QUEUE_REACH = 26.0  # m before the area; who stands farther away stands in a queue
 IMPATIENT = 40.0  # s of standing, about a cycle of lights, after which others let one go first
 COURTESY_BRAKE = 3.0  # m/s^2 at most, to let one go first
-TAKEN_TIME = 20.0  # s after which a driver in a junction creeps on
+TAKEN_TIME = 20.0  # s after which a driver in a junction creeps past others that leave room
+CREEP_ROOM = 0.4  # m to them at least
 EXIT_ROOM = 3.0  # m to be free behind the junction beside the own length
 V_QUEUE = 2.0  # m/s, slower leaders make a queue
 V_ANEW = 2.0  # m/s, below which a driver in a junction can still leave the way to others
-KERB = 0.5  # m beside the road from which a pedestrian in motion counts as on the zebra
-V_WALKING = 0.1  # m/s
 INDICATED = 5  # lanes ahead that others can guess
 
 
@@ -77,7 +75,7 @@ def right_of_way_gap(view: View, d: Drivers, i: int) -> tuple[float, int, int]:
                 me.halted = NOBODY if k == 0 else me.halted  # the stop is over
                 blocked, cause, other = _gap_within(view, d, i, k, start, True)
                 me.waited = me.waited + view.dt if blocked < np.inf else 0.0
-                if me.waited >= TAKEN_TIME:
+                if me.waited >= TAKEN_TIME:  # past those who leave room
                     blocked, cause, other = _gap_within(view, d, i, k, start, False)
                 if blocked < np.inf:
                     return max(blocked, 0.1), cause, other
@@ -229,13 +227,29 @@ def _on_area(view: View, i: int, lane: int, start: float, end: float) -> int:
 
 
 @inner_kernel
+def _is_in_way(view: View, i: int, j: int, lane: int, front: float) -> bool:
+    """Whether the body of actor j leaves driver i no room on a lane, from `front` m along it on."""
+    me, other, row = view.placed[i], view.placed[j], view.streets.net.lane[lane]
+    c, s = cos(other.yaw), sin(other.yaw)
+    half_l = other.half_length + me.half_width + CREEP_ROOM
+    half_w = other.half_width + me.half_width + CREEP_ROOM
+    for k in range(row.first, row.first + row.size):
+        point = view.streets.net.point[k]
+        dx, dy = point.x - other.x, point.y - other.y
+        if point.s > front and abs(c * dx + s * dy) < half_l and abs(-s * dx + c * dy) < half_w:
+            return True
+    return False
+
+
+@inner_kernel
 def _gap_within(
     view: View, d: Drivers, i: int, k: int, start: float, keeps_out: bool
 ) -> tuple[float, int, int]:
     """m to the nearest shared area on path[k] that a driver in the junction must not enter (inf: none),
     for what, and the row of the actor that is the cause.
 
-    keeps_out: of areas in which another stands. A driver that has almost stopped judges gaps anew.
+    keeps_out: of areas in which another stands, else only of those whose way is not free. A driver that
+    has almost stopped judges gaps anew.
     """
     entry, body = view.streets.entry[d.path[i, k]], view.placed[i]
     nearest, cause, by = np.inf, FREE, NOBODY
@@ -245,8 +259,14 @@ def _gap_within(
         if gap < 0.0 or gap > nearest:
             continue
         other = NOBODY
-        if keeps_out:
+        if keeps_out or view.care.on:
             other = _on_area(view, i, conflict.other, conflict.other_start, conflict.other_end)
+        if (
+            other != NOBODY
+            and not keeps_out
+            and not _is_in_way(view, i, other, d.path[i, k], -start)
+        ):
+            other = NOBODY
         if other != NOBODY:
             nearest, cause, by = gap, AREA_TAKEN, other
         elif conflict.yields and body.speed < V_ANEW:
@@ -347,39 +367,3 @@ def leads_to(d: Drivers, j: int, lane: int) -> bool:
     for k in range(INDICATED):
         found = found or d.path[j, k] == lane
     return found
-
-
-@inner_kernel
-def note_walkers(streets: Streets, placed: Places) -> None:
-    """Mark the zebras on which somebody walks, or steps from the kerb."""
-    for z in range(len(streets.zebras)):
-        zebra = streets.zebras[z]
-        c, s = cos(zebra[2]), sin(zebra[2])
-        streets.busy[z] = False
-        for i in streets.walkers:
-            who = placed[i]
-            if not who.present or who.vx * who.vx + who.vy * who.vy <= V_WALKING * V_WALKING:
-                continue
-            dx, dy = who.x - zebra[0], who.y - zebra[1]
-            along, across = c * dx + s * dy, -s * dx + c * dy
-            if abs(along) < zebra[3] + KERB and abs(across) < zebra[4]:
-                streets.busy[z] = True
-
-
-@inner_kernel
-def zebra_gap(view: View, d: Drivers, i: int) -> float:
-    """m from the front bumper to a zebra on which somebody walks; inf: none within reach."""
-    body = view.placed[i]
-    start = -d.state[i].s - body.half_length
-    far = reach(view.care, body.speed, REACH)
-    for k in range(PATH):
-        lane = d.path[i, k]
-        if lane < 0 or start > far:
-            break
-        entry = view.streets.entry[lane]
-        for row in range(entry.zebra_first, entry.zebra_first + entry.zebras):
-            gap = start + view.streets.zebra[row].s - 1.0
-            if gap > -1.0 and view.streets.busy[view.streets.zebra[row].zebra]:
-                return float(max(gap, 0.1))
-        start += view.streets.net.lane[lane].length
-    return np.inf

@@ -102,7 +102,7 @@ def test_followers_are_held_up_and_no_longer_close_in(
     watch = Watch(world, seen, "clear-noon", 900_000)
     assert world.traffic is not None
     halves = world.placed["half_length"][:2].copy()
-    for tick in range(10, 100, 10):
+    for tick in range(10, 220, 10):
         world.tick = tick
         world.placed["present"][:2] = world.states.present[:2] = True
         world.placed["lane"][1] = world.placed["lane"][0]
@@ -112,9 +112,9 @@ def test_followers_are_held_up_and_no_longer_close_in(
         world.placed["ax"][:2] = 0.0
         world.traffic.drivers.state["v_desired"][0] = wanted
         watch.look()
-    assert len(seen.fast) == 2  # of 9 looks: the first finds the leader, and 3.5 s are 7 of 0.5 s
+    assert len(seen.fast) == 14  # of 21 looks: the first finds the leader, and 3.5 s are 7 of 0.5 s
     assert seen.fast[0] == pytest.approx(30.0 / own)
-    assert len(seen.followers_fast) == (2 if counted else 0)
+    assert len(seen.followers_fast) == (1 if counted else 0)  # after 10 s
     if counted:
         fronts = 30.0 / own + 2.0 * halves[1] / own
         assert seen.followers_fast_fronts[0] == pytest.approx(fronts)

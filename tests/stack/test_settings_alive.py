@@ -249,6 +249,7 @@ OTHERS: dict[str, Scenario] = {
     "wind_gusts": Scenario(0.3, in_wind(wind_speed=12.0)),
     "camera": Scenario(False, lambda s: pictures(s, "rain-noon", "rgb_front")),
     "night_rain": Scenario("rain_only", lambda s: pictures(s, "rain-night", "rgb_front")),
+    "headways": Scenario("field", short_drive("clear-noon")),
     "drivers": Scenario(False, short_drive("rain-noon")),
     "initial_limit_kmh": Scenario(30.0, short_drive("clear-noon")),
     "traffic_positions": Scenario("table", short_drive("clear-noon")),

@@ -24,6 +24,7 @@ from skidpad.core.vocabulary import (
     AntiLock,
     Clearance,
     GripModel,
+    Headways,
     LidarModel,
     RadarModel,
     RangeModel,
@@ -136,6 +137,9 @@ class TrafficSettings(SettingsPart):
 
     drivers: bool = setting_field(
         True, "M-1, R-5", "background drivers differ and mind grip and sight"
+    )
+    headways: Headways = setting_field(
+        Headways.COMFORT, "M-1, R-5", "how closely background drivers follow, with `drivers`"
     )
     initial_limit_kmh: float | None = setting_field(
         None, "M-6", "limit of background drivers up to the first sign", low=5.0, high=250.0

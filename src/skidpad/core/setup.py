@@ -14,6 +14,7 @@ from skidpad.core.vocabulary import (
     AntiLock,
     Control,
     GripModel,
+    Headways,
     LidarModel,
     RadarModel,
     RangeModel,
@@ -69,6 +70,7 @@ class TrafficSetup:
     slow_in_weather: bool = False  # the switch `drivers` (decisions M-1, R-5)
     put_wrecks_back: bool = True  # decision M-7
     variety: bool = False  # drivers differ in speed, headway and acceleration (decision C-11)
+    headways: Headways = Headways.COMFORT  # with variety
     stratum: Stratum = Stratum.NATURAL  # risky: with variety, tails are oversampled
 
 

@@ -78,6 +78,14 @@ class Stratum(str, Enum):
     RISKY = "risky"  # the tails of how they drive, oversampled: what is missed
 
 
+class Headways(str, Enum):
+    """How closely background drivers follow: `comfort` as when told to keep a comfortable distance, with
+    the plain car-following model; `field` as measured on roads, which the model's gaps then are."""
+
+    COMFORT = "comfort"
+    FIELD = "field"
+
+
 class Control(str, Enum):
     """What decides the motion of an actor."""
 

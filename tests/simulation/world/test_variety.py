@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis.strategies import floats
 
-from skidpad.core.vocabulary import Stratum
+from skidpad.campaign.bench.headways import QUANTILES, field_sources
+from skidpad.core.vocabulary import Headways, Stratum
 from skidpad.simulation.world.traffic.mobil import B_SAFE, GAP_CLEAR, is_safe
 from skidpad.simulation.world.traffic.state import TRAIT
 from skidpad.simulation.world.traffic.variety import (
@@ -78,3 +79,16 @@ def test_who_accepts_less_room_enters_where_others_do_not():
     assert is_safe(0.0, 0.0, 50.0, 3.0, B_SAFE, 2.0)
     assert not is_safe(0.0, -4.0, 50.0, 30.0, B_SAFE, GAP_CLEAR)
     assert is_safe(0.0, -4.0, 50.0, 30.0, 8.0, GAP_CLEAR)
+
+
+@pytest.mark.parametrize(("count", "tolerance"), [(4000, 0.01), (60, 0.08)])
+def test_headways_of_the_field_are_those_of_the_sources_to_fit(count, tolerance):
+    """Sixty drivers of a run stand for the whole distribution."""
+    found = np.zeros(count, dtype=TRAIT)
+    vary(found, range(count), 7, headways=Headways.FIELD)
+    assert found["is_exact"].all()
+    for source in field_sources():
+        if source.role == "fit":
+            name = "headway" if source.road == "motorway" else "headway_town"
+            field = [source.distribution().value(q) for q in QUANTILES]
+            assert np.quantile(found[name], QUANTILES) == pytest.approx(field, rel=tolerance)

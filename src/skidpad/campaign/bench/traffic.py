@@ -72,7 +72,9 @@ def measure_drive(asked: TrafficBench, weather: str, seed: int, seconds: float) 
 def background_world(asked: TrafficBench, weather: str, seed: int) -> World:
     """A world as runs have it, in whose ego's car a driver of the background sits."""
     roads = Roads(map=asked.map, traffic=TrafficStart.RANDOM, vehicles=asked.vehicles - 1)
-    settings = load_profile("recommended", {"drivers": not asked.careless})
+    settings = load_profile(
+        "recommended", {"drivers": not asked.careless, "headways": asked.headways}
+    )
     spec = RunSpec(course=roads, weather=find_weather(weather), settings=settings)
     world = staged(stage_of(spec).setup, seed)
     assert world.traffic is not None

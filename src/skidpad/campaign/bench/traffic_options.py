@@ -7,6 +7,7 @@ from typing import Annotated
 from msgspec import Meta, Struct
 
 from skidpad.core.run import PARTED
+from skidpad.core.vocabulary import Headways
 
 
 class TrafficBench(Struct, frozen=True, kw_only=True):
@@ -22,6 +23,9 @@ class TrafficBench(Struct, frozen=True, kw_only=True):
         float, Meta(ge=1.0, le=1.0e6, description="traffic: km of all vehicles per weather.")
     ] = 100.0
     vehicles: Annotated[int, Meta(ge=2, le=80, description="traffic: vehicles, 2 to 80.")] = 60
+    headways: Annotated[
+        Headways, Meta(description="traffic: how closely drivers follow: comfort or field.")
+    ] = Headways.COMFORT
     careless: Annotated[
         bool, Meta(description="traffic: drivers mind no weather, as CARLA's (drivers=off).")
     ] = False

@@ -179,6 +179,7 @@ def _roads(spec: RunSpec, course: Roads) -> Stage:
         initial_limit_kmh=s.initial_limit_kmh,
         slow_in_weather=s.drivers,
         variety=s.drivers,
+        headways=s.headways,
     )
     setup = replace(setup_of(spec, file, ego), traffic=traffic)
     supervisor = Supervisor(map, recovery_settings(s), setup.dt)

@@ -22,6 +22,7 @@ from skidpad.physics.optics import sight
 from skidpad.simulation.world.traffic.idm import (
     A_EMERGENCY,
     B_COMFORT,
+    GAP_MIN,
     Character,
 )
 
@@ -41,6 +42,8 @@ BEND_HALVINGS = 6  # of the range of speeds for a bend
 STEER_SHARE = 0.6  # lateral at most, corrections included
 CHANGE_SHARE = 0.3  # lateral, peak in a change of lane
 CHANGE_PEAK = 0.81  # m/s^2, of a quintic over 3.5 m in CHANGE_TIME
+V_STEADY = 8.0  # m/s, from which on the whole gap is the headway; slower, it tends to GAP_MIN
+LEAST_PART = 0.3  # of a headway, beside GAP_MIN
 V_CHANGE = 8.0  # m/s; slower ones change over the way of this speed, else they would stand across
 REACTION = 1.0  # s from seeing an obstacle to braking; AASHTO's design value is 2.5 s
 SEEN_AT_MOST = 140.0  # m: drivers look as far as driver.REACH_AHEAD
@@ -86,16 +89,21 @@ def grip_at(care: Care, v: float) -> float:
 
 
 @kernel
-def character(care: Care, v: float, headway: float, a_max: float) -> Character:
-    """How a driver with these habits follows at speed v."""
+def character(
+    care: Care, v: float, headway: float, a_max: float, is_exact: bool = False
+) -> Character:
+    """How a driver with these habits follows at speed v; is_exact: the headway is that of the whole gap."""
     if not care.on:
-        return Character(headway, a_max, B_COMFORT, A_EMERGENCY)
+        return Character(headway, a_max, B_COMFORT, A_EMERGENCY, False)
     g = grip_at(care, v)
+    if is_exact:
+        headway = max(headway - GAP_MIN / max(v, V_STEADY), LEAST_PART * headway)
     return Character(
         headway / sqrt(min(left_at(care.grip, v), 1.0)),
         min(a_max, DRIVE_SHARE * g),
         min(B_COMFORT, COMFORT_SHARE * g),
         max(A_EMERGENCY, -HARDEST_SHARE * g),
+        is_exact,
     )
 
 

@@ -56,6 +56,7 @@ CHANGE_MIN_SPEED = 5.0  # m/s
 CHANGE_MAX_CURVE = 1.0 / 250.0  # 1/m: nobody changes lane in a tight bend
 LOOK_PERIOD = 4  # ticks between two looks at limits and bends ahead: 0.2 s
 CHANGE_PERIOD = 10  # ticks between two looks at the neighbour lanes
+FAST_LIMIT = 80.0 / 3.6 - 0.1  # m/s: limits from here on are those of motorways
 END_MARGIN = 200.0  # m before a lane's end from which a driver must leave it
 LEFT_BEHIND = 0.6  # of a change, after which the leader on the old lane no longer counts
 HEADWAY_STOP = 0.5  # s kept to a stop line
@@ -104,15 +105,23 @@ def turn_to(view: View, d: Drivers, i: int, lane: int, s: float) -> None:
 
 
 @inner_kernel
+def character_of(view: View, d: Drivers, i: int, v: float) -> Character:
+    """How driver i follows at speed v on the road where it is."""
+    trait = d.trait[i]
+    fast = view.streets.net.point[d.state[i].at].limit >= FAST_LIMIT
+    headway = trait.headway if fast else trait.headway_town
+    return character(view.care, v, headway, trait.a_max, trait.is_exact)
+
+
+@inner_kernel
 def acceleration_along(
     view: View, d: Drivers, i: int, path: Ints, s: float, v_desired: float
 ) -> tuple[float, float, int]:
     """IDM acceleration of i on `path` at `s`, the gap to its leader there, and that one."""
     leader, gap = occ_.find_ahead(view.streets.net, view.occ, view.placed, path, s, i, REACH_AHEAD)
     v_lead = view.placed[leader].v if leader != NOBODY else 0.0
-    v, trait = view.placed[i].speed, d.trait[i]
-    c = character(view.care, v, trait.headway, trait.a_max)
-    return idm(v, v_desired, gap, v_lead, c), gap, leader
+    v = view.placed[i].speed
+    return idm(v, v_desired, gap, v_lead, character_of(view, d, i, v)), gap, leader
 
 
 @inner_kernel
@@ -120,9 +129,8 @@ def follower_acceleration(view: View, d: Drivers, j: int, gap: float, v_lead: fl
     """What follower j would do behind a vehicle at `gap`; it is taken to want its own speed."""
     if j == NOBODY:
         return 0.0
-    v, trait = max(view.placed[j].v, 0.0), d.trait[j]
-    c = character(view.care, v, trait.headway, trait.a_max)
-    return idm(v, max(v, 1.0), gap, v_lead, c)
+    v = max(view.placed[j].v, 0.0)
+    return idm(v, max(v, 1.0), gap, v_lead, character_of(view, d, j, v))
 
 
 @inner_kernel
@@ -221,7 +229,7 @@ def plan(view: View, d: Drivers, i: int) -> None:
     if (view.tick + i) % LOOK_PERIOD == 0 or me.v_desired == 0.0:
         me.v_desired = desired_speed(view.streets.net, me, trait, d.path[i], body.speed, view.care)
     v, v_desired = body.speed, me.v_desired
-    c = character(view.care, v, trait.headway, trait.a_max)
+    c = character_of(view, d, i, v)
     a, gap, leader = acceleration_along(view, d, i, d.path[i], me.s, v_desired)
     if body.lane >= 0 and body.lane != d.path[i, 0] and me.change < LEFT_BEHIND * CHANGE_TIME:
         straight_path(view.streets.net, body.lane, d.aside)
@@ -238,7 +246,7 @@ def plan(view: View, d: Drivers, i: int) -> None:
     stops = (stop_gap(view, d, i), end_gap(view, d, i), gap_yield, zebra_gap(view, d, i))
     gap_stop = min(stops)
     if gap_stop < np.inf:
-        stop = Character(HEADWAY_STOP, c.a_max, c.b, c.a_min)
+        stop = Character(HEADWAY_STOP, c.a_max, c.b, c.a_min, False)
         a = min(a, idm(v, v_desired, gap_stop, 0.0, stop))
     if v > v_desired:  # the profile ahead is comfortable: falling behind it is not an option
         firm = firm_braking(view.care, v, TOO_FAST_BRAKE)

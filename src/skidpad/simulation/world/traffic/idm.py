@@ -31,6 +31,21 @@ class Character(NamedTuple):
     a_max: float = A_MAX  # m/s^2
     b: float = B_COMFORT  # m/s^2, comfortable braking
     a_min: float = A_EMERGENCY  # m/s^2, the hardest braking
+    is_exact: bool = False  # the steady gap is GAP_MIN + v headway at any speed: the improved model
+
+
+@kernel
+def improved(z: float, free: float, c: Character) -> float:
+    """Acceleration in m/s^2 of the improved model; z: wanted over real gap, free: without a leader.
+
+    Source: Treiber and Kesting (2013), eqs. 11.24 to 11.26.
+    """
+    closeness = c.a_max * (1.0 - z * z)
+    if free <= 0.0:
+        return free if z < 1.0 else max(c.a_min, free + closeness)
+    if z >= 1.0:
+        return max(c.a_min, closeness)
+    return free * (1.0 - z ** (2.0 * c.a_max / max(free, 1e-6)))
 
 
 @kernel
@@ -43,5 +58,7 @@ def idm(v: float, v_desired: float, gap: float, v_lead: float, c: Character) -> 
     if gap == np.inf:
         return free
     wanted = GAP_MIN + max(0.0, v * c.headway + v * (v - v_lead) / (2.0 * sqrt(c.a_max * c.b)))
+    if c.is_exact:
+        return improved(wanted / max(gap, 0.1), free, c)
     interaction = c.a_max * (wanted / max(gap, 0.1)) ** 2
     return max(c.a_min, free - interaction)

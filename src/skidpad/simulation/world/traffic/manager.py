@@ -130,7 +130,7 @@ class Traffic:
         self.drivers.state["key"] = [stream_key(self.seed, "traffic", "driver", id) for id in ids]
         self.drivers.trait[:] = _traits([m.actor.body for m in members])
         if self.setup.variety:
-            vary(self.drivers.trait, ids, self.seed, self.setup.stratum)
+            vary(self.drivers.trait, ids, self.seed, self.setup.stratum, self.setup.headways)
         for new, before in source.items():
             for column, was in zip(self.drivers[:3], old[:3], strict=True):
                 column[new] = was[before]
@@ -302,7 +302,7 @@ def _traits(bodies: Sequence[VehicleType | Shape]) -> NDArray[np.void]:
     """Drivers know their vehicles."""
     traits = np.zeros(len(bodies), dtype=TRAIT)
     traits["factor"] = 1.0
-    traits["headway"] = T_HEADWAY
+    traits["headway"] = traits["headway_town"] = T_HEADWAY
     traits["a_max"] = A_MAX
     traits["a_curve"] = A_CURVE
     traits["room"] = GAP_CLEAR

@@ -62,7 +62,9 @@ DRIVER = np.dtype(
 TRAIT = np.dtype(
     [
         ("factor", "f8"),  # desired speed over the limit
-        ("headway", "f8"),  # s
+        ("headway", "f8"),  # s, on fast roads
+        ("headway_town", "f8"),  # s, on others
+        ("is_exact", "?"),  # its steady gap is its headway, else longer the less it is held up
         ("a_max", "f8"),  # m/s^2
         ("a_curve", "f8"),  # m/s^2, lateral acceleration accepted in bends
         ("room", "f8"),  # m to the new follower with which a lane is entered

@@ -16,13 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.randomness import stream
-from skidpad.core.vocabulary import Stratum
+from skidpad.core.vocabulary import Headways, Stratum
 
 # Taieb-Maimon and Shinar (2001), Human Factors 43(1): at 50 to 100 km/h drivers follow at 0.98 s when
 # told to keep a comfortable distance and at 0.66 s when told to keep the smallest safe one. Log-normal
 # with the first as median; the second is put one deviation below it (ours).
 HEADWAY_MEDIAN, HEADWAY_SIGMA = 0.98, 0.4  # s, of the logarithm
 HEADWAY_RANGE = (0.5, 3.0)  # s
+# Of the field (`campaign/bench/headways.csv`, rows to fit): log-normal gaps of followers on motorways
+# (Al-Obaedi 2019: mean 1.10 s, deviation 0.42 s) and headways on streets (Michael, Leeming and Dwyer
+# 2000: 7.3 % below 1 s, 50.6 % below 2 s).
+FIELD_FAST, FIELD_TOWN = (1.028, 0.369), (1.986, 0.472)  # s, and of the logarithm
+FIELD_RANGE = (0.3, 6.0)  # s
+GOLDEN_SHARE = 0.6180339887498949  # of one, from the quantile of one driver to that of the next
 # Free speeds are normal with a coefficient of variation near 0.1 (Highway Capacity Manual 2010).
 SPEED_SIGMA, SPEED_RANGE = 0.10, (0.75, 1.25)
 # Kesting, Treiber and Helbing (2010) vary the IDM's acceleration by 20 to 30 %.
@@ -79,11 +85,22 @@ def tail_draw(layers: Layers, which: float, where: float) -> tuple[float, float]
 
 
 def vary(
-    traits: NDArray[np.void], ids: Sequence[int], seed: int, stratum: Stratum = Stratum.NATURAL
+    traits: NDArray[np.void],
+    ids: Sequence[int],
+    seed: int,
+    stratum: Stratum = Stratum.NATURAL,
+    headways: Headways = Headways.COMFORT,
 ) -> None:
-    """Give every driver (row of TRAIT) a character of its own."""
+    """Give every driver (row of TRAIT) a character of its own.
+
+    Headways of the field are spread evenly over ids (a Kronecker sequence from a start drawn per run):
+    twenty drivers stand for the whole distribution, its ends included.
+    """
+    first = float(stream(seed, "traffic", "headways").random())
     for id, trait in zip(ids, traits, strict=True):
         draw = stream(seed, "traffic", "character", id).standard_normal(3).tolist()
+        if headways is Headways.FIELD:
+            draw[0] = _normal((first + id * GOLDEN_SHARE) % 1.0)
         if stratum is Stratum.RISKY:
             risky = risky_character(seed, id)
             draw[0] = _normal(risky.u_headway)
@@ -91,8 +108,13 @@ def vary(
             trait["room"] = np.clip(gap, *GAP_RANGE)
             trait["imposed"], trait["eager"] = IMPOSED, EAGER
         least = HEADWAY_LEAST if stratum is Stratum.RISKY else HEADWAY_RANGE[0]
-        headway = HEADWAY_MEDIAN * np.exp(HEADWAY_SIGMA * draw[0])
-        trait["headway"] = np.clip(headway, least, HEADWAY_RANGE[1])
+        if headways is Headways.FIELD:
+            trait["is_exact"] = True
+            for name, (median, sigma) in (("headway", FIELD_FAST), ("headway_town", FIELD_TOWN)):
+                trait[name] = np.clip(median * np.exp(sigma * draw[0]), *FIELD_RANGE)
+        else:
+            headway = HEADWAY_MEDIAN * np.exp(HEADWAY_SIGMA * draw[0])
+            trait["headway"] = trait["headway_town"] = np.clip(headway, least, HEADWAY_RANGE[1])
         trait["factor"] *= np.clip(1.0 + SPEED_SIGMA * draw[1], *SPEED_RANGE)
         trait["a_max"] *= np.clip(1.0 + ACCELERATION_SIGMA * draw[2], *ACCELERATION_RANGE)
 

@@ -8,6 +8,7 @@ from skidpad.campaign.bench.traffic import background_world
 from skidpad.campaign.bench.traffic_options import TrafficBench
 from skidpad.campaign.bench.traffic_watch import leaders
 from skidpad.core.vocabulary import Headways
+from skidpad.roads.bundled import load_map
 from skidpad.simulation.world.traffic.idm import GAP_MIN, Character, idm
 
 
@@ -32,7 +33,7 @@ def test_a_driver_on_a_motorway_ends_up_at_its_headway(headway: float) -> None:
     assert traffic is not None
     traffic.waiting.clear()
     lane, s = int(placed["lane"][0]), float(placed["s"][0])
-    world.put(1, world.states.pose(0).moved(forward=60.0), 20.0)
+    world.put(1, load_map("motorway").at(lane, s + 60.0).pose, 20.0)
     traffic.engage(1, lane, s + 60.0)
     trait = traffic.drivers.trait
     trait["factor"][:2], trait["headway"][0] = (1.2, 0.7), headway

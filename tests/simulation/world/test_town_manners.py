@@ -87,6 +87,20 @@ def test_two_who_turn_left_do_not_wait_for_the_second_in_each_others_queue(weath
 
 
 @pytest.mark.parametrize("weather", ["clear-noon", "icy_30"])
+@pytest.mark.parametrize("waited", [0.0, 10.0])
+def test_of_two_who_stood_long_and_start_together_the_one_with_priority_goes(weather, waited):
+    """A left turn and one that comes the other way, both impatient; the second stood for longer."""
+    turns, comes = (12, 104.7, 0.0, (12, 47, 9)), (16, 102.7, 0.0, (16, 51, 14))
+    world = drivers_at(weather, turns, comes)
+    world.traffic.drivers.state["stood"][1:3] = 42.0, 86.0
+    world.traffic.drivers.state["waited"][1] = waited
+    _, lane, contacts = drive(world, 45.0)
+    assert contacts == 0
+    through = [np.flatnonzero(lane[:, i] == way)[0] for i, way in ((1, 9), (2, 14))]
+    assert through[1] < through[0]
+
+
+@pytest.mark.parametrize("weather", ["clear-noon", "icy_30"])
 @pytest.mark.parametrize(("s", "passes"), [(18.8, False), (30.0, True)])
 def test_who_waits_within_a_junction_never_creeps_into_one_that_stands_there(weather, s, passes):
     """It stood for 20 s before an area that it shares with the other, which does not move."""

@@ -14,6 +14,7 @@ import numpy as np
 from skidpad.core.jit import inner_kernel
 from skidpad.simulation.world.traffic.care import (
     bend_speed_sq,
+    braking,
     drive_limit,
     firm_braking,
     reach,
@@ -42,7 +43,7 @@ TAKEN_TIME = 20.0  # s after which a driver in a junction creeps past others tha
 CREEP_ROOM = 0.4  # m to them at least
 EXIT_ROOM = 3.0  # m to be free behind the junction beside the own length
 V_QUEUE = 2.0  # m/s, slower leaders make a queue
-V_ANEW = 2.0  # m/s, below which a driver in a junction can still leave the way to others
+V_ANEW = 2.0  # m/s, below which a driver in a junction can always leave the way to others
 INDICATED = 5  # lanes ahead that others can guess
 
 
@@ -242,6 +243,14 @@ def _is_in_way(view: View, i: int, j: int, lane: int, front: float) -> bool:
 
 
 @inner_kernel
+def _can_judge_anew(view: View, v: float, gap: float) -> bool:
+    """Whether a driver in a junction, `gap` m before a shared area, can still leave the way to others."""
+    if v < V_ANEW:
+        return True
+    return bool(view.care.on and v * v <= 2.0 * braking(view.care, v) * gap)
+
+
+@inner_kernel
 def _gap_within(
     view: View, d: Drivers, i: int, k: int, start: float, keeps_out: bool
 ) -> tuple[float, int, int]:
@@ -249,7 +258,7 @@ def _gap_within(
     for what, and the row of the actor that is the cause.
 
     keeps_out: of areas in which another stands, else only of those whose way is not free. A driver that
-    has almost stopped judges gaps anew.
+    can still stop judges gaps anew.
     """
     entry, body = view.streets.entry[d.path[i, k]], view.placed[i]
     nearest, cause, by = np.inf, FREE, NOBODY
@@ -269,7 +278,7 @@ def _gap_within(
             other = NOBODY
         if other != NOBODY:
             nearest, cause, by = gap, AREA_TAKEN, other
-        elif conflict.yields and body.speed < V_ANEW:
+        elif conflict.yields and _can_judge_anew(view, body.speed, gap):
             way = max(start + conflict.end + 2.0 * body.half_length, 1.0)
             clear = _time_through(view, d, i, way, entry.bend) + GAP_MARGIN
             other = _coming(view, d, i, conflict.other, conflict.other_start, clear)
@@ -349,7 +358,7 @@ def _arrives(
             continue
         if v < HALTED and (distance > QUEUE_REACH or d.state[i].waited > PATIENCE):
             continue
-        if v < HALTED and _is_impatient(view, d, i):
+        if v < HALTED and _is_impatient(view, d, i) and d.state[i].stood > d.state[j].stood:
             continue
         if d.state[j].active and not leads_to(d, j, target):
             continue

@@ -45,7 +45,7 @@ def improved(z: float, free: float, c: Character) -> float:
         return free if z < 1.0 else max(c.a_min, free + closeness)
     if z >= 1.0:
         return max(c.a_min, closeness)
-    return free * (1.0 - z ** (2.0 * c.a_max / max(free, 1e-6)))
+    return float(free * (1.0 - z ** (2.0 * c.a_max / max(free, 1e-6))))
 
 
 @kernel

@@ -186,7 +186,7 @@ def _impatient_on(
         turns = other.active and d.path[j, 0] == here and leads_to(d, j, lane)
         waits = other.stood > longest and other.held != EXIT_TAKEN
         if turns and waits and _gap_to_line(view, d, j) < reach:
-            return j
+            return int(j)
         entry = view.occ.next[entry]
     return NOBODY
 
@@ -222,7 +222,7 @@ def _on_area(view: View, i: int, lane: int, start: float, end: float) -> int:
         j = entry // SLOTS
         half = view.placed[j].half_length
         if j != i and view.occ.s[entry] + half > start and view.occ.s[entry] - half < end:
-            return j
+            return int(j)
         entry = view.occ.next[entry]
     return NOBODY
 
@@ -365,7 +365,7 @@ def _arrives(
         if view.occ.s[entry_now] > way:
             continue
         if _travel_time(v, max(distance, 0.0), 1.0, max(v, V_THROUGH)) < clear:
-            return j
+            return int(j)
     return NOBODY
 
 

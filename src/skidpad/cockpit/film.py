@@ -20,6 +20,7 @@ from skidpad.cockpit.source import Source, index_at
 from skidpad.cockpit.studio import Studio, View, plane
 from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.setup import DT
+from skidpad.core.vocabulary import Scenery
 from skidpad.recording.run.surfaces import read_run_surface
 from skidpad.roads.surface_outlines import outline_patches
 from skidpad.simulation.world.world import BRAKING
@@ -44,9 +45,17 @@ def stretch_of(source: Source, begin_s: float, end_s: float) -> range:
 
 
 def write_film(
-    source: Source, moments: range, view: View, path: Path, other: Source | None = None
+    source: Source,
+    moments: range,
+    view: View,
+    path: Path,
+    other: Source | None = None,
+    scenery: Scenery = Scenery.FULL,
 ) -> Path:
-    """Write the film, .mp4 or .webp, in its own time. other: a run to be shown beside it."""
+    """Write the film, .mp4 or .webp, in its own time.
+
+    other: a run to be shown beside it; scenery: beside the roads of both.
+    """
     if path.suffix not in SUFFIXES:
         raise ConfigError(f"a film's file ends in {' or '.join(SUFFIXES)}, got {path}")
     try:
@@ -55,19 +64,23 @@ def write_film(
         raise OutputError(f"cannot write the film {path}: {error.strerror}") from error
     dt = source.step * DT
     if path.suffix == ".webp":
-        _webp(frames(source, moments, view, other), path, dt)
+        _webp(frames(source, moments, view, other, scenery), path, dt)
     else:
-        _mp4(frames(source, moments, view, other), path, dt)
+        _mp4(frames(source, moments, view, other, scenery), path, dt)
     return path
 
 
 def frames(
-    source: Source, moments: Sequence[int], view: View, other: Source | None = None
+    source: Source,
+    moments: Sequence[int],
+    view: View,
+    other: Source | None = None,
+    scenery: Scenery = Scenery.FULL,
 ) -> Iterator[Picture]:
     """Pictures of these moments: the view, mirrors in it, what is said, and another run beside it."""
     first = source.seat(moments[0]).outside
-    studio = Studio(source.map, source.table, first, source.seed)
-    companion = None if other is None else Companion(other, source.tick(0))
+    studio = Studio(source.map, source.table, first, source.seed, scenery=scenery)
+    companion = None if other is None else Companion(other, source.tick(0), scenery)
     camera, light = studio.suite.cameras[view.value], LightAhead(source.map)
     outlines = outline_patches(source.map, read_run_surface(source.folder))
     for k in moments:

@@ -19,6 +19,7 @@ from skidpad.cockpit.words import Link
 from skidpad.core.errors import OutputError
 from skidpad.core.inputs import Beam
 from skidpad.core.setup import DT
+from skidpad.core.vocabulary import Scenery
 from skidpad.recording.run.surfaces import read_run_surface
 
 PATIENCE = 0.02  # s between two looks at the words
@@ -33,7 +34,7 @@ def replay_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
     other = None if about["beside"] is None else open_source(Path(about["beside"]))
     feed, link = Feed(feed_name), Link(pipe)
     try:
-        Replayer(source, feed, link, other=other).run()
+        Replayer(source, feed, link, other=other, scenery=Scenery(about["scenery"])).run()
     finally:
         feed.close()
     return f"replayed {about['path']}"
@@ -45,17 +46,22 @@ class Replayer:
     def __init__(
         self, source: Source, feed: Feed, link: Link,
         clock: Callable[[], float] = perf_counter, other: Source | None = None,
+        scenery: Scenery = Scenery.FULL,
     ) -> None:  # fmt: skip
-        """other: a run that is shown beside this one, at the same time since its begin."""
+        """other: a run that is shown beside this one, at the same time since its begin.
+
+        scenery: what stands beside the roads in the pictures of both.
+        """
+        self.scenery = scenery
         self.source, self.link, self.clock, self.other = source, link, clock, other
         self.k = 0
         self.note = ""  # what the page is told beside everything else
         self.dt = source.step * DT
         surface = read_run_surface(source.folder)
-        self.screen = Screen(feed, link, source.map, self._shown, source.seed, surface)
+        self.screen = Screen(feed, link, source.map, self._shown, source.seed, surface, scenery)
         self.screen.begin(source.table)
         if other is not None:
-            self.screen.beside = Companion(other, source.tick(0))
+            self.screen.beside = Companion(other, source.tick(0), scenery)
         self._base, self._since, self._rate = 0, clock(), 1.0  # moment from which it plays, ...
         self._shown_k, self._shown_at = -1, 0.0
 
@@ -96,7 +102,7 @@ class Replayer:
         t = source.tick(self.k) * DT
         path = source.folder / FILMS / f"{view.value}-{t:07.2f}s.mp4"
         try:
-            write_film(source, range(self.k, last + 1), view, path, self.other)
+            write_film(source, range(self.k, last + 1), view, path, self.other, self.scenery)
             self.note = f"film: {path}"
         except OutputError as error:
             self.note = str(error)

@@ -157,6 +157,10 @@ def replay(
     view: Annotated[
         str, typer.Option(help="driver, follow, top or crash, and every small view.")
     ] = "follow",
+    scenery: Annotated[
+        Scenery,
+        typer.Option(help="Beside the roads in the pictures, whatever the run had: full or none."),
+    ] = Scenery.FULL,
 ) -> None:
     """Scrub through a run in a browser: its pictures are drawn again from what was logged."""
     from skidpad.cli.options.folders import require_run
@@ -177,9 +181,14 @@ def replay(
     other = None if beside is None else open_source(beside)
     if film is not None:
         seen = View(require_choice("--view", view, [v.value for v in View]))
-        typer.echo(write_film(source, stretch_of(source, begin, end), seen, film, other))
+        typer.echo(write_film(source, stretch_of(source, begin, end), seen, film, other, scenery))
         return
-    what = {"path": str(run), "hazard": hazard, "beside": None if beside is None else str(beside)}
+    what = {
+        "path": str(run),
+        "hazard": hazard,
+        "beside": None if beside is None else str(beside),
+        "scenery": scenery.value,
+    }
     producer = Producer(replay_job, what)
     shown = About("replay", timeline(source))
     typer.echo(serve(producer, shown, place_of(pages), typer.echo, not pages.no_browser))

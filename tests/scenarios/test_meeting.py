@@ -84,3 +84,18 @@ def test_cars_of_two_roads_meet_where_these_cross(tmp_path):
         stories=story(event("e", private(meet), time(1.0))),
     )  # fmt: skip
     assert next(r.time for r in result.of("other") if r.y >= 0.0) == pytest.approx(9.0, abs=0.1)
+
+
+@pytest.mark.osc("SynchronizeAction")
+@pytest.mark.parametrize("final", ["", FINAL.format("").replace("1.5", "-4")])
+def test_a_reversing_car_arrives_as_the_other_one_does(tmp_path, final):
+    """The ego needs 6 s for its 60 m; the other one is 34 m ahead of its place, and backs at 6 m/s."""
+    meet = synchronize("ego", on_lane(-3, 160.0), on_lane(-1, 160.0), final)
+    begin = at("ego", -3, 100) + at("other", -1, 194, -6)
+    rows = told(
+        tmp_path, init=begin, end=8.0, stories=story(event("e", private(meet), time(0.0)))
+    ).of("other")
+    arrival = min(rows, key=lambda row: abs(row.x - 160.0))
+    assert arrival.x == pytest.approx(160.0, abs=0.3)
+    assert arrival.time == pytest.approx(6.0, abs=0.11)
+    assert all(row.speed < 0.0 for row in rows if row.time < 6.0)

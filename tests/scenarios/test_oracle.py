@@ -22,6 +22,8 @@ EXCEPTIONS = (
     "beside_straight",
     "meet_curve_curve",
     "track_headings_straight",
+    "meets_plain_reverse",
+    "meets_final_reverse",
 )
 
 

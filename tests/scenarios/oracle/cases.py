@@ -39,6 +39,7 @@ from tests.scenarios.oracle.actions import (
 )
 from tests.scenarios.oracle.conditions import conditions
 from tests.scenarios.oracle.ends import at_once, backwards, without_road
+from tests.scenarios.oracle.everywhere import everywhere
 from tests.scenarios.oracle.pairs import pairs
 from tests.scenarios.oracle.settings import BEGIN, NORTH, SETTINGS, WEST, Case, case, moving, turned
 from tests.scenarios.oracle.sideways import sideways
@@ -358,6 +359,7 @@ CASES: dict[str, Case] = {
         conditions,
         sideways,
         pairs,
+        everywhere,
     )
     for c in part()
 }

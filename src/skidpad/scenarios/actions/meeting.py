@@ -74,7 +74,9 @@ class Synchronized:
         self.goal, self.other_goal = goal, other_goal  # as they were when it began
         self.least = inf, inf  # m, of both ways so far
         self.phase, self.rising = Phase.BEGIN, False
-        self.v_moved = actor.guide.v  # m/s, of the step before
+        v = actor.guide.v or action.v_end or 0.0
+        self.sense = -1.0 if v < 0.0 else 1.0  # backwards, or ahead
+        self.v_moved = abs(actor.guide.v)  # m/s, of the step before
 
     def step(self, scene: Scene) -> bool:
         """Demand the speed of the end of this step."""
@@ -95,14 +97,16 @@ class Synchronized:
         if over or (pace > V_LEAST and its / pace < dt):
             guide.v, guide.a = guide.v if v_end is None else v_end, 0.0
             return True
+        before = self.sense * guide.v
         if pace <= V_LEAST:
             self.phase, guide.v, guide.a = Phase.WAITING, 0.0, 0.0
-        elif v_end is None:
-            guide.a = 2.0 * (own * pace / its - guide.v) / (its / pace)
-            guide.v += guide.a * dt
+            return False
+        if v_end is None:
+            v = before + 2.0 * (own * pace / its - before) / (its / pace) * dt
         else:
-            before, v = guide.v, max(self._speed(guide.v, own, its / pace, v_end, scene), 0.0)
-            guide.a, guide.v, self.v_moved = (v - guide.v) / dt, v, before
+            v = max(self._speed(before, own, its / pace, self.sense * v_end, scene), 0.0)
+            self.v_moved = before
+        guide.a, guide.v = self.sense * (v - before) / dt, self.sense * v
         return False
 
     def _speed(self, v: float, own: float, time: float, v_end: float, scene: Scene) -> float:

@@ -1,0 +1,85 @@
+"""Files for reference trajectories: places, meetings, angles and speeds in every setting."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from tests.scenarios.files import by_entity, on_lane, speed, synchronize, teleport, to, trajectory
+from tests.scenarios.oracle.actions import profile, timing
+from tests.scenarios.oracle.settings import SETTINGS, Case, case
+
+# places that refer to the ego, by name
+PLACES = {
+    "relative_lane": '<RelativeLanePosition entityRef="ego" dLane="0" ds="25"/>',
+    "relative_road": '<RelativeRoadPosition entityRef="ego" ds="20" dt="1.5"/>',
+    "relative_object": '<RelativeObjectPosition entityRef="ego" dx="20" dy="1.5"/>',
+    "relative_world": '<RelativeWorldPosition entityRef="ego" dx="15" dy="1"/>',
+}
+FINAL = '<FinalSpeed><AbsoluteSpeed value="{}"/></FinalSpeed>'
+# where both meet, by setting: the ego's place and the other one's
+MEETINGS = {
+    "straight": (on_lane(-2, 190), on_lane(-1, 200)),
+    "hill": (on_lane(-2, 150), on_lane(-1, 160)),
+    "reverse": (on_lane(-2, 160), on_lane(-1, 160)),
+    "on_foot": (on_lane(-2, 160), on_lane(-1, 140)),
+    "oncoming": (on_lane(-1, 190), on_lane(1, 220)),
+    "crossing": (on_lane(-1, 190), on_lane(-1, 180, road=2)),
+}
+LINES = {
+    "straight": ((140.0, -1.75), (180.0, -1.75), (200.0, 8.0)),
+    "hill": ((100.0, -1.75), (140.0, -1.75), (180.0, -5.25)),
+    "reverse": ((194.0, -1.75), (160.0, -1.75), (130.0, -5.25)),
+    "oncoming": ((290.0, 1.75), (250.0, 1.75), (220.0, 6.0)),
+    "crossing": ((201.75, -100.0), (201.75, -60.0), (220.0, -40.0)),
+}
+
+
+def places() -> Iterator[Case]:
+    for setting in SETTINGS:
+        for name, place in PLACES.items():
+            yield case(f"place_{name}", setting, teleport(place), end=5.0)
+
+
+def meetings() -> Iterator[Case]:
+    for setting, (its, own) in MEETINGS.items():
+        v = -4.0 if setting == "reverse" else 1.2 if setting == "on_foot" else 7.0
+        for name, final in (("plain", ""), ("final", FINAL.format(v))):
+            action = synchronize("ego", its, own, final, 0.5)
+            yield case(f"meets_{name}", setting, action, end=12.0)
+
+
+def lines() -> Iterator[Case]:
+    for setting, points in LINES.items():
+        yield case("line", setting, trajectory(*points))
+        times = ((x, y, None, 3.0 * k) for k, (x, y) in enumerate(points))
+        yield case("line_timed", setting, trajectory(*times, timing=timing()))
+
+
+def speeds() -> Iterator[Case]:
+    """Profiles of speed, and what waits for a speed of its own or beside that of the ego."""
+    for setting, (_, _, _, other) in SETTINGS.items():
+        sign = -1.0 if 'value="-6"' in other else 1.0
+        slow = setting == "on_foot"
+        entries = ((2.5, 2), (0.5, 3)) if slow else ((14 * sign, 2), (5 * sign, 4))
+        yield case("profile_two", setting, profile(*entries))
+        bound = 0.9 * sign if slow else 7.05 * sign
+        rule = "greaterThan" if sign < 0 else "lessThan"
+        if sign < 0:
+            bound = -3.05
+        slower = speed(to(0.2 if slow else 2 * sign), "linear", 4)
+        condition = f'<SpeedCondition value="{bound}" rule="{rule}"/>'
+        from_there = case(
+            "when_slower", setting, speed(to(sign), "linear", 1), when=by_entity(condition, "other")
+        )
+        parts = from_there.parts | {
+            "stories": case("x", setting, slower).parts["stories"].replace("story", "first")
+            + from_there.parts["stories"]
+        }
+        yield Case(from_there.name, from_there.road, parts)
+
+
+def everywhere() -> Iterator[Case]:
+    yield from places()
+    yield from meetings()
+    yield from lines()
+    yield from speeds()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from tests.scenarios.files import by_entity, on_lane, speed, synchronize, teleport, to, trajectory
-from tests.scenarios.oracle.actions import profile, timing
+from tests.scenarios.oracle.actions import beside, gap, limits, profile, timing
 from tests.scenarios.oracle.settings import SETTINGS, Case, case
 
 # places that refer to the ego, by name
@@ -78,7 +78,44 @@ def speeds() -> Iterator[Case]:
         yield Case(from_there.name, from_there.road, parts)
 
 
+STEADY = """<FinalSpeed><AbsoluteSpeed value="{}"><TargetDistanceSteadyState distance="6"/>
+</AbsoluteSpeed></FinalSpeed>"""
+RELATIVE = '<FinalSpeed><RelativeSpeedToMaster value="-5"/></FinalSpeed>'
+
+
+def more_meetings() -> Iterator[Case]:
+    for setting, (its, own) in MEETINGS.items():
+        if setting == "reverse":
+            continue  # esmini does not arrive
+        v = 1.2 if setting == "on_foot" else 7.0
+        yield case(
+            "meets_steady", setting, synchronize("ego", its, own, STEADY.format(v), 0.5), end=12.0
+        )
+        if setting != "on_foot":
+            yield case(
+                "meets_relative", setting, synchronize("ego", its, own, RELATIVE, 0.5), end=12.0
+            )
+
+
+def distances() -> Iterator[Case]:
+    """Distances across the road and along it, where the other one backs, walks or comes towards."""
+    for setting in ("reverse", "on_foot", "crossing", "oncoming", "hill"):
+        if setting != "crossing":
+            aside = beside(2.5, "left", axes="road", limits='maxSpeed="0.4"')
+            yield case("beside_slowly", setting, aside)
+        for name, how in (("gap", "distance"), ("time", "timeGap")):
+            kept = gap(
+                f'{how}="{20 if how == "distance" else 2}" freespace="true"',
+                continuous=True,
+                side="behind",
+                limits=limits(2, 3),
+            )
+            yield case(f"behind_{name}", setting, kept)
+
+
 def everywhere() -> Iterator[Case]:
+    yield from more_meetings()
+    yield from distances()
     yield from places()
     yield from meetings()
     yield from lines()

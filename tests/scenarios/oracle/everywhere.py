@@ -4,9 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from tests.scenarios.files import by_entity, on_lane, speed, synchronize, teleport, to, trajectory
+from tests.scenarios.files import (
+    by_entity,
+    event,
+    on_lane,
+    private,
+    speed,
+    story,
+    synchronize,
+    teleport,
+    time,
+    to,
+    trajectory,
+)
 from tests.scenarios.oracle.actions import beside, gap, limits, profile, timing
-from tests.scenarios.oracle.settings import SETTINGS, Case, case
+from tests.scenarios.oracle.conditions import collision_time, headway
+from tests.scenarios.oracle.settings import BEGIN, SETTINGS, Case, case
 
 # places that refer to the ego, by name
 PLACES = {
@@ -113,7 +126,39 @@ def distances() -> Iterator[Case]:
             yield case(f"behind_{name}", setting, kept)
 
 
+def waits() -> Iterator[Case]:
+    """The ego waits for a speed, a time to collision or a headway while the other one slows down."""
+    slower = {"reverse": -1.0, "on_foot": 0.3}
+    for setting in ("straight", "hill", "reverse", "on_foot", "oncoming", "crossing"):
+        slows = speed(to(slower.get(setting, 2.0)), "linear", 6)
+        between = 0.5 * (
+            slower.get(setting, 2.0) + {"reverse": -6.0, "on_foot": 1.5}.get(setting, 10.0)
+        )
+        ego = {"reverse": 8.0, "on_foot": 8.0}.get(setting, 12.0)
+        rule = "greaterThan" if between < 0.0 else "lessThan"
+        value = f'value="{between - ego + 0.011:.3f}" rule="{rule}"'
+        relative = f'<RelativeSpeedCondition entityRef="ego" {value}/>'
+        conditions = [("relative_speed", by_entity(relative, "other"))]
+        if setting != "crossing":
+            conditions.append(("collision", by_entity(collision_time(2.51), "ego")))
+        if setting not in ("crossing", "oncoming"):
+            conditions += [
+                ("headway", by_entity(headway(1.51), "ego")),
+                ("headway_road", by_entity(headway(1.51, "road"), "ego")),
+            ]
+        for name, condition in conditions:
+            first = case("x", setting, slows)
+            then = event("ego_e", private(speed(to(5), "linear", 2)), condition)
+            stories = first.parts["stories"] + story(
+                then, actor="ego", name="ego_story", start=time(BEGIN)
+            )
+            yield Case(
+                f"ego_waits_{name}_{setting}", first.road, first.parts | {"stories": stories}
+            )
+
+
 def everywhere() -> Iterator[Case]:
+    yield from waits()
     yield from more_meetings()
     yield from distances()
     yield from places()

@@ -140,7 +140,7 @@ def check(
 
 
 def _minor_revision(root: Node) -> str:
-    """Of the header, for the schema; "" where none fits (before 1.0)."""
+    """Returns the minor revision of the header, for the schema; "" where none fits (before 1.0)."""
     if root.find("ParameterValueDistribution") is not None:
         raise root.unsupported("a distribution is a campaign of another file: play it as one")
     if root.find("Catalog") is not None:

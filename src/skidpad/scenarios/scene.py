@@ -136,7 +136,7 @@ class Actor:
 
     @property
     def name(self) -> str:
-        """Of the entity."""
+        """Returns the entity's name."""
         return self.entity.name
 
     @property
@@ -176,7 +176,7 @@ class Actor:
             self.leave_track(network)
 
     def leave_track(self, network: Network) -> None:
-        """Where it is led along a trajectory: no longer."""
+        """Ends that the actor is led along a trajectory."""
         if self.track is not None:
             self.follow_road(network, self.guide.v)
 
@@ -278,7 +278,7 @@ class Actor:
         self.word = ActorCommand(self.name, place=self.centre(place.pose), speed=v, present=True)
 
     def follow_road(self, network: Network, v: float) -> None:
-        """From where it is, along the lane there at speed v: the default controller."""
+        """Drives from here along the lane at speed v: the default controller."""
         roads = self.guide.roads
         self.guide = Guide(network, network.place_of(self.pose), v)
         self.guide.roads = roads

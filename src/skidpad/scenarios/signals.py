@@ -16,7 +16,7 @@ LIT = ("on", "flashing")
 
 @dataclass(frozen=True, slots=True)
 class Phase:
-    """For a while the signals of a controller have these states."""
+    """The states that signals of a controller have for a while."""
 
     name: str
     duration: float  # s

@@ -183,7 +183,7 @@ class _Starting:
 
     @property
     def pose(self) -> Pose:
-        """As an actor has it."""
+        """Returns the pose as an actor has it."""
         return self.place(self.ctx.network).pose
 
     def outline(self) -> list[Point]:
@@ -216,7 +216,7 @@ _ASKED = object()
 def _worked_out(
     init: Node, wishes: Mapping[str, _Wish], gone: set[str], ctx: Context
 ) -> Iterator[tuple[str, Begin]]:
-    """As in esmini, what <Init> puts nowhere stands at the origin, unless it is added later."""
+    """Yields where entities begin; what <Init> puts nowhere stands at the origin, as in esmini."""
     actors: dict[str, _Starting] = {}
     scene = Scene(ctx.network, 0.0, cast("Mapping[str, Actor]", actors))
     for name in ctx.entities:

@@ -28,13 +28,13 @@ V_UNKNOWN = 50.0 / 3.6  # m/s where neither the file nor the map says a speed; a
 
 
 class Speeds(NamedTuple):
-    """With which speeds in m/s vehicles come; None: the lane's limit."""
+    """The speeds in m/s with which vehicles come; None: the lane's limit."""
 
     low: float | None = None
     high: float | None = None
 
     def draw(self, rng: Random, map: RoadMap, point: LanePoint) -> float:
-        """For who appears at a place."""
+        """Draws the speed of a vehicle that appears at a place."""
         if self.low is not None and self.high is not None:
             return rng.uniform(self.low, self.high)
         limit = map.limit(point)
@@ -112,7 +112,7 @@ class Sourcing:
         self.due: float | None = None
 
     def step(self, scene: Scene) -> bool:
-        """Until it is stopped."""
+        """Lets vehicles come until it is stopped."""
         if self.stopped:
             return True
         self.due = scene.t if self.due is None else self.due
@@ -123,7 +123,7 @@ class Sourcing:
         return False
 
     def _spots(self, scene: Scene) -> Spots:
-        """Within the radius; the lane of the place itself where no spot is so near."""
+        """Returns the spots within the radius; the lane of the place itself where none is so near."""
         spots = self.pool.spots
         near = spots.where(self.region.inside(scene, spots))
         lane = self.region.centre.place(scene).lane
@@ -139,7 +139,7 @@ class Sinking:
         self.due = 0.0
 
     def step(self, scene: Scene) -> bool:
-        """Until it is stopped."""
+        """Takes vehicles out until it is stopped."""
         if self.stopped:
             return True
         pose = self.region.centre.place(scene).pose
@@ -184,7 +184,7 @@ class Filling:
         self.due: float | None = None
 
     def step(self, scene: Scene) -> bool:
-        """Until it is stopped."""
+        """Keeps the number of vehicles until it is stopped."""
         if self.stopped:
             return True
         if self.due is None:

@@ -23,7 +23,7 @@ class GlobalAction(Protocol):
     """Something that happens to the world."""
 
     def happen(self, scene: Scene) -> Running:
-        """At once, or from now on."""
+        """Acts at once, or from now on."""
         ...
 
 
@@ -34,12 +34,12 @@ class NoEffect:
     what: str
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Over at once."""
+        """Ends at once."""
         scene.notice(f"<{self.what}> of {actor.name} has no effect")
         return DONE
 
     def happen(self, scene: Scene) -> Running:
-        """Nothing."""
+        """Does nothing."""
         scene.notice(f"<{self.what}> has no effect")
         return DONE
 

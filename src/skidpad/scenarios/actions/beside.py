@@ -23,7 +23,7 @@ A_RANGE = 1e-3, 1e3  # m/s^2, within which an acceleration makes a turn
 
 
 class Side(Enum):
-    """Of the entity that a distance is kept to."""
+    """The side of the entity that a distance is kept to."""
 
     ANY = "any"
     LEFT = "leftToReferencedEntity"
@@ -55,7 +55,7 @@ class LateralDistance:
     bounds: Bounds
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """From now on."""
+        """Keeps the distance from now on."""
         actor.leave_track(scene.network)
         _, left = scene.between(self.other, actor.name)
         to_left = left >= 0.0 if self.side is Side.ANY else self.side is Side.LEFT

@@ -106,7 +106,7 @@ class Override:
     inputs: Mapping[str, float | None]  # by field of a VehicleCommand
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """From now on; who is placed by the file has no pedals."""
+        """Sets pedals and wheel from now on; an entity that is placed by the file has none."""
         if actor.mode is ActorMode.IDEAL or actor.driver is None:
             return NoEffect("OverrideControllerValueAction").begin(scene, actor)
         for name, value in self.inputs.items():

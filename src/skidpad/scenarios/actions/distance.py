@@ -19,7 +19,7 @@ STEADY = 0.1  # m/s beside the other one's speed
 
 
 class Displacement(Enum):
-    """On which side of the other entity."""
+    """The side of the other entity on which to be."""
 
     ANY = "any"
     TRAILING = "trailingReferencedEntity"
@@ -28,7 +28,7 @@ class Displacement(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Of a controlled approach; all infinite: the entity simply is where it should be."""
+    """Limits of a controlled approach; all infinite: the entity simply is where it should be."""
 
     a_max: float = inf
     b_max: float = inf
@@ -38,7 +38,7 @@ class Limits:
 
     @property
     def none(self) -> bool:
-        """Nothing is limited."""
+        """Whether nothing is limited."""
         return self.a_max == self.b_max == inf
 
     def of(self, own: Performance) -> Performance:
@@ -66,7 +66,7 @@ class KeepGap:
     limits: Limits
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """From now on."""
+        """Keeps the gap from now on."""
         own = actor.entity.performance
         limits = self.limits.of(own)
         for name, unit, asked, has in (

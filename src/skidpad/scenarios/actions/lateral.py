@@ -89,7 +89,7 @@ class OffsetKept(ChangeOfOffset):
         self.action, self.there = action, False
 
     def step(self, scene: Scene) -> bool:
-        """Once there, beside who it refers to, no faster aside than the entity goes."""
+        """Stays beside the reference entity, moving aside no faster than the entity goes."""
         if not self.there:
             self.there = super().step(scene)
         elif self.actor.lateral is self:
@@ -111,7 +111,7 @@ class LaneChange:
     offset: float
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """From where the entity is now."""
+        """Begins the change from where the entity is now."""
         actor.leave_track(scene.network)
         actor.catch_up(scene.network)
         guide = actor.guide

@@ -26,7 +26,7 @@ class LightState:
     off: float = FLASH
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """From the next step on."""
+        """Switches the lamp from the next step on."""
         change = LampChange(scene.t, actor.name, self.lamp, self.mode, self.on, self.off)
         scene.lamps.append(change)
         return DONE

@@ -47,7 +47,7 @@ class Synchronize:
     steady: Steady = Steady()
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """From now on."""
+        """Aims for the meeting from now on."""
         goals = self.goal.place(scene), self.other_goal.place(scene)
         going = Synchronized(self, actor, *goals)
         actor.pace_by(going, scene)
@@ -67,7 +67,7 @@ class Phase(Enum):
 
 
 class Synchronized:
-    """On the way."""
+    """An entity on its way to a meeting."""
 
     def __init__(self, action: Synchronize, actor: Actor, goal: Place, other_goal: Place) -> None:
         self.action, self.actor = action, actor
@@ -110,7 +110,7 @@ class Synchronized:
         return False
 
     def _speed(self, v: float, own: float, time: float, v_end: float, scene: Scene) -> float:
-        """At the end of this step, on the way to v_end `own` m and `time` s from now."""
+        """Returns the speed at the end of this step, `own` m and `time` s before the end with v_end."""
         steady, dt = self.action.steady, scene.dt
         last = max(steady.distance, steady.time * v_end)
         if last > 0.0 and v_end > 0.0:

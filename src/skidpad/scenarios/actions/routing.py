@@ -36,7 +36,7 @@ class Teleport:
     position: Position
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """At once, keeping the demanded speed."""
+        """Puts the entity there at once, keeping the demanded speed."""
         actor.put(scene.network, self.position.place(scene), actor.guide.v)
         return DONE
 
@@ -53,7 +53,7 @@ class AssignRoute:
     route: ScenarioRoute
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """At once; it matters at the next fork."""
+        """Sets the route at once; it matters at the next fork."""
         del scene
         actor.guide.roads = self.route.roads
         return DONE
@@ -69,7 +69,7 @@ class RandomRoute:
     """Take any way at forks from now on: drawn by the entity's name, the same in every run."""
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """At once; it matters at the next fork."""
+        """Sets a random route at once; it matters at the next fork."""
         place = actor.place(scene.network)
         here = place.lane
         if here is None:
@@ -93,7 +93,7 @@ class AcquirePosition:
     position: Position
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """At once; it matters at the next fork."""
+        """Sets the way to the position at once; it matters at the next fork."""
         actor.guide.roads = _way_there(scene.network, actor, self.position, scene)
         return DONE
 
@@ -188,7 +188,7 @@ class Timed:
         self.actor, self.track = actor, track
 
     def step(self, scene: Scene) -> bool:
-        """Until the step that reaches the last point; the entity then drives on along its lane."""
+        """Moves on until the last point is reached; the entity then drives on along its lane."""
         if self.actor.track is not self.track:
             return True
         next_t = scene.t + scene.dt
@@ -207,7 +207,7 @@ class Paced:
         self.actor, self.track = actor, track
 
     def step(self, scene: Scene) -> bool:
-        """Until the step that reaches its end; the entity then drives on along its lane."""
+        """Moves on until the end is reached; the entity then drives on along its lane."""
         if self.actor.track is not self.track:
             return True
         if not self.track.step(scene.t, self.actor.guide.v, scene.dt):
@@ -226,7 +226,7 @@ class Steered:
         self.actor, self.track, self.times, self.noted = actor, track, times, False
 
     def step(self, scene: Scene) -> bool:
-        """Until the vehicle has reached the end; it then drives on along its lane."""
+        """Steers until the end is reached; the vehicle then drives on along its lane."""
         actor, track = self.actor, self.track
         if actor.track is not track:
             return True

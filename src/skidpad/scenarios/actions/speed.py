@@ -42,7 +42,7 @@ class Target:
     continuous: bool = False
 
     def speed(self, scene: Scene) -> float:
-        """As it is now, m/s."""
+        """Returns the target as it is now, m/s."""
         if self.other is None:
             return self.value
         v = scene.actors[self.other].v_told
@@ -63,7 +63,7 @@ class Speed:
         return d.shape is Shape.STEP or (d.dimension is not Dimension.RATE and d.value <= 0.0)
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """From the speed demanded so far."""
+        """Begins the change from the speed demanded so far."""
         v, limits = actor.guide.v, actor.entity.performance
         asked = self.target.speed(scene)
         end = limit_speed(asked, limits)
@@ -251,7 +251,7 @@ class Profile:
     following: Following = Following.POSITION
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """From the speed demanded so far."""
+        """Begins the profile from the speed demanded so far."""
         own = actor.entity.performance if self.following is Following.FOLLOW else Performance()
         jerk = Jerk(min(self.jerk.up, own.a_rate), min(self.jerk.down, own.b_rate))
         if jerk.is_limited:

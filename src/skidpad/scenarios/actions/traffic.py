@@ -31,7 +31,7 @@ class StartTraffic:
     flow: Callable[[str, Scene], Sourcing | Sinking | Filling]
 
     def happen(self, scene: Scene) -> Running:
-        """From now on."""
+        """Lets traffic come from now on."""
         flow = self.flow(self.name, scene)
         scene.flows.append(flow)
         return flow
@@ -44,7 +44,7 @@ class StopTraffic:
     name: str
 
     def happen(self, scene: Scene) -> Running:
-        """At once; vehicles that are there drive on."""
+        """Ends the traffic at once; vehicles that are there drive on."""
         flows: list[Flow] = scene.flows
         for flow in flows:
             if self.name in ("", flow.name):
@@ -167,7 +167,7 @@ def _region(node: Node, ctx: Context) -> Region:
 
 
 def _stretches(node: Node, ctx: Context) -> Iterator[Stretch]:
-    """Between the cursors of each road; a road with one cursor counts as a whole."""
+    """Yields what lies between the cursors of each road; a road with one cursor counts as a whole."""
     cursors = list(node.children("RoadCursor"))
     if len(cursors) < 2:
         raise node.error(f"needs at least two <RoadCursor>s, has {len(cursors)}")

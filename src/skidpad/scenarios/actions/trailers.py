@@ -31,7 +31,7 @@ class ConnectTrailer:
     trailer: str
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """At once; without a hitch or a coupler nothing happens, and the log says so."""
+        """Couples at once; without a hitch or a coupler nothing happens, and the log says so."""
         trailer = scene.actors[self.trailer]
         if any(one is trailer for one in train_of(actor)):
             scene.notice(f"{actor.name} does not tow {trailer.name}, which tows it, or is itself")

@@ -42,7 +42,7 @@ class DeleteEntity:
     name: str
 
     def happen(self, scene: Scene) -> Running:
-        """From the next step on."""
+        """Takes the entity out from the next step on."""
         actor = scene.actors[self.name]
         actor.present = False
         actor.word = ActorCommand(self.name, present=False)
@@ -67,7 +67,7 @@ class SetValue:
     change: Callable[[str], str]
 
     def happen(self, scene: Scene) -> Running:
-        """At once."""
+        """Sets the value at once."""
         values = scene.variables if self.variable else scene.parameters
         old = values[self.name]
         try:
@@ -110,7 +110,7 @@ class SetSignal:
     state: str
 
     def happen(self, scene: Scene) -> Running:
-        """At once."""
+        """Sets the signal at once."""
         scene.signals[self.name] = self.state
         return DONE
 
@@ -132,7 +132,7 @@ class SetEnvironment:
     environment: Environment
 
     def happen(self, scene: Scene) -> Running:
-        """From the next step on."""
+        """Sets weather and time from the next step on."""
         scene.environments.append(self.environment)
         scene.tell_time(self.environment)
         return DONE
@@ -150,7 +150,7 @@ class UserAction:
     text: str
 
     def happen(self, scene: Scene) -> Running:
-        """At once."""
+        """Calls the user's hook at once."""
         self.act(scene, self.text)
         return DONE
 

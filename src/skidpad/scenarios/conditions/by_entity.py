@@ -39,7 +39,7 @@ class Reaches:
     value: float
 
     def holds(self, scene: Scene, actor: str) -> bool:
-        """As it is now; before the first tick nothing has lasted."""
+        """Whether it holds now; before the first tick nothing has lasted."""
         a = scene.actors[actor]
         if self.quantity is Quantity.OFF_ROAD:
             lasted = time_off_road(a, scene.network, scene.t)
@@ -59,7 +59,7 @@ def _reaches(node: Node, ctx: Context) -> EntityCondition:
 
 
 class Component(Enum):
-    """Of a motion, in the entity's own axes."""
+    """A component of a motion, in the entity's own axes."""
 
     TOTAL = ""
     LONGITUDINAL = "longitudinal"
@@ -101,7 +101,7 @@ def _motion(node: Node, ctx: Context) -> EntityCondition:
 
 @dataclass(frozen=True, slots=True)
 class ReachPosition:
-    """Within a tolerance of a place."""
+    """Holds within a tolerance of a place."""
 
     tolerance: float
     position: Position
@@ -166,7 +166,7 @@ class Angle:
     other: str | None
 
     def holds(self, scene: Scene, actor: str) -> bool:
-        """As it is now."""
+        """Whether the angle is as asked now."""
         here = scene.actors[actor].pose
         if self.other is not None:
             value = self._of(scene, here) - self._of(scene, scene.actors[self.other].pose)
@@ -175,7 +175,7 @@ class Angle:
         return abs(wrap_angle(value - self.angle)) <= self.tolerance
 
     def _of(self, scene: Scene, pose: Pose) -> float:
-        """In the world, rad."""
+        """Returns the angle in the world, rad."""
         if self.turn is Turn.HEADING:
             return pose.yaw
         pitch, roll = scene.network.slopes(pose)
@@ -219,7 +219,7 @@ class Clearance:
     lanes: tuple[tuple[float, float], ...]  # from, to; relative to the own lane
 
     def holds(self, scene: Scene, actor: str) -> bool:
-        """Nothing is there now."""
+        """Whether nothing is there now."""
         here = scene.actors[actor]
         place = scene.network.place_of(here.pose)
         base = place.lane
@@ -240,7 +240,7 @@ class Clearance:
         }
 
     def _has_lane(self, scene: Scene, base: LanePoint, sign: int) -> bool:
-        """Beside the entity there is a lane of those that are asked for: no lane is no room."""
+        """Whether a lane of those that are asked for is beside the entity: no lane is no room."""
         wanted = self._wanted(base.lane_id, sign) or {base.lane_id}
         if not self.opposite:
             wanted = {i for i in wanted if (i > 0) == (base.lane_id > 0)}

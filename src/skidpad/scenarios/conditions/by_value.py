@@ -44,7 +44,7 @@ class Value:
     value: str
 
     def probe(self) -> Probe:
-        """As it is now."""
+        """Returns the value as it is now."""
         return self._holds
 
     def _holds(self, scene: Scene) -> bool:
@@ -73,7 +73,7 @@ def _is_criterion(node: Node) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Never:
-    """In the place of a condition that means nothing here."""
+    """Stands in the place of a condition that means nothing here."""
 
     def probe(self) -> Probe:
         """Never."""
@@ -88,7 +88,7 @@ class ElementState:
     state: State
 
     def probe(self) -> Probe:
-        """As it is now."""
+        """Returns the element's state as it is now."""
         return lambda scene: scene.states.get(self.path, State.STANDBY) is self.state
 
 
@@ -130,7 +130,7 @@ class Signal:
     state: str
 
     def probe(self) -> Probe:
-        """As it is now."""
+        """Returns the signal's state as it is now."""
         wanted, id = read_signal_state(self.state), id_number(self.name.removeprefix("id="))
 
         def holds(scene: Scene) -> bool:
@@ -148,7 +148,7 @@ class TimeOfDay:
     rule: Rule
 
     def probe(self) -> Probe:
-        """As it is now."""
+        """Returns the time of day as it is now."""
         return lambda s: s.clock is not None and self.rule.met(s.clock.now(s.t))
 
 
@@ -169,7 +169,7 @@ class UserValue:
     value: str
 
     def probe(self) -> Probe:
-        """As it is now."""
+        """Returns the user's value as it is now."""
         return lambda scene: holds_between(self.rule, str(self.read(scene)), self.value)
 
 

@@ -34,7 +34,7 @@ class Measure:
     free: bool
 
     def distance(self, scene: Scene, actor: Actor, goal: Pose, other: Actor | None) -> float:
-        """From an entity to a place, or to the entity there; m, never negative."""
+        """Measures from an entity to a place, or to the entity there; m, never negative."""
         if self.direction in EUCLIDEAN:
             if not self.free:
                 return hypot(goal.x - actor.pose.x, goal.y - actor.pose.y)

@@ -49,7 +49,7 @@ def pieces(vertices: Sequence[Vertex], sparse: bool = False) -> list[list[Vertex
 
 
 def thin_vertices(vertices: Sequence[Vertex], sparse: bool = False) -> list[Vertex]:
-    """Without the vertices between which motion is as even without them."""
+    """Drops the vertices between which motion is as even without them."""
     table = np.array(vertices)
     kept, i, last = [0], 0, len(vertices) - 1
     while i < last:

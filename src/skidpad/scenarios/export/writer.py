@@ -158,7 +158,7 @@ def _entity(track: Track, sheet: Sheet) -> Any:
 
 
 def _rgb(colour: str) -> str:
-    """As CARLA's blueprints want it: red, green and blue from 0 to 255."""
+    """Returns a colour as CARLA's blueprints want it: red, green and blue from 0 to 255."""
     return ",".join(str(int(colour[k : k + 2], 16)) for k in (1, 3, 5))
 
 
@@ -221,7 +221,7 @@ def _with_waits(stretches: Sequence[Sequence[Vertex]], sheet: Sheet, k: int) -> 
 
 
 def _stay(manoeuvre: Any, name: str, rows: Sequence[Vertex], sheet: Sheet, suffix: str) -> None:
-    """One stretch of being there."""
+    """Adds the events of one stretch of being there."""
     if rows[0].t > 1e-6:
         add = xosc.AddEntityAction(name, _position(rows[0]))
         manoeuvre.add_event(_event(f"{name}_appears{suffix}", add, rows[0].t, sheet))
@@ -258,7 +258,7 @@ def _position(v: Vertex) -> Any:
 
 
 def _after(t: float, sheet: Sheet, point: str = "start") -> Any:
-    """At simulation time `t`; OpenSCENARIO 1.0 knows no `greaterOrEqual`."""
+    """Triggers at simulation time `t`; OpenSCENARIO 1.0 knows no `greaterOrEqual`."""
     rule = xosc.Rule.greaterThan if sheet.old else xosc.Rule.greaterOrEqual
     value = round(t - EARLY, 3) if t > 0.0 or sheet.old else 0.0
     condition = xosc.SimulationTimeCondition(value, rule)

@@ -43,7 +43,7 @@ def progress(shape: Shape, u: float) -> tuple[float, float, float]:
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """From `start` to `end` while something (time in s, or distance in m) goes from 0 to `span`."""
+    """Goes from `start` to `end` while something (time in s, or distance in m) goes from 0 to `span`."""
 
     start: float
     end: float

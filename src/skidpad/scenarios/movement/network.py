@@ -76,7 +76,7 @@ class Network:
         return Place(pose, self.map.project(pose.x, pose.y, pose.z))
 
     def on_lane(self, road: int, lane: int, s: float, offset: float) -> Place:
-        """On a lane, `offset` to the left of increasing s; ConfigError when it is not there."""
+        """Returns a place on a lane, `offset` m to the left of increasing s; ConfigError where none is."""
         point = self.map.on_lane(road, lane, s)
         left = offset if self.forward(point) else -offset
         point = replace(point, offset=left)
@@ -96,7 +96,7 @@ class Network:
         return min(a, b), max(a, b)
 
     def on_road(self, road: int, s: float, t: float) -> Place:
-        """At (s, t) of a road, looking along increasing s."""
+        """Returns the place at (s, t) of a road, looking along increasing s."""
         record = self.roads.get(road)
         if record is None or not 0.0 <= s <= record.length + END_SLACK:
             has = "no such road" if record is None else f"s from 0 to {record.length:.1f}"

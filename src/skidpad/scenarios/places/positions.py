@@ -25,7 +25,7 @@ class Position(Protocol):
     """A place, perhaps relative to something that moves."""
 
     def place(self, scene: Scene) -> Place:
-        """Where it is now."""
+        """Returns the place where it is now."""
         ...
 
 
@@ -121,7 +121,7 @@ def _facing(place: Place, facing: Orientation) -> Place:
 
 @dataclass(frozen=True, slots=True)
 class RelativeLane:
-    """So many metres along and lanes aside of an entity.
+    """A place some metres along and some lanes aside of an entity.
 
     along_lane: ds, dLane and offset count in the driving direction, else in that of the road.
     """

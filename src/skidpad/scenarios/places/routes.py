@@ -89,7 +89,7 @@ class OnRoute:
     facing: Orientation
 
     def place(self, scene: Scene) -> Place:
-        """By the lanes of the route."""
+        """Returns the place by the lanes of the route."""
         point = self.route.at(scene.network, self.s)
         network = scene.network
         if self.lane_id is None:
@@ -111,7 +111,7 @@ class OfEntity:
     other: str
 
     def place(self, scene: Scene) -> Place:
-        """Where the entity is now."""
+        """Returns where the entity is now."""
         return scene.actors[self.other].place(scene.network)
 
 

@@ -48,7 +48,7 @@ class Spots(NamedTuple):
 
 
 def spots_of(map: RoadMap) -> Spots:
-    """Every few metres of all driving lanes outside junctions."""
+    """Returns a spot every few metres of all driving lanes outside junctions."""
     lanes, samples = map.lanes, map.samples
     usable = (lanes.kind == LaneKind.DRIVING) & (lanes.junction < 0)
     k = np.flatnonzero(usable[samples.lane])[::SPACING]
@@ -78,13 +78,13 @@ class Region(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Disc:
-    """Within a radius in m of a place."""
+    """The area within a radius in m of a place."""
 
     centre: Position
     radius: float
 
     def inside(self, scene: Scene, spots: Spots) -> Mask:
-        """By distance."""
+        """Tells the spots inside by their distance."""
         pose = self.centre.place(scene).pose
         near: Mask = np.hypot(spots.x - pose.x, spots.y - pose.y) <= self.radius
         return near
@@ -106,7 +106,7 @@ class Oval:
     rim: float = 0.0
 
     def inside(self, scene: Scene, spots: Spots) -> Mask:
-        """Between the inner disc, or the rim, and the ellipse."""
+        """Tells the spots between the inner disc, or the rim, and the ellipse."""
         centre = scene.actors[self.entity].pose.moved(forward=self.offset)
         forward, left = between(centre, spots.x, spots.y)
         share = np.hypot(forward / self.major, left / self.minor)
@@ -116,12 +116,12 @@ class Oval:
 
 @dataclass(frozen=True, slots=True)
 class Outline:
-    """Within a polygon of places."""
+    """The area within a polygon of places."""
 
     corners: tuple[Position, ...]
 
     def inside(self, scene: Scene, spots: Spots) -> Mask:
-        """By the number of edges that a ray along x crosses (even and odd)."""
+        """Tells the spots inside by the edges that a ray along x crosses (even and odd)."""
         poses = [corner.place(scene).pose for corner in self.corners]
         odd = np.zeros(len(spots.x), np.bool_)
         for a, b in zip(poses, [*poses[1:], poses[0]], strict=True):
@@ -148,7 +148,7 @@ class Stretches:
     parts: tuple[Stretch, ...]
 
     def inside(self, scene: Scene, spots: Spots) -> Mask:
-        """By road, lane and s."""
+        """Tells the spots inside by road, lane and s."""
         del scene
         found = np.zeros(len(spots.x), np.bool_)
         for part in self.parts:

@@ -212,7 +212,7 @@ SHAPES: Mapping[str, Callable[[Node], tuple[list[Node], Shape]]] = {
 
 @dataclass(frozen=True, slots=True)
 class OnTrajectory:
-    """So far along a trajectory, and to the left of it."""
+    """A place along a trajectory, and to the left of it."""
 
     trajectory: Trajectory
     s: float

@@ -10,7 +10,7 @@ from skidpad.scenarios.scene import Actor, Controlling, Scene
 
 
 def control(scene: Scene) -> None:
-    """One step of every active controller; an action of the file goes before it in its domain."""
+    """Steps every active controller; an action of the file goes before it in its domain."""
     for actor in scene.actors.values():
         actor.piloted, controller = None, actor.controller
         if controller is None or not actor.present:

@@ -106,7 +106,7 @@ class Player:
 
     @property
     def triggered(self) -> bool:
-        """Every event of the scenario has begun."""
+        """Whether every event of the scenario has begun."""
         return all(event.happened_at is not None for event in self.telling.events)
 
     @property
@@ -116,7 +116,7 @@ class Player:
 
     @property
     def played(self) -> Played:
-        """As a value."""
+        """Returns what was played as a value."""
         boxes = {name: entity.box for name, entity in self.scenario.entities.items()}
         story = tuple(self.scene.story)
         driven_by_file = self.modes.get(self.scenario.ego, ActorMode.PHYSICAL) is not None

@@ -29,19 +29,19 @@ class StatefulElement:
         self.path, self.state = path, State.STANDBY
 
     def turn(self, scene: Scene, state: State, move: Move) -> None:
-        """Into another state."""
+        """Turns into another state."""
         self.state = state
         scene.states[self.path] = state
         scene.moved(self.path, move)
 
     @property
     def running(self) -> bool:
-        """Under way."""
+        """Whether the element is under way."""
         return self.state is State.RUNNING
 
     @property
     def complete(self) -> bool:
-        """Over."""
+        """Whether the element is over."""
         return self.state is State.COMPLETE
 
 
@@ -100,7 +100,7 @@ class ToldEvent(StatefulElement):
             self.turn(scene, State.STANDBY if self.left > 0 else State.COMPLETE, Move.END)
 
     def stop(self, scene: Scene) -> None:
-        """Before its end."""
+        """Ends the event early."""
         if self.complete:
             return
         for path, runs in self.going:
@@ -133,7 +133,7 @@ class ToldParent(StatefulElement):
         self.children = children
 
     def start(self, scene: Scene) -> None:
-        """With its children, which have no triggers of their own."""
+        """Starts with its children, which have no triggers of their own."""
         self.turn(scene, State.RUNNING, Move.START)
         for child in self.children:
             if isinstance(child, ToldParent):
@@ -160,7 +160,7 @@ class ToldParent(StatefulElement):
         self.turn(scene, State.COMPLETE, Move.END)
 
     def stop(self, scene: Scene) -> None:
-        """Before its end."""
+        """Ends the element and its children early."""
         for child in self.children:
             child.stop(scene)
         if not self.complete:
@@ -192,7 +192,7 @@ class ToldGroup(ToldParent):
         super().__init__(group.path, self.manoeuvres)
 
     def end(self, scene: Scene) -> None:
-        """Once more, or complete."""
+        """Begins once more, or is complete."""
         self.left -= 1
         if self.left <= 0:
             self.turn(scene, State.COMPLETE, Move.END)

@@ -36,7 +36,7 @@ class Node:
 
     @property
     def line(self) -> int:
-        """In the file, from 1."""
+        """Returns the line in the file, from 1."""
         line: Any = self.element.sourceline
         return int(line or 0)
 

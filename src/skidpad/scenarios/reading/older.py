@@ -122,7 +122,7 @@ A_MAX = "200"  # m/s^2, as in ASAM's migration; 0.9.1 knows no largest accelerat
 
 
 def renew(root: Element) -> None:
-    """Everything under the root by its newer name."""
+    """Gives everything under the root its newer name."""
     for element in list(root.iter("*")):
         parent = element.getparent()
         inside = "" if parent is None else str(parent.tag)
@@ -204,7 +204,7 @@ def _time(element: Element) -> None:
 
 
 def _trajectory(element: Element) -> None:
-    """Its shape stands around the vertices since; only lines from point to point are taken over."""
+    """Puts the shape around the vertices, as today; only lines from point to point are taken over."""
     vertices = element.findall("Vertex")
     if not vertices or any(v.find("Shape/Polyline") is None for v in vertices):
         return

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from skidpad.core.errors import SkidpadError
 from skidpad.core.setup import DT
-from skidpad.scenarios.playing.stage import played
+from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.scenarios.reading.document import Node, parse
 from skidpad.scenarios.reading.findings import HARMLESS, Finding, Kind
 from skidpad.scenarios.scenario import check
@@ -98,7 +98,7 @@ class Corpus:
             return [f"{'' if valid else 'not valid: '}{f}" for f in serious]
         count["clean"] += valid
         try:
-            played(compiled.scenario, self.ticks * DT)
+            play_ideal(compiled.scenario, self.ticks * DT)
         except SkidpadError as error:
             count["refused"] += 1
             return [f"at run time: {error}"]

@@ -40,7 +40,7 @@ from tests.scenarios.oracle.reference import (  # noqa: E402
 
 from skidpad.core.errors import SkidpadError  # noqa: E402
 from skidpad.scenarios import registry  # noqa: E402
-from skidpad.scenarios.playing.stage import PlayedScenario, played  # noqa: E402
+from skidpad.scenarios.playing.stage import PlayedScenario, play_ideal  # noqa: E402
 from skidpad.scenarios.scenario import compile_scenario  # noqa: E402
 
 STEP, SAMPLE = 0.05, 0.2  # s, of the players and of what is stored
@@ -131,7 +131,7 @@ def record(programs: Path, folders: Sequence[Path]) -> int:
 def play_without_controllers(file: Path) -> PlayedScenario:
     """Plays a file as esmini does with --disable_controllers: no name of a controller is known."""
     with patch.dict(registry.BUILT_IN, clear=True):
-        return played(compile_scenario(file), CORPUS_END, STEP)
+        return play_ideal(compile_scenario(file), CORPUS_END, STEP)
 
 
 def compare(folders: Sequence[Path]) -> int:

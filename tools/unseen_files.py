@@ -28,7 +28,7 @@ from tests.scenarios.oracle.reference import deviations, file_hash  # noqa: E402
 from openscenario_corpus import breaks, content, lacking  # noqa: E402
 from scenario_oracle import LEAST_WAY, run_esmini  # noqa: E402
 from skidpad.core.errors import SkidpadError  # noqa: E402
-from skidpad.scenarios.playing.stage import PlayedScenario, played  # noqa: E402
+from skidpad.scenarios.playing.stage import PlayedScenario, play_ideal  # noqa: E402
 from skidpad.scenarios.reading.document import parse  # noqa: E402
 from skidpad.scenarios.reading.findings import HARMLESS  # noqa: E402
 from skidpad.scenarios.scenario import check  # noqa: E402
@@ -121,7 +121,7 @@ def play(file: Path, maps: Sequence[Path]) -> tuple[str, PlayedScenario | None]:
         if compiled.scenario is None:
             first = next(f for f in compiled.findings if f.kind not in HARMLESS)
             return f"refused: {first}", None
-        return "played", played(compiled.scenario, END, STEP)
+        return "played", play_ideal(compiled.scenario, END, STEP)
     except SkidpadError as error:
         return f"failed: {str(error).splitlines()[0]}", None
     except Exception:

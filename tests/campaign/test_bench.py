@@ -13,7 +13,7 @@ from skidpad.campaign.bench.tick import TickCost, bench_run, tick_cost
 from skidpad.campaign.bench.traffic import measure
 from skidpad.campaign.bench.traffic_options import TrafficBench
 from skidpad.core.vocabulary import SensorLevel
-from skidpad.scenarios.playing.stage import played
+from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.scenarios.scenario import compile_scenario
 
 
@@ -69,14 +69,14 @@ def test_the_measured_files_do_something(tmp_path: Path) -> None:
     small, large = tmp_path / "small.xosc", tmp_path / "large.xosc"
     text = bench_scenarios.two_cars(bench_scenarios.SLOWER, bench_scenarios.ASIDE, seconds=12.0)
     small.write_text(text, encoding="utf-8")
-    result = played(compile_scenario(small), 60.0)
+    result = play_ideal(compile_scenario(small), 60.0)
     last = result.of("other")[-1]
     assert last.time == pytest.approx(12.0)
     assert (last.speed, last.y) == pytest.approx((8.0, -5.25), abs=1e-3)
     text = bench_scenarios.two_cars(bench_scenarios.long_line(), seconds=1.0)
     assert 5_000_000 <= len(text) < 5_200_000
     large.write_text(text, encoding="utf-8")
-    assert played(compile_scenario(large), 60.0).of("other")[-1].x == pytest.approx(210.0)
+    assert play_ideal(compile_scenario(large), 60.0).of("other")[-1].x == pytest.approx(210.0)
 
 
 def test_a_target_is_a_bound_from_one_side() -> None:

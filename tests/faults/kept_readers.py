@@ -52,7 +52,7 @@ def catalogs() -> list[bytes]:
 
 def read_catalog(path: Path) -> object:
     """A scenario that takes a vehicle and a manoeuvre from it, played; a new folder each time."""
-    from skidpad.scenarios.playing.stage import played
+    from skidpad.scenarios.playing.stage import play_ideal
 
     with TemporaryDirectory(dir=path.parent) as name, np.errstate(all="ignore"):
         folder = Path(name)
@@ -61,7 +61,7 @@ def read_catalog(path: Path) -> object:
         other = f'<ScenarioObject name="other">{NAMED.format("long")}</ScenarioObject>'
         file = write(folder, catalogs=PLACES, entities=vehicle("ego") + other, stories=STORY)
         scenario = story_of(file).scenario
-        return scenario and played(scenario, STORY_S, STORY_DT).csv()
+        return scenario and play_ideal(scenario, STORY_S, STORY_DT).csv()
 
 
 # --- what was judged before

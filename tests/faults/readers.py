@@ -273,12 +273,12 @@ def story_of(path: Path) -> Any:
 
 def tell_story(path: Path) -> object:
     """Everything as the file says, where it compiles."""
-    from skidpad.scenarios.playing.stage import played
+    from skidpad.scenarios.playing.stage import play_ideal
 
     beside(path)
     scenario = story_of(path).scenario
     with np.errstate(all="ignore"):
-        return scenario and played(scenario, STORY_S, STORY_DT).csv()
+        return scenario and play_ideal(scenario, STORY_S, STORY_DT).csv()
 
 
 # --- words of a command line

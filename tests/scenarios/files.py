@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from skidpad.scenarios.playing.stage import PlayedScenario, played
+from skidpad.scenarios.playing.stage import PlayedScenario, play_ideal
 from skidpad.scenarios.scenario import Scenario, compile_scenario
 
 HEAD = """<?xml version='1.0'?>
@@ -188,4 +188,4 @@ def compiled(folder: Path, **parts: object) -> Scenario:
 
 def told(folder: Path, **parts: object) -> PlayedScenario:
     """The file played by itself, everything ideal."""
-    return played(compiled(folder, **parts), 60.0)
+    return play_ideal(compiled(folder, **parts), 60.0)

@@ -27,7 +27,7 @@ from skidpad.roads.bundled import load_map
 from skidpad.scenarios.movement.network import network_of
 from skidpad.scenarios.places.routes import random_roads
 from skidpad.scenarios.playing.player import Player
-from skidpad.scenarios.playing.stage import IdealWorld, played
+from skidpad.scenarios.playing.stage import IdealWorld, play_ideal
 from skidpad.scenarios.scenario import check
 
 STOP = private(speed(to(0)))
@@ -106,7 +106,7 @@ def lit(tmp_path, when, *more):
     file.write_text(
         (text[:a] + LIGHTS + text[b:]).replace("<StopTrigger>", probe + "<StopTrigger>", 1)
     )
-    return begun(played(check(file).playable(), 20.0))
+    return begun(play_ideal(check(file).playable(), 20.0))
 
 
 def phase(controller, name):

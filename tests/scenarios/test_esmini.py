@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from skidpad.scenarios.playing.stage import played
+from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.scenarios.scenario import compile_scenario
 
 FILES = sorted(Path(__file__).with_name("esmini").glob("*.xosc"))
@@ -25,7 +25,7 @@ def test_there_are_files():
 
 @pytest.mark.parametrize("file", FILES, ids=lambda f: f.stem)
 def test_everybody_is_where_esmini_puts_them(file):
-    told = played(compile_scenario(file), 9.0)
+    told = play_ideal(compile_scenario(file), 9.0)
     ours = {(round(r.time / 0.05), r.name): r for r in told.rows}
     lines = [line for line in file.with_suffix(".csv").read_text().splitlines() if line[0] != "#"]
     compared = 0

@@ -29,7 +29,7 @@ from typer.testing import CliRunner
 from skidpad.cli.main import app
 from skidpad.core.errors import FileError
 from skidpad.roads.opendrive.bake import bake
-from skidpad.scenarios.playing.stage import played
+from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.scenarios.reading.findings import Kind, ScenarioError
 from skidpad.scenarios.scenario import check, compile_scenario
 
@@ -166,7 +166,7 @@ def test_what_is_missing_but_clear_plays_when_asked_to_be_lenient(tmp_path):
     scenario = compile_scenario(file, lenient=True)
     for words in ("has no attribute dx: read as 0", "has no attribute dLane", "has no <Actors>"):
         assert words in notes(scenario)
-    ego, other, third = (played(scenario, 0.1).of(n)[0] for n in ("ego", "other", "third"))
+    ego, other, third = (play_ideal(scenario, 0.1).of(n)[0] for n in ("ego", "other", "third"))
     assert (other.x - ego.x, other.y - ego.y) == pytest.approx((0.0, 3.0), abs=1e-6)
     assert (third.x - ego.x, third.y - ego.y) == pytest.approx((20.0, 0.0), abs=1e-6)
 

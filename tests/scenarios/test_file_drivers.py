@@ -23,7 +23,7 @@ from skidpad.campaign.driving.file_drivers import FollowingDriver
 from skidpad.campaign.driving.run_setup import load_scenario
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import Scenario
-from skidpad.scenarios.playing.stage import played
+from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.stack.reference.following import GAP_MIN
 from skidpad.stack.reference.person import person_of
 
@@ -42,7 +42,7 @@ def end_of(folder, lead=True, **properties):
         init=at("ego", -3, 100, 0) + begins + third,
         end=60.0,
     )
-    found = played(load_scenario(Scenario(file=str(file))), 60.0)
+    found = play_ideal(load_scenario(Scenario(file=str(file))), 60.0)
     return found.of("other")[-1], found.of("third")[-1]
 
 
@@ -72,7 +72,7 @@ def test_an_action_of_the_file_goes_before_it(tmp_path):
         stories=story(slow),
         end=3.0,
     )
-    found = played(load_scenario(Scenario(file=str(file))), 3.0).of("other")
+    found = play_ideal(load_scenario(Scenario(file=str(file))), 3.0).of("other")
     assert found[-1].speed == pytest.approx(4.0, abs=0.1)
 
 

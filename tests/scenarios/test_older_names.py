@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from skidpad.scenarios.playing.stage import played
+from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.scenarios.scenario import check
 
 CAR = """<Object name="{0}"><Vehicle name="v" category="car"><ParameterDeclaration/>
@@ -52,7 +52,7 @@ def played_file(tmp_path, *events, cars=("ego", "other")):
     )
     path = tmp_path / "old.xosc"
     path.write_text(text)
-    return played(check(path).playable(), 20.0)
+    return play_ideal(check(path).playable(), 20.0)
 
 
 def test_names_of_0_9_1_are_those_of_later(tmp_path):

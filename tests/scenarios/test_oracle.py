@@ -12,7 +12,7 @@ import pytest
 from tests.scenarios.oracle.cases import CASES
 from tests.scenarios.oracle.reference import OWN, deviations, file_hash, read_reference, write_case
 
-from skidpad.scenarios.playing.stage import played
+from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.scenarios.scenario import compile_scenario
 
 DOCS = Path(__file__).parents[2] / "docs" / "openscenario.md"
@@ -39,7 +39,7 @@ def test_every_case_has_its_reference_and_few_are_exceptions():
 def test_everybody_moves_as_in_esmini(tmp_path, name):
     file, reference = write_case(name, tmp_path), read_reference(OWN / f"{name}.csv")
     assert reference.file_hash == file_hash(file), "compute the references anew"
-    told = played(compile_scenario(file), CASES[name].end)
+    told = play_ideal(compile_scenario(file), CASES[name].end)
     off = deviations(told, reference)
     assert set(off) == {"ego", "other"}
     beyond = {who: d for who, d in off.items() if not d.is_within}

@@ -16,7 +16,7 @@ from skidpad.core.vocabulary import Outcome, SemanticClass
 from skidpad.scenarios.export.hazard_export import export_hazard, road_under
 from skidpad.scenarios.export.tracks import Track, tracks
 from skidpad.scenarios.export.writer import OscVersion, Sheet, write_element, write_scenario
-from skidpad.scenarios.playing.stage import played
+from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.scenarios.scenario import compile_scenario
 
 T = np.round(np.arange(0.0, 12.01, 0.1), 3)
@@ -97,7 +97,7 @@ def test_our_own_replay_is_within_1_cm_although_the_worlds_overlap(tmp_path):
     scenario = compile_scenario(file)
     ghosts = {name for name, entity in scenario.entities.items() if entity.is_ghost}
     assert ghosts == {name for name in scenario.entities if "tfuse" in name}
-    told = played(scenario, 60.0)
+    told = play_ideal(scenario, 60.0)
     for track in tracks(record, record.channels):
         rows = told.of(track.name)
         times = [row.time for row in rows]

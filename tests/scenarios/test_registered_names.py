@@ -29,7 +29,7 @@ from skidpad.campaign.driving.run_setup import load_scenario
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import RunSpec, Scenario
-from skidpad.scenarios.playing.stage import played
+from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.scenarios.reading.findings import ScenarioError
 from skidpad.scenarios.registry import Acc, Names
 from skidpad.scenarios.scenario import check
@@ -85,7 +85,7 @@ def test_acc_settles_at_the_gap_of_the_intelligent_driver_model(tmp_path):
     """Where it follows at constant speed v, the gap is (s0 + v T) / sqrt(1 - (v / v0)^4)."""
     file = file_of(tmp_path, with_controller("ACC", setSpeed=20, timeGap=1.8))
     scenario = check(file).playable()
-    found = played(scenario, 60.0)
+    found = play_ideal(scenario, 60.0)
     other, third = found.of("other")[-1], found.of("third")[-1]
     assert other.speed == pytest.approx(8.0, abs=0.02)
     gap = third.x - other.x - 4.2  # two boxes of 4.2 m with their reference point in the middle
@@ -98,7 +98,7 @@ def test_a_registered_controller_moves_its_actor_by_what_it_returns(tmp_path):
     """0.5 m/s2 from 10 m/s: 11.5 m/s and 32.25 m after 3 s."""
     file = file_of(tmp_path, with_controller("ramp", a=0.5), end=3.0)
     scenario = check(file, names=Names({"ramp": Ramp})).playable()
-    found = played(scenario, 3.0).of("other")
+    found = play_ideal(scenario, 3.0).of("other")
     assert found[-1].speed == pytest.approx(11.5, abs=0.03)
     assert found[-1].x - found[0].x == pytest.approx(32.25, abs=0.1)
 
@@ -106,7 +106,7 @@ def test_a_registered_controller_moves_its_actor_by_what_it_returns(tmp_path):
 def test_an_action_of_the_file_upon_the_speed_goes_before_the_controller(tmp_path):
     slow = event("slow", private(speed(to(4), "linear", 2)), time(1))
     file = file_of(tmp_path, with_controller("ramp", a=0.5), stories=story(slow), end=3.0)
-    found = played(check(file, names=Names({"ramp": Ramp})).playable(), 3.0).of("other")
+    found = play_ideal(check(file, names=Names({"ramp": Ramp})).playable(), 3.0).of("other")
     assert found[-1].speed == pytest.approx(4.0, abs=0.05)
 
 
@@ -124,7 +124,7 @@ def test_an_action_and_a_value_of_users_are_reached_by_their_names(tmp_path):
         made.append(Counter())
         return made[-1]
 
-    found = played(check(file, names=Names({"count": make})).playable(), 5.0)
+    found = play_ideal(check(file, names=Names({"count": make})).playable(), 5.0)
     assert [c.texts for c in made] == [[(1.0, "ping")]]
     speeds = {round(row.time, 2): row.speed for row in found.of("other")}
     assert speeds[0.95] == pytest.approx(10.0)
@@ -165,7 +165,7 @@ def test_a_file_never_imports_what_it_names(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     for name in ("evil_by_name", "evil_by_name:Evil", f"{tmp_path}/evil_by_name.py:Evil"):
         found = check(file_of(tmp_path, with_controller(name), end=0.2))
-        played(found.playable(), 0.2)
+        play_ideal(found.playable(), 0.2)
     assert "evil_by_name" not in sys.modules
 
 
@@ -196,6 +196,6 @@ def test_what_a_users_code_does_wrong_is_one_sentence(tmp_path):
     file = file_of(tmp_path, with_controller("broken"), end=1.0)
     scenario = check(file, names=Names({"broken": Broken})).playable()
     with pytest.raises(ConfigError, match="'broken', as it is registered, failed: .*nothing_of"):
-        played(scenario, 1.0)
+        play_ideal(scenario, 1.0)
     with pytest.raises(ConfigError, match="setSpeed of a controller must be a number"):
         Acc({"setSpeed": "fast"})

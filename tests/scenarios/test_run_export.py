@@ -21,7 +21,7 @@ from skidpad.cli.main import app
 from skidpad.core.run import Passenger, Roads
 from skidpad.recording.run.log_files import read_log
 from skidpad.scenarios.export.run_export import log_tracks, road_of
-from skidpad.scenarios.playing.stage import played
+from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.scenarios.scenario import compile_scenario
 
 
@@ -61,7 +61,7 @@ def test_a_run_is_played_again_within_1_cm(drives, name):
     scenario = compile_scenario(file)
     assert scenario.ego == log.table.names[0]
     assert scenario.map.content_hash == log.header.map_hash  # of the road beside it
-    assert distances(log, played(scenario, 60.0)).max() < 0.01
+    assert distances(log, play_ideal(scenario, 60.0)).max() < 0.01
     follows = led(file)
     for track in log_tracks(log):  # and by players that merge vertices within 5 mm
         for t, x, y in list(zip(track.t, track.x, track.y, strict=True))[1:]:

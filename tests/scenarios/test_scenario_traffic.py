@@ -7,7 +7,7 @@ from math import hypot
 import pytest
 from tests.scenarios.files import at, compiled, condition, event, on_lane, story, time, told, write
 
-from skidpad.scenarios.playing.stage import played
+from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.scenarios.scenario import check
 
 CARS = """<TrafficDefinition name="t"><VehicleCategoryDistribution><VehicleCategoryDistributionEntry
@@ -84,7 +84,9 @@ def begins(told):
 def test_a_source_brings_vehicles_at_its_rate(tmp_path):
     rows = begins(playing(tmp_path, traffic(source(rate=0.25)), end=21))
     assert [row.time for row in rows] == pytest.approx([0.05 + 4.0 * k for k in range(6)], abs=1e-6)
-    first = played(compiled(tmp_path), 0.0).of("other")[0]  # looks along the lanes of negative id
+    first = play_ideal(compiled(tmp_path), 0.0).of("other")[
+        0
+    ]  # looks along the lanes of negative id
     for row in rows:
         assert (row.h, row.speed) == pytest.approx((first.h, 10.0), abs=0.01)
     assert max(hypot(a.x - b.x, a.y - b.y) for a in rows for b in rows) < 1.0
@@ -174,7 +176,7 @@ def test_nobody_of_traffic_touches_another(tmp_path):
 def test_places_are_drawn_by_the_seed(tmp_path):
     path = write(tmp_path, init=at("ego", -3, 100) + at("other", -1, 120) + traffic(swarm()))
     scenario = check(path).playable()
-    first, again, other = (played(scenario, 2.0, seed=seed).csv() for seed in (1, 1, 2))
+    first, again, other = (play_ideal(scenario, 2.0, seed=seed).csv() for seed in (1, 1, 2))
     assert first == again != other
 
 

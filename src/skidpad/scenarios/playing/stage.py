@@ -121,7 +121,9 @@ class IdealWorld:
         return WorldTruth(self.tick, self.table, self.states, self.mu, self.commands, {}, (), ())
 
 
-def played(scenario: Scenario, duration: float, dt: float = DT, seed: int = 0) -> PlayedScenario:
+def play_ideal(
+    scenario: Scenario, duration: float, dt: float = DT, seed: int = 0
+) -> PlayedScenario:
     """The scenario as its file says, everything ideal, until it ends or for `duration` s."""
     stage = IdealWorld(scenario)
     modes = dict.fromkeys(scenario.entities, ActorMode.IDEAL)

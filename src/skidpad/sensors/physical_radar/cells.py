@@ -28,7 +28,7 @@ RANGES, SPEEDS = 1 << 11, 1 << 12  # numbers of bins that a cell's number has ro
 GUARD, TRAIN = 2, 8  # cells on each side of the tested one: left out, averaged
 AVERAGED = 2 * TRAIN
 EMPTY = -1
-WEAK = 0.01  # an echo below this share of the noise is left out
+WEAK = 0.1  # an echo below this share of the noise is left out
 SLACK = 0.3  # share of the threshold below which a cell cannot pass, but for 2 in 100 000 means
 
 

@@ -87,6 +87,16 @@ def test_two_who_turn_left_do_not_wait_for_the_second_in_each_others_queue(weath
 
 
 @pytest.mark.parametrize("weather", ["clear-noon", "icy_30"])
+def test_who_stands_within_a_junction_does_not_yield_for_ever_to_a_queue_that_waits_for_it(weather):
+    """The second of the queue is what it yields to, the first waits until the area is free."""
+    inside = (72, 18.8, 0.0, (72, 16))
+    queue = [(28, s, 0.0, (28, 75, 24)) for s in (296.0, 289.0)]
+    _, lane, contacts = drive(drivers_at(weather, inside, *queue), 60.0)
+    assert contacts == 0
+    assert all((lane[:, i] == way).any() for i, way in ((1, 16), (2, 24), (3, 24)))
+
+
+@pytest.mark.parametrize("weather", ["clear-noon", "icy_30"])
 @pytest.mark.parametrize("waited", [0.0, 10.0])
 def test_of_two_who_stood_long_and_start_together_the_one_with_priority_goes(weather, waited):
     """A left turn and one that comes the other way, both impatient; the second stood for longer."""

@@ -75,7 +75,10 @@ def right_of_way_gap(view: View, d: Drivers, i: int) -> tuple[float, int, int]:
             else:
                 me.halted = NOBODY if k == 0 else me.halted  # the stop is over
                 blocked, cause, other = _gap_within(view, d, i, k, start, True)
-                me.waited = me.waited + view.dt if blocked < np.inf else 0.0
+                if blocked < np.inf:
+                    me.waited += view.dt
+                elif not view.care.on or body.speed > V_ANEW:  # else its patience would end at once
+                    me.waited = 0.0
                 if me.waited >= TAKEN_TIME:  # past those who leave room
                     blocked, cause, other = _gap_within(view, d, i, k, start, False)
                 if blocked < np.inf:

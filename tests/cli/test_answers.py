@@ -76,7 +76,10 @@ def test_adas_ends_with_the_answers_the_page_and_the_run_to_look_at(tmp_path, mo
         "skidpad.report.matrix.page.write_report", lambda folder: folder / "report.html"
     )
     first, sure, *_, page, following = answer(tmp_path).split("\n")
-    assert first == "Fewest crashes: in clear sky configuration 1 (ACC) with 0.00 per run."
+    assert (
+        first
+        == "Of the configurations, fewest crashes: in clear sky configuration 1 (ACC) with 0.00 per run."
+    )
     assert sure.startswith("2 seeds per cell cannot tell two configurations apart")
     assert page == str(tmp_path / "report.html")
     assert following == f"Next: skidpad show {tmp_path}/runs/2-2 tells of the run with 6 crashes"

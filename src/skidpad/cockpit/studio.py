@@ -147,7 +147,7 @@ def mount_in(body: Pose, camera: Pose) -> Pose:
 
 
 def plane(image: CameraImage) -> NDArray[Any]:
-    """What of an image goes to the page: packed colours, classes, or depth as bytes."""
+    """Returns the part of an image that the page shows: colours, classes, or depth as bytes."""
     if image.packed is not None:
         return image.packed
     if image.labels is not None:

@@ -123,8 +123,10 @@ def _judgement(
 def _verdict(
     contrasts: list[Contrast], p: tuple[float, float] | None, *, built_in: bool
 ) -> Verdict:
-    """From the adjusted p for and against; against comes first, for what is there may be too
-    small to matter however sure it is."""
+    """Returns the verdict by the adjusted p for and against a claim.
+
+    Against is judged first: a difference that is sure may still be too small to matter.
+    """
     if not contrasts:
         return Verdict.NOT_TESTABLE
     if p is None:

@@ -54,7 +54,7 @@ class Pool:
         return [a for a in (scene.actors[n] for n in self.cars) if a.present]
 
     def bring(self, scene: Scene, spots: Spots) -> bool:
-        """Let one appear at one of the spots that are free; False where there is none of either."""
+        """Puts a spare vehicle at a free spot; False where no vehicle is spare or no spot is free."""
         away = [n for n in self.cars if not scene.actors[n].present]
         if not away or len(spots.x) == 0:
             return False

@@ -26,7 +26,7 @@ CORNERS: dict[SignalKind, tuple[int, tuple[int, int, int]]] = {
 def signs_of(
     samples: LaneSamples, lanes: LaneTable, signals: SignalTable, roadside: Roadside
 ) -> Iterator[Box]:
-    """Yields post and plate of every sign that stands beside the road and has none yet."""
+    """Yields post and plate of every sign beside the road for which the file draws none."""
     driven = np.isin(lanes.kind, (LaneKind.DRIVING, LaneKind.RAMP))[samples.lane]
     plates = np.array(
         [(b.x, b.y) for b in roadside.boxes if b.label == SemanticClass.TRAFFIC_SIGN]

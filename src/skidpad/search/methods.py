@@ -87,7 +87,7 @@ class Descents:
         self.descent: CMA | None = None
 
     def ask(self, count: int) -> Floats:
-        """Return points of the sequence, then of the descent."""
+        """Returns the next points: those of the spread-out sequence first, later those of the descents."""
         if len(self.seen) < self.spread:
             return self.halton.ask(count)
         if self.descent is None:

@@ -232,7 +232,7 @@ class LazyImages(PartialImages):
         return self._ready[id]
 
     def rows(self, id: str, first: int, end: int) -> CameraImage:
-        """The image, of which at least these rows are there."""
+        """Returns an image in which at least rows first to end - 1 are drawn."""
         if id in self._ready:
             return self._ready[id]
         self._check(id)

@@ -84,7 +84,7 @@ def desk_of(run: Path, spec: RunSpec) -> Desk | None:
 
 
 def same_segment(recording: Path) -> bool:
-    """Drive the segment of a recording of channels again, all of it; the contents are the same."""
+    """Whether driving a recorded segment of channels again gives the same contents."""
     spec = with_kept_map(read_segment(recording), recording.resolve().parents[1])
     with TemporaryDirectory() as folder:
         again = Path(folder) / "again.mcap"

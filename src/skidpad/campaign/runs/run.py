@@ -196,7 +196,7 @@ class DeskLog(Log):
         self.desk = desk
 
     def see(self, moment: Moment) -> None:
-        """Write down the moment; the weather is another one from the next one on."""
+        """Writes down the moment; a change of weather counts from the next moment on."""
         super().see(moment)
         if self.desk.changed:
             self.log.set_weather(self.desk.outside.weather.name)

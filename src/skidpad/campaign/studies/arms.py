@@ -78,7 +78,7 @@ def by_settings(arms: Mapping[str, Mapping[str, Any]], configuration: int = 2) -
 
 
 def speed_and_dropout(seeds: Sequence[int]) -> list[Variant]:
-    """F-08: cruise target x share of time without any sensing, configuration 2."""
+    """Returns arms for F-08: every cruise target with every share of time without any sensing."""
     return [
         Variant(
             make_changed_run("Blinking", seed, 2, cruise_kmh=target, dropout=share),

@@ -110,7 +110,7 @@ class Estimate(Struct, frozen=True, kw_only=True):
 
     @property
     def folder(self) -> Path | None:
-        """Nowhere."""
+        """Returns None: an estimate writes no folder."""
         return None
 
     def __call__(

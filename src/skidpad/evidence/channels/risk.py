@@ -92,7 +92,7 @@ def _worst_known(row: list[float]) -> float:
 
 @inner_kernel
 def printed_risk(ttc: float, pet: float) -> float:
-    """Risk of times in s, inf where there is none (C-094)."""
+    """Returns the risk of a time to collision and a PET in s (inf: none), as the source prints it (C-094)."""
     return max(1.0 - ttc / HORIZON, 1.0 - pet / PET_SAFE, 0.0)
 
 

@@ -49,7 +49,7 @@ class LaneIndex:
         self._tree = cKDTree(here)
 
     def match(self, x: Numbers, y: Numbers, z: Numbers) -> LaneMatch:
-        """Lane of each point (n,): the centre line that is nearest in the plane at this height."""
+        """Matches each point (n,) to the lane at its height whose centre line is nearest in x and y."""
         points = np.column_stack([x, y, z]).astype(np.float64)
         k = min(CANDIDATES, len(self._rows))
         _, near = self._tree.query(points, k=k)

@@ -58,7 +58,7 @@ def weathers(
     scenario: str, more: str, less: str, column: str = "completion", amount: Amount = SHARE,
     claim: Claim = Claim.MORE,
 ) -> Paired:  # fmt: skip
-    """States that with reduced friction `column` is larger in one weather than in another."""
+    """Returns the claim that with reduced friction `column` is larger in weather `more` than in `less`."""
     return Paired(
         column=column, more=rows_of("weather", more), less=rows_of("weather", less),
         by=("seed",), amount=amount, claim=claim,

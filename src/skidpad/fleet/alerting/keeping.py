@@ -85,7 +85,7 @@ class Alert:
 
     @property
     def closed(self) -> bool:
-        """Whether nothing more is to be done."""
+        """Whether a person has closed the alert."""
         return any(e.what == What.CLOSED.value for e in self.events)
 
     @property

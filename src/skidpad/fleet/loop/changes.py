@@ -57,7 +57,7 @@ def propose(fleet: Fleet, who: Principal, proposal: Proposal) -> str:
 
 
 def change_row(connection: Connection, who: Principal, change: str) -> Any:
-    """A change of the tenant's own; Refused (404) otherwise."""
+    """Returns the row of a change of the caller's own tenant; Refused (404) where there is none."""
     row = connection.execute(
         select(changes).where(changes.c.id == change, changes.c.tenant == who.tenant)
     ).first()

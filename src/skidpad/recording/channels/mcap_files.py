@@ -150,7 +150,7 @@ class ChannelWriter:
         self._add(self._decision, decision.t, codec.message_from_decision(decision))
 
     def write_context(self, context: Context) -> None:
-        """Append words about the drive."""
+        """Writes names and values that describe the drive."""
         self._add(self._context, context.t, codec.message_from_context(context))
 
     def _add(self, topic: int, t: float, message: Any) -> None:

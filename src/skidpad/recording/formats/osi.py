@@ -94,7 +94,7 @@ def send_run(address: tuple[str, int], log: RunLog, world: World | None = None) 
 
 
 def moments(log: RunLog, world: World) -> Iterator[GroundTruth]:
-    """One message per row of the log."""
+    """Yields one GroundTruth message per row of the log."""
     osi3 = library()
     still = _still(osi3, world)
     lamps = _Lamps(log)

@@ -103,7 +103,7 @@ def headline(crash: Crash) -> str:
 
 
 def tags(story: Story) -> list[str]:
-    """Short marks to scan by."""
+    """Returns short labels that let a reader skim crash cards."""
     crash, contact = story.crash, story.crash.contact
     marks = [
         (crash.kind.value.replace("_", " "), True),

@@ -78,7 +78,10 @@ def _functions(matrix: Matrix) -> Answer:
     judged = {g: {c: r[c] for c in r if c != REFERENCE} or r for g, r in rates.items()}
     best = {g: min(r, key=lambda c: r[c].rate) for g, r in judged.items() if r}
     parts = [_fewest(g, judged[g], judged[g][c].rate) for g, c in best.items()]
-    sentence = f"Fewest {EVENTS}: {'; '.join(parts)}.{_beside_reference(rates, judged)}"
+    sentence = (
+        f"Of the configurations, fewest {EVENTS}: {'; '.join(parts)}."
+        f"{_beside_reference(rates, judged)}"
+    )
     least = seeds_for_verdict(len(differences))
     if len(matrix.comparison_configs) < 2:
         lines = []
@@ -162,8 +165,8 @@ def _sureness(
     if not rate.events:
         share = 100 * rate.most_runs
         told.append(
-            f"none of its {count_text(rate.runs, 'seed')} had a {EVENT}, so at most {share:.0f} % "
-            "of all seeds do (95 % confidence)"
+            f"none of its {count_text(rate.runs, 'seed')} had a {EVENT}, which still allows one in up "
+            f"to {share:.0f} % of seeds (95 % confidence)"
         )
     return (
         f"{capitalize_first(group.name)}, {config_list([best])}: {'; '.join(told)}." if told else ""
@@ -190,8 +193,9 @@ def _rate_figure(matrix: Matrix, rates: dict[WeatherGroup, dict[str, Rate]]) -> 
         series.append(weather_series(group, k, values=values, low=low, high=high))
     rows = [config_title(c) for c in matrix.comparison_configs]
     caption = (
-        f"{EVENTS.capitalize()} per run of {matrix.duration:g} s; lines are 95 % intervals. A hollow "
-        f"point has no interval, as at most one seed had a {EVENT}; the true rate may be higher."
+        f"{EVENTS.capitalize()} per run of {matrix.duration:g} s; a run goes on after one. Lines are "
+        f"95 % intervals. A hollow point has none: at most one seed had a {EVENT}, and one seed does not "
+        "say how others vary."
     )
     caption += cut_note(series, POINTS_REACH)
     return Figure(points_with_intervals(rows, series, f"{EVENTS} per run"), caption)
@@ -219,13 +223,11 @@ def _weather(matrix: Matrix) -> Answer:
     told = [_changes(matrix, group, changes) for group in rest]
     if matrix.seeds < least:
         told = [_too_few_seeds(matrix.seeds, least).replace("configurations", "weathers")]
-    elif any(not d.is_sure and not d.identical for d in changes.values()):
-        told.append("Where no difference shows, the crash rates below may differ by chance.")
     lines = [_levels(matrix, c) for c in matrix.comparison_configs]
     return Answer(
         question,
         " ".join(told),
-        [*lines, *_meaning(matrix), *_times_of_day(matrix)],
+        [*_meaning(matrix), *lines, *_times_of_day(matrix)],
         _change_figure(matrix, rest, changes) if matrix.seeds > 1 else None,
     )
 
@@ -245,7 +247,7 @@ def _changes(
             (f"more {EVENTS} with", more),
             (f"fewer {EVENTS} with", fewer),
             ("the very same drives with", same),
-            (f"no change of {EVENTS} that {count_text(matrix.seeds, 'seed')} can show with", open_),
+            (f"chance may explain every change of {EVENTS} with", open_),
         )
         if configs
     ]
@@ -289,7 +291,7 @@ def _times_of_day(matrix: Matrix) -> list[str]:
     if not groups:
         return []
     names = list_text([f"“{g.title}”" for g in groups])
-    return [f"In {names} each seed gave the same drive, so these count once and share a column."]
+    return [f"In {names} each seed gave the same drive, so these count once."]
 
 
 def _change_figure(
@@ -308,7 +310,8 @@ def _change_figure(
     label = f"{EVENTS} per run, minus those in {base}"
     caption = (
         f"What each weather adds to the {EVENTS} per run in {base}, paired by seed; to the right of "
-        "the rule is worse. Lines are 95 % intervals of each difference alone; the sentence above is "
-        f"corrected for all {len(changes)}.{cut_note(series, POINTS_REACH)}"
+        "the rule is worse. Lines are 95 % intervals of each difference alone, from the differences within "
+        "seeds, so they need not agree with those of the rates; the sentence above is corrected for all "
+        f"{len(changes)}.{cut_note(series, POINTS_REACH)}"
     )
     return Figure(points_with_intervals(rows, series, label, origin=0.0), caption)

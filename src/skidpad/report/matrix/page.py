@@ -96,8 +96,8 @@ def _first(
     """What is read first: answers, headline numbers, the worst crashes, and how to read the rest."""
     return [
         *matrix.missing(),
-        answers(matrix, judged, crashes),
         Text(GRADED if matrix.has_grades else UNGRADED),
+        answers(matrix, judged, crashes),
         *baseline_text(matrix),
         headline_numbers(matrix),
         headline_table(matrix),
@@ -110,12 +110,10 @@ def _first(
 
 def _processor_time(matrix: Matrix, parity: Parity | None) -> list[tuple[str, str]]:
     """What each part of the campaign took, in processor minutes."""
-    parts = [matrix, *([parity.pixels] if parity else [])]
-    told = [
-        f"{m.processor_minutes:.1f} min on {m.values('sensors')}"
-        for m in parts
-        if m.processor_minutes > 0.0
-    ]
+    told = [f"{matrix.processor_minutes:.1f} min"] if matrix.processor_minutes > 0.0 else []
+    if parity and parity.pixels.processor_minutes > 0.0:
+        minutes = parity.pixels.processor_minutes
+        told.append(f"{minutes:.1f} min more for the comparison with images")
     return [("processor time", ", ".join(told))] if told else []
 
 

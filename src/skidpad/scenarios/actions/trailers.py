@@ -12,7 +12,7 @@ from skidpad.scenarios.scene import DONE, Actor, Running, Scene
 
 
 def can_tow(tractor: Entity, trailer: Entity) -> bool:
-    """Tells whether one has a hitch and the other one a coupler."""
+    """Whether the first vehicle has a hitch and the second a coupler."""
     return tractor.coupling.hitch is not None and trailer.coupling.coupler is not None
 
 

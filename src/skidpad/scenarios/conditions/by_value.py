@@ -169,7 +169,7 @@ class UserValue:
     value: str
 
     def probe(self) -> Probe:
-        """Returns the user's value as it is now."""
+        """Returns a probe that reads the value when it is asked."""
         return lambda scene: holds_between(self.rule, str(self.read(scene)), self.value)
 
 

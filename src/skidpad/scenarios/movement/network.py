@@ -83,7 +83,7 @@ class Network:
         return Place(point.pose.moved(left=left), point)
 
     def within(self, road: int, lane: int, s: float) -> float:
-        """s, or the nearest end of the lane where it does not reach there; as esmini reads it."""
+        """Returns s, or the nearest end of the lane where the lane does not reach to s, as esmini does."""
         of_lane = (self.map.lanes.road == road) & (self.map.lanes.lane_id == lane)
         ends = [self._ends(int(i)) for i in np.flatnonzero(of_lane)]
         nearest = [min(max(s, low), high) for low, high in ends]

@@ -51,7 +51,7 @@ class Orientation:
 
 
 def orientation(node: Node) -> Orientation:
-    """That of a position; without one it looks as its reference does."""
+    """Reads the orientation of a position; without one it faces the way its reference faces."""
     found = node.find("Orientation")
     if found is None:
         return Orientation(None, Frame.RELATIVE)

@@ -84,7 +84,7 @@ class Disc:
     radius: float
 
     def inside(self, scene: Scene, spots: Spots) -> Mask:
-        """Tells the spots inside by their distance."""
+        """Returns which spots lie within the radius of the centre."""
         pose = self.centre.place(scene).pose
         near: Mask = np.hypot(spots.x - pose.x, spots.y - pose.y) <= self.radius
         return near

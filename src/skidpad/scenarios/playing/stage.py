@@ -124,7 +124,7 @@ class IdealWorld:
 def play_ideal(
     scenario: Scenario, duration: float, dt: float = DT, seed: int = 0
 ) -> PlayedScenario:
-    """The scenario as its file says, everything ideal, until it ends or for `duration` s."""
+    """Plays a scenario with every entity exactly where the file puts it, for `duration` s at most."""
     stage = IdealWorld(scenario)
     modes = dict.fromkeys(scenario.entities, ActorMode.IDEAL)
     player = Player(scenario, modes=modes, dt=dt, seed=seed)

@@ -70,7 +70,7 @@ _GREEN = np.float32(0.35)
 
 @inner_kernel
 def _texel(a: np.float32, b: np.float32) -> np.float32:
-    """Index of a place, in texels, in a tile that repeats; floats hold it exactly."""
+    """Returns the index of the texel at row a and column b of a tile that repeats."""
     i, j = np.floor(a), np.floor(b)
     i -= _SIZE * np.floor(i * _PER_SIZE)
     j -= _SIZE * np.floor(j * _PER_SIZE)

@@ -118,7 +118,7 @@ def advance_undriven(arena: Held[Arena], now: Now) -> tuple[int, int]:
 
 @kernel
 def feel_grip(rows: Rows, w: Wheeled) -> None:
-    """Friction, stiffness and water at every wheel, with weather, patches and the tyres' own scale."""
+    """Writes friction, stiffness and water at every wheel, by weather, patches and the tyres' own scale."""
     s = rows.states
     for i in range(len(w.active)):
         grip = grip_of_row(w.grips, i)

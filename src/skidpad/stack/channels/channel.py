@@ -55,7 +55,7 @@ class Channel:
         self.reset()
 
     def reset(self) -> None:
-        """Begins anew at the start of the route."""
+        """Resets plan, tracks and controllers of the channel to the start of the route."""
         self.tracker.reset()
         self.controller.reset()
         self.at = 0  # point of the route beside the ego

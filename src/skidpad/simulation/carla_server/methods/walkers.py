@@ -74,7 +74,7 @@ def get_bones_transform(served: Served, id: Any) -> list[Any]:
 
 @TABLE.method("set_bones_transform", Shape.VOID)
 def set_bones_transform(served: Served, id: Any, bones: Any) -> None:
-    """Bones of the client's pose; they show as far as it is blended in."""
+    """Sets the bones of a walker's pose, which shows by the share that is blended in."""
     _skeleton(served, id)[1].set_bones(parse_bones(bones))
 
 

@@ -69,7 +69,7 @@ def make_radar(actor: Actor, seed: int) -> RadarMake:
 
 
 def radar(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
-    """Velocity, azimuth, altitude, depth of every return."""
+    """Returns one message: velocity in m/s, azimuth and altitude in rad, depth in m of every return."""
     make: RadarMake = sensor.equipment
     n = int(make.spec.points_per_second * sensor.share(clock))
     if n == 0:

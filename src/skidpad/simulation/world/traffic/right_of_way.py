@@ -14,7 +14,6 @@ import numpy as np
 from skidpad.core.jit import inner_kernel
 from skidpad.simulation.world.traffic.care import (
     bend_speed_sq,
-    braking,
     drive_limit,
     firm_braking,
     reach,
@@ -38,7 +37,7 @@ HALT_GAP = 4.5  # m to the line within which standing counts as a stop
 PATIENCE = 4.0  # s, then who stands on the other side no longer counts
 QUEUE_REACH = 26.0  # m before the area; who stands farther away stands in a queue
 IMPATIENT = 40.0  # s of standing, about a cycle of lights, after which others let one go first
-COURTESY_BRAKE = 3.0  # m/s^2 at most, to let one go first
+COURTESY_BRAKE = 3.0  # m/s^2 at most, to let one go first, or to judge a gap anew
 TAKEN_TIME = 20.0  # s after which a driver in a junction creeps past others that leave room
 CREEP_ROOM = 0.4  # m to them at least
 EXIT_ROOM = 3.0  # m to be free behind the junction beside the own length
@@ -250,7 +249,7 @@ def _can_judge_anew(view: View, v: float, gap: float) -> bool:
     """Whether a driver in a junction, `gap` m before a shared area, can still leave the way to others."""
     if v < V_ANEW:
         return True
-    return bool(view.care.on and v * v <= 2.0 * braking(view.care, v) * gap)
+    return bool(view.care.on and v * v <= 2.0 * firm_braking(view.care, v, COURTESY_BRAKE) * gap)
 
 
 @inner_kernel

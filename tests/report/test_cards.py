@@ -353,7 +353,7 @@ def test_no_crash_stands_twice_where_drives_moved_alike(tmp_path: Path) -> None:
     blocks = [*worst_of_each(found), *crash_sections(matrix, found)]
     cards = [card for b in blocks if isinstance(b, Cards) for card in b.cards]
     assert len(cards) == len({card.subtitle for card in cards}) == 3
-    assert cards[0].title.startswith("3 · + light assist, resume: Ego into car 1")
+    assert cards[0].title.startswith("3 · + traffic-light assist, resume: Ego into car 1")
 
 
 def test_all_crash_pictures_of_a_configuration_stand_side_by_side(tmp_path: Path) -> None:
@@ -365,7 +365,7 @@ def test_all_crash_pictures_of_a_configuration_stand_side_by_side(tmp_path: Path
     matrix = load_matrix(tmp_path)
     (montage,) = montages(matrix, found_crashes(matrix))
     assert isinstance(montage, Montage)
-    assert montage.title == "Crash pictures of 3 · + light assist, resume: 2 of 2 crashes"
+    assert montage.title == "Crash pictures of 3 · + traffic-light assist, resume: 2 of 2 crashes"
     assert sorted(image.caption for image in montage.images) == [
         "Clear Sky - Noon, 2 s: Ego into car 1, closing at 72 km/h",
         "Heavy Rain - Noon, 2 s: Ego into car 1, closing at 72 km/h",

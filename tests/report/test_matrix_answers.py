@@ -117,8 +117,8 @@ def test_the_first_answer_is_about_functions_and_the_reference_driver_stands_bes
     first = told(campaign(tmp_path, of, configs=("3", "4", "reference")))[0]
     assert first.sentence == (
         "Of the configurations, fewest crashes: in clear sky configuration 3 "
-        "(ACC, lane centring, light assist and resume) "
-        "with 3.00 per run; in heavy rain configuration 3 (ACC, lane centring, light assist and "
+        "(ACC, lane centring, traffic-light assist and resume) "
+        "with 3.00 per run; in heavy rain configuration 3 (ACC, lane centring, traffic-light assist and "
         "resume) with 3.00 per run. "
         "The reference driver, a model of a careful human, had 0.00 in clear sky and 0.00 in heavy "
         "rain."
@@ -150,7 +150,7 @@ def test_the_second_answer_says_what_rain_changes_for_each_configuration(tmp_pat
 def test_the_third_answer_names_the_commonest_kind_of_the_worst_configuration(tmp_path):
     third = told(campaign(tmp_path, clear_cut))[2]
     assert third.sentence == (
-        "190 of 250 crashes were of the kind “into a barrier”: 110 in heavy rain, 80 in other weather. "
+        "190 of 250 crashes were of the kind “into a barrier”: 110 in heavy rain, 80 in clear sky. "
         "Configuration 3 had most (140 in 20 drives; next configuration 4 with 70 in 20)."
     )
     assert third.lines[0].startswith(f"Of the sources' {len(CLAIMS)} claims: ")

@@ -21,7 +21,7 @@ CONFIGS = {
     "0": "0 · baseline, no ADAS",
     "1": "1 · ACC",
     "2": "2 · ACC + lane centring",
-    "3": "3 · + light assist, resume",
+    "3": "3 · + traffic-light assist, resume",
     "4": "4 · + 80 km/h limiter",
     "reference": "reference driver (a model)",
 }
@@ -29,8 +29,8 @@ FUNCTIONS = {
     "0": "no assistance",
     "1": "ACC",
     "2": "ACC and lane centring",
-    "3": "ACC, lane centring, light assist and resume",
-    "4": "ACC, lane centring, light assist, resume and the 80 km/h limiter",
+    "3": "ACC, lane centring, traffic-light assist and resume",
+    "4": "ACC, lane centring, traffic-light assist, resume and the 80 km/h limiter",
 }
 REFERENCE = "reference"  # a model of a human: no functions
 IN_SENTENCES = {"reference": "the reference driver"}

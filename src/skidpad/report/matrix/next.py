@@ -83,10 +83,11 @@ def _commonest(matrix: Matrix, total: int) -> str:
         g: sum(count(most, matrix.within(c, g)) for c in matrix.comparison_configs)
         for g in matrix.climates
     }
-    where = max(within, key=lambda g: within[g])
+    first, *others = sorted(within, key=lambda g: -within[g])
+    rest = others[0].name if len(others) == 1 else "other weather"
     return (
-        f"{kinds[most]} of {count_text(total, EVENT, EVENTS)} were {kind}: {within[where]} in "
-        f"{where.name}, {kinds[most] - within[where]} in other weather."
+        f"{kinds[most]} of {count_text(total, EVENT, EVENTS)} were {kind}: {within[first]} in "
+        f"{first.name}, {kinds[most] - within[first]} in {rest}."
     )
 
 

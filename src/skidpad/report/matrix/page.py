@@ -30,9 +30,10 @@ from skidpad.report.matrix.ways import way_blocks
 
 CLAIMS = (*FINDINGS, *ACCEPTANCE)
 GRADED = """A crash is a serious contact or a departure. A contact is serious when it changes the speed of \
-either side by 5 km/h or more; with a pedestrian or a two-wheeler every contact is. A departure leads into a \
-barrier, takes all wheels off every lane for 1 s or the car more than 3 m beyond the edge, or ends facing \
-the wrong way. An intervention puts the car back on its lane; the source counts these as collisions."""
+either side by 5 km/h or more; with a pedestrian or a two-wheeler every contact is. A departure ends in a \
+barrier, with all wheels off every lane for 1 s, with the car more than 3 m beyond the edge, or facing the \
+wrong way. An intervention puts the car back on its lane, after a light contact, too; the published study \
+counts interventions as collisions."""
 UNGRADED = """These results are older than the grading of contacts. A crash is every intervention: what puts \
 the car back on its lane after a contact, a departure from the road, or because it faces the wrong way."""
 LEAD = f"""\

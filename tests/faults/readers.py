@@ -74,13 +74,7 @@ def read_weather(path: Path) -> object:
 
 def run_files() -> list[bytes]:
     described = [runs.adas_run(), runs.scenario_run("ghost_cut_in"), runs.segment_run()]
-    return [yaml.safe_dump(run.to_plain(), sort_keys=False).encode() for run in described] + [
-        (
-            b"stack: null\ndriver: '2'\nfunctions: [acc]\noptions: {}\nmap: figure8\ntraffic: fixed\n"
-            b"vehicles: 2\nallow_fewer: false\nduration: 5.0\nsensors: objects\nrender: needed\n"
-            b"weather: {name: a}\nseed: 1\nprofile: recommended\nsettings: {}\nbackend: {kind: embedded}\n"
-        )
-    ]
+    return [yaml.safe_dump(run.to_plain(), sort_keys=False).encode() for run in described]
 
 
 def read_stored(path: Path) -> object:

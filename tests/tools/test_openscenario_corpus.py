@@ -82,7 +82,7 @@ def test_what_fails_while_it_is_played_has_its_own_column(told, monkeypatch, rai
     def fail(*_):
         raise raised
 
-    monkeypatch.setattr(corpus, "played", fail)
+    monkeypatch.setattr(corpus, "play_ideal", fail)
     rows, _ = told({"a": {"good": GOOD}})
     assert counts(rows["a"])[column] == 1
     assert rows["a"]["played"] == "0"

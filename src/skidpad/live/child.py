@@ -84,10 +84,6 @@ def _scene(t: float) -> ChannelFrame:
     )
 
 
-if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:]))
-
-
 # --- a processor for the monitor alone, as far as the system allows (C-231)
 GOVERNOR = "/sys/devices/system/cpu/cpu{}/cpufreq/scaling_governor"
 HIGHEST = -20  # nice
@@ -154,3 +150,7 @@ def _waited_ns() -> int:
 def _faults() -> int:
     usage = resource.getrusage(resource.RUSAGE_SELF)
     return usage.ru_majflt + usage.ru_minflt
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

@@ -111,7 +111,8 @@ def test_nobody_there_is_one_sentence() -> None:
 
 
 @pytest.mark.parametrize(
-    ("said", "name"), [("Broken", "broken"), ("SolidSolid", "solid_solid"), ("Curb", "other")]
+    ("said", "name"),
+    [("Broken", "broken"), ("SolidSolid", "solid_solid"), ("Curb", "curb"), ("Other", "other")],
 )
 def test_markings_are_named_as_in_our_maps(said: str, name: str) -> None:
     assert marking_name(f"LaneMarkingType.{said}") == name

@@ -8,11 +8,19 @@ import pytest
 from skidpad.recording.campaign.matrix import MATRIX, Metrics, RunKey
 from skidpad.recording.campaign.results import Timing
 from skidpad.recording.files import write_parquet
-from skidpad.report.matrix.data import WEATHERS, load_matrix, rate_by_seed, weather_title
-from skidpad.report.matrix.headline import headline_numbers, headline_table
+from skidpad.report.elements.tables import number
+from skidpad.report.matrix.data import (
+    WEATHERS,
+    config_title,
+    load_matrix,
+    rate_by_seed,
+    weather_title,
+)
+from skidpad.report.matrix.headline import headline_numbers, headline_tables
 from skidpad.report.matrix.page import build_page, write_report
 from skidpad.report.matrix.tables import per_weather
 
+NONE_OF_9 = f"in at most {100 * (1 - 0.05 ** (1 / 9)):.0f} % of seeds"
 RATES = {"0": 3.0, "1": 0.5, "2": 1.0, "3": 1.5, "4": 0.0}
 
 
@@ -202,14 +210,32 @@ def test_crashes_departures_and_the_time_to_the_first_lead_the_page(tmp_path):
         numbers[2].note
         == "the car was put back, after light contacts, too; 61 soon after another one"
     )
-    head = headline_table(matrix)
+    head, per_100_km = headline_tables(matrix)
     assert head.columns[0][0] == "configuration"
-    baseline, one, *_, safest = head.rows
+    _, one, *_, safest = head.rows
     assert safest[1].text == "0.00"
     assert safest[4].text == "> 500"  # no run of configuration 4 had one: censored at its end
-    per_100 = float(re.findall(r"per 100 km ([0-9.]+)", one[1].note)[0])
-    assert per_100 == pytest.approx(one[1].sort / 7.0 * 100.0, abs=0.06)
-    assert "per 100 km" not in baseline[1].note
+    assert [row[0].text for row in per_100_km.rows] == [
+        config_title(c) for c in matrix.comparison_configs
+    ]
+    assert per_100_km.rows[0][1].sort == pytest.approx(6 * 7 * 7.0)  # km: weathers, seeds, km each
+    assert per_100_km.rows[0][2].sort == pytest.approx(one[1].sort / 7.0 * 100.0)
+
+
+def test_a_cell_of_the_headline_tells_one_number_with_its_bound(tmp_path):
+    campaign(tmp_path, seeds=9)
+    matrix = load_matrix(tmp_path)
+    per_run, per_100_km = headline_tables(matrix)
+    assert not per_run.folded
+    assert per_100_km.folded, "the rest stands one click away, under its caption"
+    for here, there in zip((1, 2, 3, 5), (2, 3, 4, 5), strict=True):  # the same quantity
+        for own, other in zip(per_run.rows[1:], per_100_km.rows, strict=True):
+            for cell, spec in ((own[here], ""), (other[there], ".1f")):
+                told = [number(x, spec) for x in cell.limits or ()]
+                assert cell.note == (" to ".join(told) or NONE_OF_9)
+            assert other[there].sort == pytest.approx(own[here].sort / 7.0 * 100.0)  # 7 km a run
+            scaled = [x / 7.0 * 100.0 for x in own[here].limits or ()]
+            assert list(other[there].limits or ()) == pytest.approx(scaled)
 
 
 def test_a_campaign_of_an_older_version_can_still_be_shown(tmp_path):

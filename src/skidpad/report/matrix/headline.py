@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from skidpad.core.wording import count_text
-from skidpad.evidence.statistics import ASSUMED, median_time
+from skidpad.evidence.statistics import ASSUMED, Interval, Rate, median_time
 from skidpad.report.elements.page import Block, Cell, Number, Numbers, Table, Text
-from skidpad.report.elements.tables import Column, Quantity, table
+from skidpad.report.elements.tables import Column, Format, Quantity, table
 from skidpad.report.matrix.data import (
     BASELINE,
     EVENTS,
@@ -20,7 +21,13 @@ from skidpad.report.matrix.data import (
     config_title,
     rate_by_seed,
 )
-from skidpad.report.matrix.tables import RATE, few_seeds_note, rate_hint, remark_on
+from skidpad.report.matrix.tables import (
+    RATE,
+    few_seeds_note,
+    rate_hint,
+    rate_quantity,
+    remark_on,
+)
 
 SERIOUS = (
     "serious_contacts",
@@ -34,6 +41,8 @@ PUT_BACK = (
     "interventions",
     "times put back, each with its first cause; published as collisions",
 )
+DISTANCE = Format(",.0f")
+PER_100_KM = Format(".1f", ".1f", absent="no run")
 
 
 def headline_numbers(matrix: Matrix) -> Numbers:
@@ -71,13 +80,15 @@ def _meaning(put_back: int, first: int) -> str:
     return f"the car was put back, after light contacts, too{again}"
 
 
-def headline_table(matrix: Matrix) -> Table:
-    """One row per configuration, every drive once."""
-    both = (EVENTS, EVENTS, "both")
-    kinds = (SERIOUS if matrix.has_grades else STRUCK, LEFT, both, PUT_BACK)
-    counts = [
-        Column[str](f"{title} per run", partial(_count, matrix, name), meaning, format=RATE)
-        for name, title, meaning in kinds
+def headline_tables(matrix: Matrix) -> list[Table]:
+    """One row per configuration, every drive once: per run, and folded below it per 100 km."""
+    return [_per_run(matrix), _per_100_km(matrix)]
+
+
+def _per_run(matrix: Matrix) -> Table:
+    *crashes, put_back = [
+        Column[str](f"{title} per run", partial(_rate_per_run, matrix, name), meaning, format=RATE)
+        for name, title, meaning in _counted(matrix)
     ]
     first = Column[str](
         "time to the first intervention, median",
@@ -86,17 +97,35 @@ def headline_table(matrix: Matrix) -> Table:
         "back for another cause before",
         "s",
     )
+    columns = [Column[str]("configuration", partial(_name, matrix)), *crashes, first, put_back]
+    note = (
+        f"Every drive once. Small: 95 % interval {ASSUMED}, or the largest share of seeds that have one "
+        "(95 %); of the median exact by order statistics, from six runs on."
+        f"{few_seeds_note(matrix)}"
+    )
+    return table(columns, matrix.configs, "What happened, by configuration", note)
+
+
+def _per_100_km(matrix: Matrix) -> Table:
     columns = [
-        Column[str]("configuration", partial(_name, matrix)),
-        *counts[:3],
-        first,
-        counts[3],
+        Column[str]("configuration", config_title),
+        Column[str]("distance", partial(_distance, matrix), "of all its drives", "km", DISTANCE),
+        *(
+            Column[str](title, partial(_rate_per_100_km, matrix, name), meaning, format=PER_100_KM)
+            for name, title, meaning in _counted(matrix)
+        ),
     ]
     note = (
-        f"Every drive once. Small: 95 % interval {ASSUMED}; per 100 km it is that of the count, the way "
-        "taken as given; of the median exact by order statistics, from six runs on."
-    ) + few_seeds_note(matrix)
-    return table(columns, matrix.configs, "What happened, by configuration", note)
+        f"Every drive once. Small: 95 % interval of the count {ASSUMED}, the way taken as given."
+        f"{few_seeds_note(matrix)}"
+    )
+    caption = "The same per 100 km"
+    return replace(table(columns, matrix.comparison_configs, caption, note), folded=True)
+
+
+def _counted(matrix: Matrix) -> tuple[tuple[str, str, str], ...]:
+    """What is counted: column, title and meaning."""
+    return (SERIOUS if matrix.has_grades else STRUCK, LEFT, (EVENTS, EVENTS, "both"), PUT_BACK)
 
 
 def _name(matrix: Matrix, config: str) -> Cell:
@@ -104,25 +133,36 @@ def _name(matrix: Matrix, config: str) -> Cell:
     return Cell(config_title(config), note="counts its reset cycle, see above" if cycles else "")
 
 
-def _count(matrix: Matrix, column: str, config: str) -> Quantity:
+def _distance(matrix: Matrix, config: str) -> float:
+    return float(matrix.cell(config)["distance_km"].sum())
+
+
+def _rate_per_run(matrix: Matrix, column: str, config: str) -> Quantity:
+    rate = matrix.rate(column, config)
+    if rate is None:
+        return Quantity(value=None)
+    hint = f"{rate_hint(rate)}, {_distance(matrix, config):,.0f} km"
+    return replace(rate_quantity(rate), hint=hint, remark=_short_remark(rate))
+
+
+def _rate_per_100_km(matrix: Matrix, column: str, config: str) -> Quantity:
     runs = matrix.cell(config).drop_nulls([column, "distance_km"])
     km = float(runs["distance_km"].sum())
-    if not len(runs) or not km:
-        return Quantity(value=None)
     rate = rate_by_seed(runs, column)
-    assert rate is not None
+    if rate is None or not km:
+        return Quantity(value=None)
     scale = 100.0 * len(runs) / km
-    lines = [f"per 100 km {scale * rate.rate:.1f}"]
-    if rate.interval is not None:
-        low, high = (scale * end for end in rate.interval)
-        lines.append(f"{low:.1f} to {high:.1f}")
+    limits = rate.interval and Interval(*(scale * end for end in rate.interval))
     return Quantity(
-        value=rate.rate,
-        interval=rate.interval,
-        remark=remark_on(rate),
-        lines=tuple(lines) if config in matrix.comparison_configs else (),
-        hint=f"{rate_hint(rate)}, {km:,.0f} km",
+        value=scale * rate.rate, interval=limits, remark=_short_remark(rate), hint=rate_hint(rate)
     )
+
+
+def _short_remark(rate: Rate) -> str:
+    """What stands beside a rate; without an interval only the bound, its counts are in the hint."""
+    if rate.interval is None and rate.runs > 1 and rate.most_runs < 1.0:
+        return f"in at most {100.0 * rate.most_runs:.0f} % of seeds"
+    return remark_on(rate)
 
 
 def _first(matrix: Matrix, config: str) -> Cell:

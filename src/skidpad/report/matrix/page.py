@@ -23,7 +23,7 @@ from skidpad.report.matrix.comparisons.steps import step_blocks
 from skidpad.report.matrix.crashes import Cell, crash_sections, found_crashes, worst_of_each
 from skidpad.report.matrix.data import Matrix, load_matrix
 from skidpad.report.matrix.envelope import envelope_blocks
-from skidpad.report.matrix.headline import baseline_text, headline_numbers, headline_table
+from skidpad.report.matrix.headline import baseline_text, headline_numbers, headline_tables
 from skidpad.report.matrix.readings import reading_blocks
 from skidpad.report.matrix.real_time import real_time_blocks
 from skidpad.report.matrix.ways import way_blocks
@@ -101,7 +101,7 @@ def _first(
         answers(matrix, judged, crashes),
         *baseline_text(matrix),
         headline_numbers(matrix),
-        headline_table(matrix),
+        *headline_tables(matrix),
         matrix_figures.speed_figure(matrix),
         *worst_of_each(crashes),
         Text(LEAD),

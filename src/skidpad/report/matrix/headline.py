@@ -88,7 +88,7 @@ def headline_tables(matrix: Matrix) -> list[Table]:
 def _per_run(matrix: Matrix) -> Table:
     *crashes, put_back = [
         Column[str](f"{title} per run", partial(_rate_per_run, matrix, name), meaning, format=RATE)
-        for name, title, meaning in _counted(matrix)
+        for name, title, meaning in _event_kinds(matrix)
     ]
     first = Column[str](
         "time to the first intervention, median",
@@ -112,7 +112,7 @@ def _per_100_km(matrix: Matrix) -> Table:
         Column[str]("distance", partial(_distance, matrix), "of all its drives", "km", DISTANCE),
         *(
             Column[str](title, partial(_rate_per_100_km, matrix, name), meaning, format=PER_100_KM)
-            for name, title, meaning in _counted(matrix)
+            for name, title, meaning in _event_kinds(matrix)
         ),
     ]
     note = (
@@ -123,7 +123,7 @@ def _per_100_km(matrix: Matrix) -> Table:
     return replace(table(columns, matrix.comparison_configs, caption, note), folded=True)
 
 
-def _counted(matrix: Matrix) -> tuple[tuple[str, str, str], ...]:
+def _event_kinds(matrix: Matrix) -> tuple[tuple[str, str, str], ...]:
     """What is counted: column, title and meaning."""
     return (SERIOUS if matrix.has_grades else STRUCK, LEFT, (EVENTS, EVENTS, "both"), PUT_BACK)
 

@@ -9,7 +9,7 @@ TEST_ARGS ?=
 DRIVE_ARGS ?=
 NIGHTLY_ARGS ?=
 
-.PHONY: cockpit run published results test test-all test-times test-bare check wheel-check bench oracle fuzz nightly soak refs data fleet fleet-load docs figures arm64 channels campaigns tables clean
+.PHONY: cockpit run published results test test-all test-times test-bare check wheel-check bench oracle fuzz nightly soak refs data fleet fleet-load docs figures gallery arm64 channels campaigns tables clean
 
 # ten seeds of every distinct cell on objects, one of them once more on pixels
 run: $(VENV)/.installed
@@ -129,6 +129,11 @@ REPORT ?=
 figures: $(VENV)/.tested-with
 	$(BIN)/python tools/vehicle_validation.py docs/img
 	$(BIN)/python tools/readme_pictures.py docs/img $(REPORT)
+
+# replays of the site's gallery, by their commands; GALLERY="guardrail": one of docs/gallery.yaml
+GALLERY ?=
+gallery: $(VENV)/.tested-with
+	$(BIN)/python tools/gallery.py $(GALLERY)
 
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { echo "skidpad needs Python 3.10 to 3.13 on the PATH"; exit 2; }

@@ -2,7 +2,9 @@
 // involved: [[x, y]], cycles: [[world per channel]]}; world: [ego, plan, objects, predictions] or null;
 // a box is [x, y, heading in mrad, length, width], a line [x, y, ...], all in `unit` metres.
 for (const figure of document.querySelectorAll(".worlds")) {
-  const canvas = figure.querySelector("canvas"), data = JSON.parse(figure.querySelector("script").textContent);
+  const canvas = figure.querySelector("canvas"), own = figure.querySelector("script");
+  const data = own ? JSON.parse(own.textContent) : window.skidpadReplays?.[figure.id];
+  if (!data) { figure.append("the data of this replay is missing"); continue; }
   const colours = ["#ff5b52", "#4fce7f", "#f2b441", "#b58cff"], ego = "#4d9dff";
   const n = data.names.length, panels = n + 1, side = 420, u = data.unit, last = data.cycles.length - 1;
   const bar = document.createElement("div"), button = document.createElement("button");

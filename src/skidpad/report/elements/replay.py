@@ -53,6 +53,22 @@ def replay_run(
     return _cut_log(log, road_map, rows, mark, rows, surface)
 
 
+def replay_stretch(
+    log: RunLog,
+    road_map: RoadMap,
+    begin_s: float,
+    end_s: float,
+    mark_s: float,
+    surface: Sequence[SurfacePatch] = (),
+) -> dict[str, Any]:
+    """The part of a run between two times, with lanes along its whole way; mark_s: shown first."""
+    stride = max(round(STEP_S / log.header.dt), 1)
+    first, last = np.searchsorted(log.t, (begin_s - 1e-9, end_s + 1e-9))
+    rows = np.arange(first, last, stride)
+    mark = int(np.argmin(np.abs(log.t[rows] - mark_s)))
+    return _cut_log(log, road_map, rows, int(rows[mark]), rows, surface)
+
+
 def _cut_log(
     log: RunLog,
     road_map: RoadMap,

@@ -81,11 +81,22 @@ def answer(search: Search, trials: Sequence[Trial], findings: Findings) -> str:
         return f"No failure of {driver} in {runs}; {near}. This is no proof that there is none."
     different = distinct_failures(failing)
     avoided = [t for t in different if t.is_avoidable]
-    known = f"The reference driver avoids {len(avoided)} of the {len(different)} that differ"
-    kinds = f", which are of {count_text(len(findings.groups), 'kind')}" if avoided else ""
+    known = f"{len(avoided)} of the {len(different)} that differ could have been avoided"
+    kinds = f", of {count_text(len(findings.groups), 'kind')}" if avoided else ""
     return (
         f"{count_text(len(failing), 'failure')} of {driver} in {runs}, the first in run "
-        f"{failing[0].number + 1}. {known}{kinds}."
+        f"{failing[0].number + 1}. {known}{kinds}: {judges_text(different)}."
+    )
+
+
+def judges_text(failures: Sequence[Trial]) -> str:
+    """Return how many failures each of the two judges avoids, and how many neither does."""
+    reference = sum(t.is_avoided_by_reference for t in failures)
+    bound = sum(t.bound != "" for t in failures)
+    both = sum(t.is_avoided_by_reference and t.bound != "" for t in failures)
+    return (
+        f"the reference driver avoids {reference}, braking or steering from the same state {bound}, "
+        f"both {both}, neither {sum(not t.is_avoidable for t in failures)}"
     )
 
 
@@ -133,8 +144,9 @@ def _answers(search: Search, trials: Sequence[Trial], findings: Findings) -> Ans
         ),
         Answer(
             "What was not counted?",
-            f"{count_text(len(unavoidable), 'failure')} that the reference driver does not avoid, and "
-            f"{count_text(len(faults), 'run')} that could not be driven.",
+            f"{count_text(len(unavoidable), 'failure')} that neither the reference driver nor braking or "
+            f"steering from the same state avoids, and {count_text(len(faults), 'run')} that could not be "
+            "driven.",
             sorted({t.fault for t in faults})[:5],
         ),
     ]
@@ -152,11 +164,12 @@ def _failures(
     if hard:
         blocks += [
             Text(
-                "The reference driver touches something or leaves the road in these as well, so they say "
-                "nothing against the driver that was searched.",
+                "The reference driver touches something or leaves the road in these as well, and neither "
+                "braking nor steering from the same state would have been enough, so they say nothing "
+                "against the driver that was searched.",
                 "note",
             ),
-            _failure_table(out, search, hard, "not avoided by the reference driver"),
+            _failure_table(out, search, hard, "not avoidable"),
         ]
     return blocks or [Text("There is none to show.")]
 
@@ -167,6 +180,10 @@ def _failure_table(out: Path, search: Search, failures: Sequence[Trial], caption
         ("contact, km/h", "larger delta-v of the two, else closing speed"),
         ("at, s", "of the contact, or of the departure"),
         ("reference", "what the reference driver came to with the same values: least gap, m"),
+        (
+            "bound",
+            "what avoids it from the state in which it could be known first: see docs/search.md",
+        ),
         ("likelihood", "density of the values beside that of the likeliest ones"),
         ("values", "of what varied"),
     ]
@@ -186,6 +203,7 @@ def _failure_row(out: Path, trial: Trial, likelihood: float) -> list[Cell]:
         _number(trial.contact_kmh, ".1f"),
         _number(trial.contact_s if trial.departed_s is None else trial.departed_s, ".2f"),
         _reference_cell(trial.reference),
+        Cell(trial.bound or "nothing"),
         _number(likelihood, ".3g"),
         Cell(values),
     ]

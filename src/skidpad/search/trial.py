@@ -11,7 +11,7 @@ from msgspec import structs
 from skidpad.campaign.runs.run import Run, run
 from skidpad.core.errors import InputError
 from skidpad.core.geometry import Pose, kmh_from_mps
-from skidpad.core.run import ReferenceDriver, RunSpec
+from skidpad.core.run import REFERENCE, ReferenceDriver, RunSpec
 from skidpad.core.space import Space
 from skidpad.core.vocabulary import Outcome
 from skidpad.evidence.drive.severity import Contact
@@ -20,7 +20,8 @@ from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.motion import motion_hash
 from skidpad.roads.bundled import load_map
 from skidpad.scenarios.movement.measures import between
-from skidpad.search.margin import NO_CONFLICT, Closeness, closeness
+from skidpad.search.avoidance import find_run_avoidance
+from skidpad.search.margin import NO_CONFLICT, Closeness, closeness, is_failure
 from skidpad.search.space import apply_values
 
 SIDES = (FRONT, "left side", "rear", "right side")  # of the ego, from ahead to the left
@@ -59,7 +60,21 @@ def describe_run(blank: Trial, driven: Run, objective: str) -> Trial:
         last = driven.error.strip().rpartition("\n")[2]
         return structs.replace(blank, fault=last or "the run ended before its first tick")
     near = closeness(log, load_map(driven.road), driven.off_road, objective)
-    return structs.replace(blank, simulated_s=float(log.t[-1]), **_columns(log, near))
+    columns = _columns(log, near)
+    if near.margin <= 0.0 and driven.log.header.about["config"] != REFERENCE:
+        columns["bound"] = _bound_of(driven, near)
+    return structs.replace(blank, simulated_s=float(log.t[-1]), **columns)
+
+
+def _bound_of(driven: Run, near: Closeness) -> str:
+    """Return what avoids the contact of a failure, or its departure where that came first."""
+    log, road = driven.log, load_map(driven.road)
+    contact = near.contact if near.contact is not None and is_failure(near.contact) else None
+    departed = None if near.departed_s is None else round(near.departed_s / log.header.dt)
+    if contact is None or (departed is not None and departed < contact.tick):
+        assert departed is not None
+        return find_run_avoidance(log, road, departed, None)
+    return find_run_avoidance(log, road, contact.tick, contact.actor)
 
 
 def _columns(log: RunLog, near: Closeness) -> dict[str, object]:

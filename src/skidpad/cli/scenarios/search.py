@@ -48,8 +48,8 @@ def search(
     """Find the values of a scenario that make the ego crash or leave the road.
 
     A failure is a contact above 5 km/h (with a person or a two-wheeler any) or a departure that the
-    reference driver avoids in the same place; others are listed apart. The page shows each kind with
-    the smallest change that makes it harmless.
+    reference driver avoids in the same place, or that braking or steering from the same state avoids;
+    others are listed apart. The page shows each kind with the smallest change that makes it harmless.
     """
     from skidpad.core.errors import require_choice
     from skidpad.recording.campaign.searches import Search

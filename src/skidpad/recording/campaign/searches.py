@@ -53,6 +53,8 @@ class Trial(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         motion: hash of what moved (decision T-3): equal drives are one.
         fault: why it could not be driven, or how the stack failed; "" where neither.
         reference: of a failure, the same values with the reference driver at the wheel.
+        bound: of a failure, what avoids it from the state in which it began: "braking", "steering left"
+            or "steering right" (`search.bound`); "" where neither does.
     """
 
     number: int
@@ -71,12 +73,18 @@ class Trial(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     motion: str = ""
     fault: str = ""
     reference: Trial | None = None
+    bound: str = ""
 
     @property
     def is_avoidable(self) -> bool:
-        """Whether it is a failure, and the reference driver touches nothing and stays on the road."""
+        """Whether it is a failure that the reference driver, or braking and steering in time, avoids."""
+        return self.is_failure and (self.is_avoided_by_reference or self.bound != "")
+
+    @property
+    def is_avoided_by_reference(self) -> bool:
+        """Whether the reference driver touches nothing and stays on the road with the same values."""
         r = self.reference
-        if not self.is_failure or r is None:
+        if r is None:
             return False
         return r.contact_kmh is None and r.departed_s is None and not r.fault
 

@@ -163,8 +163,9 @@ def _others(
 
 
 def _cut(track: Track, begin: int, end: int) -> Track:
-    places = (c[begin:end] for c in track[:4])
-    return Track(*places, track.length, track.width)  # type: ignore[arg-type]
+    x, y, yaw, present = track.x, track.y, track.yaw, track.present
+    part = slice(begin, end)
+    return Track(x[part], y[part], yaw[part], present[part], track.length, track.width)
 
 
 def _standing(log: RunLog, tick: int, begin: int, last: int) -> Track:

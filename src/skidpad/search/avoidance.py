@@ -151,18 +151,18 @@ def _others(
         if i == 0 or not track.present[begin:end].any():
             continue
         if i != actor:
-            found.append(_cut(track, begin, end))
+            found.append(_take_rows(track, begin, end))
             continue
         x, y, yaw = (float(c[last]) for c in track[:3])
         point = road.project(x, y, float(log.actors.z[last, i]))
         follows = point is not None and abs(wrap_angle(yaw - point.heading)) < 0.25 * pi
         along = point.heading if point is not None and follows else yaw
-        cut, speed = _cut(track, begin, last + 1), motion_of(log, i).speed[begin : last + 1]
+        cut, speed = _take_rows(track, begin, last + 1), motion_of(log, i).speed[begin : last + 1]
         found += continue_track(cut, speed, last - begin, round(AFTER / dt), dt, along)
     return found
 
 
-def _cut(track: Track, begin: int, end: int) -> Track:
+def _take_rows(track: Track, begin: int, end: int) -> Track:
     x, y, yaw, present = track.x, track.y, track.yaw, track.present
     part = slice(begin, end)
     return Track(x[part], y[part], yaw[part], present[part], track.length, track.width)

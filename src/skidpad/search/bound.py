@@ -9,7 +9,7 @@ does one of these with all of the true grip, and nothing else:
 
 All other road users move as recorded. What touches none of their boxes and stays on the road avoids
 the failure. The bound only moves boxes: it knows no slip, load transfer or steering rate, and others do
-not react to it, so that a follower who would have braked counts as an obstacle.
+not react to it, so that a follower that would have braked counts as an obstacle.
 """
 
 from __future__ import annotations

@@ -166,3 +166,15 @@ def test_the_example_of_a_stop_on_split_friction_is_quick_and_shows_the_control(
     assert process_time() - begin < 30.0
     drop = {name: v[45] - v[-1] for name, v in speeds.items()}
     assert 3.0 < drop["wheel_speeds"] < drop["ideal"]
+
+
+def test_the_example_with_a_puddle_is_quick(tmp_path):
+    """The first call compiles; the second one is timed. Issue 30: within 30 s of processor time."""
+    call = ["play", "lead_slowdown", "--surface", str(EXAMPLE), "--set", "tyre_stiffness=on"]
+    call += ["--set", "water_drag=on", "--sensors", "objects", "--out"]
+    CliRunner().invoke(app, [*call, str(tmp_path / "first"), "--duration", "1"])
+    begin = process_time()
+    done = CliRunner().invoke(app, [*call, str(tmp_path / "second")], catch_exceptions=False)
+    assert done.exit_code in (0, 1), done.output
+    assert process_time() - begin < 30.0
+    assert len(read_log(tmp_path / "second")) > 200

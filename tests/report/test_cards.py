@@ -178,6 +178,11 @@ CAME = Moment(0.1, 3.7)
             "it had touched traffic_2 1.2 s before."),
         ),
         (
+            a_story(off_lane(CrashKind.ROLL_OVER, mu=0.3, lane_offset=0.0, contact=None)),
+            ("The ego drove at 65 km/h and rolled over; the bend of 84 m takes 3.9 m/s² at that speed, "
+            "more than the 2.9 m/s² that the tyres hold."),
+        ),
+        (
             a_story(off_lane(CrashKind.WRONG_WAY)),
             "The ego faced against the direction of its lane at 65 km/h.",
         ),
@@ -226,7 +231,9 @@ def test_one_timeline_in_order_of_time_with_mismatches_marked() -> None:
     ]
 
 
-@pytest.mark.parametrize("kind", [CrashKind.STATIC, CrashKind.OFF_ROAD, CrashKind.WRONG_WAY])
+@pytest.mark.parametrize(
+    "kind", [CrashKind.STATIC, CrashKind.OFF_ROAD, CrashKind.WRONG_WAY, CrashKind.ROLL_OVER]
+)
 def test_what_stands_has_no_speed_and_nothing_is_unknown(kind: CrashKind) -> None:
     none = {} if kind is CrashKind.STATIC else {"contact": None, "v_closing": None}
     story = a_story(off_lane(kind, **none))

@@ -257,6 +257,25 @@ def test_far_from_any_lane_nothing_is_wrong_way() -> None:
     assert action.command == DRIVING
 
 
+@pytest.mark.parametrize("lane", [True, False])
+def test_an_ego_that_rolled_over_is_put_back_on_a_lane(lane: bool) -> None:
+    s = supervisor()
+    play(s, 1, beside(0.0))
+    pose = beside(0.0, 1.0 if lane else 4000.0)
+    phase, action = s.observe(replace(truth(pose), rolled=(0,))), s.act(DRIVING)
+    assert phase is Supervision.REALIGN
+    assert action.relocate is not None
+    assert action.relocate.moved is not None
+    assert action.relocate.moved.reason is RelocationReason.ROLL_OVER
+    assert not reasons(play(s, 60, beside(0.0)))
+
+
+def test_another_vehicle_that_rolled_over_moves_no_ego() -> None:
+    s = supervisor()
+    s.observe(replace(truth(beside(0.0), [beside(30.0)]), rolled=(1,)))
+    assert s.act(DRIVING).relocate is None
+
+
 TOWN = RoadMap(bake(stadium("sidewalk").encode(), "elsewhere"))
 ON_STREET = Pose(150.0, -0.5 * WIDTH)
 

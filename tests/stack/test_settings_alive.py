@@ -165,6 +165,21 @@ def full_brake(settings: Settings) -> float:
     return speed
 
 
+def tight_bend(settings: Settings) -> float:
+    """Roll of an ego that is a lorry after three seconds of much steer."""
+    ready = cell(settings)
+    setup = stage_of(ready).setup
+    backend = EmbeddedBackend()
+    backend.reset(
+        replace(setup, ego=replace(setup.ego, type="truck", speed=20.0, collides=False)), ready.seed
+    )
+    for _ in range(60):
+        backend.step(VehicleCommand(throttle=0.5, steer=0.3))
+    roll = float(backend.truth().states.roll[0])
+    backend.close()
+    return roll
+
+
 def in_wind(**also: Any) -> Outcome:
     """A short drive in a wind."""
     return lambda s: short_drive("rain-noon")(s.with_values({"wind": True, **also}))
@@ -243,6 +258,7 @@ OTHERS: dict[str, Scenario] = {
     "lane_material": Scenario(True, lane_friction),
     "esc": Scenario(False, short_drive("icy_30")),
     "anti_lock": Scenario("wheel_speeds", full_brake),
+    "roll_over": Scenario(True, tight_bend),
     "wind": Scenario(True, short_drive("rain-noon")),
     "wind_speed": Scenario(12.0, in_wind()),
     "wind_direction_deg": Scenario(0.0, in_wind(wind_speed=12.0)),

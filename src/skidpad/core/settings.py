@@ -93,6 +93,7 @@ class WorldSettings(SettingsPart):
     anti_lock: AntiLock = setting_field(
         AntiLock.IDEAL, "M-1, T-11", "anti-lock brakes: ideal, or cycles by wheel speeds"
     )
+    roll_over: bool = setting_field(False, "M-1, T-11", "vehicles can tip over in bends")
     wind: bool = setting_field(False, "M-1, T-11", "wind pushes vehicles")
     wind_speed: float | None = setting_field(
         None,

@@ -107,6 +107,7 @@ class Setup:
     radar_model: RadarModel = RadarModel.GEOMETRIC  # of the common radar (embedded backend)
     stability: bool = False  # all vehicles have stability and traction control (embedded backend)
     anti_lock: AntiLock = AntiLock.IDEAL  # of vehicles that have them (embedded backend)
+    roll_over: bool = False  # vehicles can tip over their outer wheels (embedded backend)
     wind: Wind | None = None  # that pushes vehicles; None: no air moves (embedded backend)
     level: SensorLevel = SensorLevel.PIXELS
     asked: frozenset[str] = frozenset()  # ids among specs whose readings go to `frame.extra` (L-3)

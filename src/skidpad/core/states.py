@@ -175,4 +175,5 @@ class WorldTruth:
     background: tuple[TrafficContact, ...] = ()  # of all others, that began in this tick
     put_back: tuple[int, ...] = ()  # actors of the background, stuck or astray (decision M-7)
     moved_on: tuple[int, ...] = ()  # actors of the background moved from afar to near the ego
+    rolled: tuple[int, ...] = ()  # actors, the ego too, that came to lie on their side in this tick
     notices: tuple[str, ...] = ()  # what else happened in this tick: a wreck was put back, ...

@@ -109,6 +109,7 @@ class RelocationReason(IntEnum):
     STUCK = 3
     OFF_ROAD = 4
     ROAD_END = 5  # the map ends there: no driver's fault
+    ROLL_OVER = 6  # it lay on its side
 
 
 class Scenery(str, Enum):
@@ -123,6 +124,7 @@ class Outcome(str, Enum):
 
     COMPLETED = "completed"
     COLLISION = "collision"
+    ROLL_OVER = "roll_over"  # the ego of a scenario lay on its side
     NOT_TRIGGERED = "not_triggered"
     AGENT_ERROR = "agent_error"
     CRASHED = "crashed"

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.core.states import ActorStates
-from skidpad.physics.antilock import MEMORY, PRESSURE
+from skidpad.physics.antilock import PRESSURE
 from skidpad.physics.params import FEEL, STIFFNESS, WATER, WheelStates, vehicle_params
+from skidpad.physics.rollover import MEMORY, OVER
 from skidpad.physics.types import TIRE_FRICTION_REFERENCE, VehicleType
 from skidpad.physics.vehicle import step_vehicles
 
@@ -38,6 +39,7 @@ class Fleet:
         anti_lock: bool | None = None,
         stability: bool = False,
         cycling: bool = False,
+        roll_over: bool = False,
         substep: float = SUBSTEP,
     ) -> None:
         """A fleet at rest at the origin.
@@ -45,6 +47,7 @@ class Fleet:
         states: arrays to work on whose first rows are these vehicles; None: own ones.
         anti_lock: None leaves it to each type. stability: stability and traction control and
         brake-force distribution. cycling: anti-lock brakes work from wheel speeds.
+        roll_over: vehicles can tip over their outer wheels.
         substep: longest inner step, s.
         """
         n = len(types)
@@ -58,6 +61,7 @@ class Fleet:
             self.params.anti_lock[:] = anti_lock
         self.params.stability[:] = stability
         self.params.cycling[:] = cycling
+        self.params.tips[:] = roll_over
         self.wind = (0.0, 0.0)  # m/s of the air in world axes
         self.wheels = WheelStates(
             omega=np.zeros((n, 4)),
@@ -152,6 +156,10 @@ class Fleet:
         s.vx[i] += impulse[0] / p.mass[i] + d_r * p.x_cog[i] * sn
         s.vy[i] += impulse[1] / p.mass[i] - d_r * p.x_cog[i] * c
         s.yaw_rate[i] += d_r
+
+    def rolled(self) -> NDArray[np.bool_]:
+        """(n,) which vehicles lie on their side."""
+        return np.asarray(self.wheels.memory[:, OVER] > 0.0)
 
     def wheel_speeds(self, i: int) -> tuple[float, float, float, float]:
         """Rim speeds of vehicle i in m/s: FL, FR, RL, RR."""

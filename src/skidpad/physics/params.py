@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.physics.rollover import roll_inertias
 from skidpad.physics.types import VehicleType
 from skidpad.physics.wind import AIR_DENSITY, side_coefficients
 
@@ -47,6 +48,8 @@ class VehicleParams(NamedTuple):
     anti_lock: NDArray[np.bool_]
     cycling: NDArray[np.bool_]  # anti-lock brakes work from wheel speeds
     stability: NDArray[np.bool_]  # stability and traction control, brake-force distribution
+    roll_inertia: Floats  # m^2, about the outer wheels, over the mass; `rollover`
+    tips: NDArray[np.bool_]  # it can roll over
 
 
 class WheelStates(NamedTuple):
@@ -58,7 +61,9 @@ class WheelStates(NamedTuple):
     a_load: Floats  # (n, 2) specific force behind the load transfer, low-passed
     slide: Floats  # (n, 4) slip over the slip of full sliding; beyond 1 the tyre slides
     load: Floats  # (n, 4) N
-    memory: Floats  # (n, 16) of anti-lock brakes that cycle, `antilock`
+    memory: (
+        Floats  # (n, MEMORY) of anti-lock brakes that cycle and of tipping, `antilock`, `rollover`
+    )
 
 
 # Columns of what the road does to the tyres, (n, 12), each for FL, FR, RL, RR: friction at nominal
@@ -107,4 +112,6 @@ def vehicle_params(types: Sequence[VehicleType]) -> VehicleParams:
         anti_lock=np.array([t.abs for t in types], dtype=np.bool_),
         cycling=np.zeros(len(types), dtype=np.bool_),
         stability=np.zeros(len(types), dtype=np.bool_),
+        roll_inertia=roll_inertias(types),
+        tips=np.zeros(len(types), dtype=np.bool_),
     )

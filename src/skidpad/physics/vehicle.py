@@ -2,9 +2,9 @@
 
 A body with three degrees of freedom in the road plane, four wheel spins and a steering actuator;
 quasi-static load transfer; wheels with combined-slip tyres (`wheel`, `tyre`); stability control
-(`stability`) where a vehicle has it. Rollover and suspension travel are not modelled. How far limit
-handling can be trusted: docs/physics.md. The equations are textbook ones (Newton and Euler in the
-plane); tests compare them with an independent drift model and with laws of motion.
+(`stability`) and roll-over (`rollover`) where a vehicle has it. Suspension travel is not modelled. How
+far limit handling can be trusted: docs/physics.md. The equations are textbook ones (Newton and Euler
+in the plane); tests compare them with an independent drift model and with laws of motion.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics.antilock import PRESSURE, regulate
 from skidpad.physics.params import STIFFNESS, WATER, Floats, VehicleParams, WheelStates
+from skidpad.physics.rollover import OVER, SLIDING, TILT, left_arm, tip
 from skidpad.physics.stability import Correction, Model, Motion, correction
 from skidpad.physics.tyre import RELAXATION_RADII, V_SLIP_MIN
 from skidpad.physics.wheel import Contact, Torques, Tyre, turn
@@ -83,6 +84,9 @@ class Car(NamedTuple):
     anti_lock: bool  # ideal
     cycling: bool  # anti-lock brakes from wheel speeds
     stability: bool
+    tips: bool
+    lean: float  # rad per m/s^2
+    roll_inertia: float  # m^2
 
 
 class Body(NamedTuple):
@@ -155,6 +159,9 @@ def _car(i: int, p: VehicleParams, command: Floats, grade: float, bank: float) -
         anti_lock & ~cycling,
         anti_lock & cycling,
         p.stability[i],
+        p.tips[i],
+        p.roll_gradient[i],
+        p.roll_inertia[i],
     )
 
 
@@ -165,12 +172,49 @@ def _wheel_loads(car: Car, a_x: float, a_y: float, load: Floats) -> None:
     front = (car.weight * car.b - car.mass * a_x * car.cog_height) / wheelbase
     front = min(max(front, 0.0), car.weight)
     moment = 0.5 * car.mass * a_y * car.cog_height / car.half_track
+    if car.tips:
+        _share_loads(car, front, moment, a_y, load)
+        return
     for axle in range(2):
         axle_load = front if axle == 0 else car.weight - front
         share = car.roll_front if axle == 0 else 1.0 - car.roll_front
         transfer = min(max(share * moment, -0.5 * axle_load), 0.5 * axle_load)
         load[2 * axle] = 0.5 * axle_load - transfer
         load[2 * axle + 1] = 0.5 * axle_load + transfer
+
+
+@inner_kernel
+def _share_loads(car: Car, front: float, moment: float, a_y: float, load: Floats) -> None:
+    """Loads where an axle whose inner wheel lifts leaves the rest of the moment (N) to the other one."""
+    arm = left_arm(car.half_track, car.cog_height, car.lean, a_y)
+    shift = 0.5 * car.weight * (1.0 - arm / car.half_track)
+    moment = min(
+        max(moment + (shift if a_y > 0.0 else -shift), -0.5 * car.weight), 0.5 * car.weight
+    )
+    half_front, half_rear = 0.5 * front, 0.5 * (car.weight - front)
+    ahead = min(max(car.roll_front * moment, -half_front), half_front)
+    behind = min(max(moment - ahead, -half_rear), half_rear)
+    ahead = moment - behind
+    load[0], load[1] = half_front - ahead, half_front + ahead
+    load[2], load[3] = half_rear - behind, half_rear + behind
+
+
+@inner_kernel
+def _slide(car: Car, u: float, v: float, r: float, feel: Floats, h: float) -> Push:
+    """What the road does to a body that lies on its side, at the places of its axles."""
+    force_x, force_y, moment = 0.0, 0.0, 0.0
+    for axle in range(2):
+        arm = car.a if axle == 0 else -car.b
+        load = car.weight * (car.b if axle == 0 else car.a) / (car.a + car.b)
+        mu = min(SLIDING, 0.5 * (feel[2 * axle] + feel[2 * axle + 1]))
+        side = v + r * arm
+        speed = sqrt(u * u + side * side)
+        # at most what stops it within the step
+        most = min(mu, speed / (G * h)) * load / max(speed, V_HOLD * h)
+        force_x -= most * u
+        force_y -= most * side
+        moment -= most * side * arm
+    return Push(force_x, force_y, moment, 0.0)
 
 
 @inner_kernel
@@ -287,12 +331,19 @@ def _advance(
         if car.cycling:
             pedal = car.brake > 0.0
             regulate(memory, omega, car.front.radius, car.half_track, r, g_x - a_x, pedal, h)
-        push = _push(car, u, v, r, a_x, drive, asked, steer, omega, wheels.slip_y[i],
-                     wheels.slide[i], load, feel, memory, h)  # fmt: skip
+        if memory[OVER] > 0.0:
+            push = _slide(car, u, v, r, feel, h)
+        else:
+            push = _push(car, u, v, r, a_x, drive, asked, steer, omega, wheels.slip_y[i],
+                         wheels.slide[i], load, feel, memory, h)  # fmt: skip
         u_air, v_air = u - (wind_x * c + wind_y * s), v - (wind_y * c - wind_x * s)
         air = sqrt(u_air * u_air + v_air * v_air)
         a_load[0] += load_lag * (push.x / car.mass - a_load[0])
         a_load[1] += load_lag * (push.y / car.mass - a_load[1])
+        if car.tips and memory[OVER] == 0.0:
+            arm = left_arm(car.half_track, car.cog_height, car.lean, a_load[1])
+            down = car.weight / car.mass
+            tip(memory, a_load[1], down, arm, car.cog_height, car.roll_inertia, h)
         a_x = (push.x - car.drag * air * u_air) / car.mass + g_x
         side, moment = car.drag * speed * v, push.moment
         if windy:
@@ -345,6 +396,12 @@ def _keep(i: int, states: ActorStates, body: Body, x_cog: float, dt: float) -> N
     states.vx[i], states.vy[i], states.yaw_rate[i] = vx, vy, body.r
 
 
+@inner_kernel
+def _lean(lean: float, memory: Floats) -> float:
+    """Roll of a body that may tip: on its springs, or about its outer wheels; on its side it is at rest."""
+    return float(memory[TILT]) + (0.0 if memory[OVER] > 0.0 else lean)
+
+
 @kernel
 def step_vehicles(
     states: ActorStates,
@@ -373,4 +430,7 @@ def step_vehicles(
             turn_max = params.steer_rate[i] * h
             _advance(i, states, wheels, car, feel[i], g_x, g_y, turn_max, wind_x, wind_y, h, steps)
             states.pitch[i] = -grade[i] - params.pitch_gradient[i] * wheels.a_load[i, 0]
-            states.roll[i] = bank[i] + params.roll_gradient[i] * wheels.a_load[i, 1]
+            lean = params.roll_gradient[i] * wheels.a_load[i, 1]
+            states.roll[i] = bank[i] + (
+                lean if not params.tips[i] else _lean(lean, wheels.memory[i])
+            )

@@ -50,6 +50,7 @@ MARGIN = 0.3  # m around the ego's own box where it is put
 FULL_STOP = VehicleCommand(brake=1.0, handbrake=True)
 HELD = VehicleCommand(brake=1.0)
 ROLLING = VehicleCommand()
+LEAVING = (RelocationReason.OFF_ROAD, RelocationReason.ROLL_OVER)  # it may be far from all lanes
 HOLDING = frozenset(
     {Tier.STOPPED_BEHIND_CAR, Tier.APPROACH, Tier.ACC_HOLD, Tier.LIGHT_STOP, Tier.HOLDING_AT_LINE}
 )
@@ -123,6 +124,7 @@ class Supervisor:
         self.truth: WorldTruth | None = None
         self._states: ActorStates | None = None  # those of `_held`
         self.off = 0  # ticks with all wheels off every lane
+        self.over = False  # the ego lies on its side
         self.first: LanePoint | None = None  # where the run began
         self._lane: LanePoint | None = None  # of this moment, where it was asked for
         self.last: LanePoint | None = None  # nearest lane, as long as there was one
@@ -131,12 +133,15 @@ class Supervisor:
         """The phase of the tick that `truth` begins."""
         self.truth, self._lane = truth, None
         self.contacts_seen += len(truth.contacts)
+        self.over |= 0 in truth.rolled
         if self.phase is not Supervision.NONE:
             if self.left == 0:
                 self._next_phase()
         elif truth.contacts and self.cool_down == 0:
             self.recoveries += 1
             self._begin(Supervision.BRAKE, BRAKE_TIME, RelocationReason.COLLISION)
+        elif self.over:
+            self._begin(Supervision.REALIGN, 0.0, RelocationReason.ROLL_OVER)
         elif (reason := self._astray(truth)) is not None:
             self._begin(Supervision.REALIGN, 0.0, reason)
         return self.phase
@@ -196,12 +201,13 @@ class Supervisor:
         nearest = self._find_lane(states)
         if self.reason is RelocationReason.ROAD_END:
             nearest = self.first
-        elif self.reason is RelocationReason.OFF_ROAD and nearest is None:
+        elif self.reason in LEAVING and nearest is None:
             nearest = self.last
         if nearest is None:
             return Action(FULL_STOP, notice="no driving lane near the ego, relocation is retried")
         place, shift, clear = self._clear_place(nearest)
         new = replace(place.pose, z=place.z + LIFT)
+        self.over = False
         moved = Moved(self.reason, shift, states.pose(0), new, clear)
         self.cool_down = round(COOL_DOWN / self.dt)
         self.grace = round(self.settings.grace / self.dt)

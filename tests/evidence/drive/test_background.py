@@ -12,7 +12,7 @@ import pytest
 import makelog
 from skidpad.core.states import ContactEvent, TrafficContact
 from skidpad.evidence.drive.background import UNSEEN, background
-from skidpad.recording.run.events import MovedOn, PutBack
+from skidpad.recording.run.events import MovedOn, PutBack, RolledOver
 from skidpad.recording.run.log import RunLog
 
 TICKS = 1000  # 50 s
@@ -33,10 +33,19 @@ def test_contacts_soon_after_one_of_the_ego_are_counted_apart() -> None:
     own = ContactEvent(100, 1, "", 1000.0, 5.0, 0.0, 0.0)
     others = [TrafficContact(tick, 1, 2, 3.0) for tick in (99, 100, 499, 501)]
     found = metrics_of(
-        log_of(own, *others, TrafficContact(300, 1, -1, 3.0), PutBack(700, 2), MovedOn(800, 1))
+        log_of(
+            own,
+            *others,
+            TrafficContact(300, 1, -1, 3.0),
+            PutBack(700, 2),
+            MovedOn(800, 1),
+            RolledOver(600, 2),
+            RolledOver(650, 0),
+        )
     )
     assert (found.traffic_contacts, found.traffic_contacts_after_ego) == (2, 2)
     assert (found.traffic_put_back, found.traffic_moved) == (1, 1)
+    assert found.traffic_roll_overs == 1
     assert found.traffic_km == pytest.approx(2.0, rel=2e-3)
     assert found.traffic_contacts_per_100_km == pytest.approx(100.0, rel=2e-3)
 

@@ -480,6 +480,14 @@ def test_leaving_the_road_is_fatal_counted_and_explained() -> None:
     assert (c.kind, c.bend_exit, c.v_ego) == (CrashKind.OFF_ROAD, False, 20.0)
 
 
+def test_a_roll_over_is_fatal_a_departure_and_a_kind_of_its_own() -> None:
+    log = field(100, 0, 0, (left(40, reason=RelocationReason.ROLL_OVER),))
+    m = metrics(log)
+    assert (m.fatal_collisions, m.roll_overs, m.road_departures, m.off_road) == (1, 1, 1, 0)
+    (c,) = find_crashes(prepare(log, straight_map()))
+    assert (c.kind, c.other, c.v_ego) == (CrashKind.ROLL_OVER, "", 20.0)
+
+
 @pytest.mark.req("R-6")
 def test_ticks_off_all_lanes_that_nothing_counts_are_a_share() -> None:
     assert metrics(field(200, 20, 30)).off_lanes_pct == pytest.approx(5.0)

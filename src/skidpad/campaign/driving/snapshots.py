@@ -17,7 +17,11 @@ from skidpad.recording.files import write_atomically
 
 FRONT, TOP = "rgb_front", "rgb_top"
 MARGIN = 12  # px
-FATAL = (RelocationReason.WRONG_WAY, RelocationReason.OFF_ROAD)  # without a contact
+FATAL = (  # without a contact
+    RelocationReason.WRONG_WAY,
+    RelocationReason.OFF_ROAD,
+    RelocationReason.ROLL_OVER,
+)
 
 
 class Snapshots(Sink):

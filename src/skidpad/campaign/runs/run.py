@@ -280,7 +280,7 @@ class OpenRun:
         stage, finished = self.stage, self.log.log.finish()
         return Run(
             finished,
-            stage.outcome if self.failure is None else Outcome.AGENT_ERROR,
+            outcome_of(stage, finished) if self.failure is None else Outcome.AGENT_ERROR,
             "" if self.failure is None else story(self.failure),
             tuple(self.snapshots.paths),
             stage.triggered,
@@ -339,6 +339,12 @@ def log_of(spec: RunSpec, stage: Stage, desk: Desk | None = None) -> Log:
     if desk is None:
         return Log(header, spec.weather.name, room)
     return DeskLog(header, spec.weather.name, min(room, DESK_ROOM), desk)
+
+
+def outcome_of(stage: Stage, log: RunLog) -> Outcome:
+    """Returns how a drive ended in which nothing failed; one with a supervisor goes on after a roll-over."""
+    rolled = stage.player is not None and any(e.actor == 0 for e in log.rolled_over)
+    return Outcome.ROLL_OVER if rolled and stage.outcome is not Outcome.COLLISION else stage.outcome
 
 
 def off_road(log: RunLog, map: RoadMap) -> NDArray[np.bool_]:

@@ -30,11 +30,13 @@ class CrashKind(str, Enum):
     STATIC = "static"
     WRONG_WAY = "wrong_way"
     OFF_ROAD = "off_road"  # decision R-6
+    ROLL_OVER = "roll_over"
 
 
 CORRECTIONS = {
     RelocationReason.WRONG_WAY: CrashKind.WRONG_WAY,
     RelocationReason.OFF_ROAD: CrashKind.OFF_ROAD,
+    RelocationReason.ROLL_OVER: CrashKind.ROLL_OVER,
 }  # relocations that are fatal by themselves, without a contact
 
 
@@ -58,7 +60,7 @@ class Crash:
     striker: Striker | None
     rear_ended: bool
     sideways: bool  # the two stood side by side just before
-    bend_exit: bool  # off the road in a bend without a lead (decision M-6)
+    bend_exit: bool  # off the road, or rolled over, in a bend without a lead (decision M-6)
     follows: bool  # soon and near after a relocation: no first of its chain
     v_ego: float  # m/s just before
     v_other: float | None
@@ -133,7 +135,7 @@ def _crash(drive: Drive, row: int, contact: ContactEvent | None) -> Crash:
 
 
 def _correct_crash(drive: Drive, at: int, kind: CrashKind) -> Crash:
-    left = kind is CrashKind.OFF_ROAD
+    left = kind in (CrashKind.OFF_ROAD, CrashKind.ROLL_OVER)
     return _event(drive, at, kind=kind, other="", bend_exit=left and _is_bend_exit(drive, at))
 
 

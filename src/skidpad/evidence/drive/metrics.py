@@ -108,6 +108,7 @@ def _collisions(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
         collisions_static=kinds.count(CrashKind.STATIC),
         off_road=kinds.count(CrashKind.OFF_ROAD),
         wrong_way=kinds.count(CrashKind.WRONG_WAY),
+        roll_overs=kinds.count(CrashKind.ROLL_OVER),
         fatal_first=len(first),
         crashes_vehicle_first=first.count(CrashKind.VEHICLE),
         road_departures_first=len(first) - first.count(CrashKind.VEHICLE),

@@ -70,6 +70,9 @@ def centre_distance(log: RunLog) -> Floats:
     return nearest
 
 
+ENDED = (Outcome.COLLISION, Outcome.ROLL_OVER)  # before the end of the route
+
+
 def grip_metrics(
     log: RunLog,
     outcome: Outcome,
@@ -99,7 +102,7 @@ def grip_metrics(
         0.0 if off_road is None or not distance else float(steps[off_road[1:]].sum()) / distance
     )
     route = route_share(outcome, distance, route_length)
-    crashed = outcome is Outcome.COLLISION
+    crashed = outcome in ENDED
     departed = off_road is not None and bool(off_road.any())
     nearest = centre_distance(log).min()
     return GripMetrics(
@@ -129,7 +132,7 @@ def route_share(outcome: Outcome, distance: float, route_length: float | None) -
     """Percent of the route: all of it when the scenario came to its end, else the way driven."""
     if outcome is Outcome.AGENT_ERROR:
         return 0.0
-    if outcome is not Outcome.COLLISION:
+    if outcome not in ENDED:
         return 100.0
     return None if not route_length else 100.0 * min(distance / route_length, 1.0)
 

@@ -40,22 +40,27 @@ class Metrics:
     fatal_collisions: int | None = metric("recoveries, wrong ways and departures", "A-247, R-6")
     crashes_vehicle: int | None = metric("fatal collisions with vehicles", "A-190, R-6")
     road_departures: int | None = metric(
-        "into a barrier, off the road, or facing the wrong way", "R-6"
+        "into a barrier, off the road, facing the wrong way, or rolled over", "R-6"
     )
     collisions_vehicle: int | None = metric("recoveries after hitting a vehicle", "A-190")
     collisions_static: int | None = metric("recoveries after hitting anything else", "A-190")
     off_road: int | None = metric("times that the car left the road and was put back", "R-6")
     wrong_way: int | None = metric("wrong-way corrections", "A-199")
+    roll_overs: int | None = metric("times that the car lay on its side", "T-11")
     fatal_first: int | None = metric("fatal ones that follow on no relocation (8 s, 100 m)", "R-6")
     crashes_vehicle_first: int | None = metric("of these with vehicles", "R-6")
-    road_departures_first: int | None = metric("of these static, off the road, wrong way", "R-6")
+    road_departures_first: int | None = metric(
+        "of these static, off the road, wrong way, rolled over", "R-6"
+    )
     first_fatal_s: float | None = metric("time to the first fatal one; none: beyond the run", "R-6")
     contacts: int | None = metric("contacts, also those within the cool-down", "A-189")
     rear_ended: int | None = metric(
         "of the vehicle collisions: struck from behind; until the morning of 2026-11-25 also at the side",
         "M-8",
     )
-    bend_exits: int | None = metric("static or off the road: in a bend without a lead", "M-6")
+    bend_exits: int | None = metric(
+        "static, off the road, rolled over: in a bend without a lead", "M-6"
+    )
     stuck_relocations: int | None = metric("relocations of a stuck ego, not fatal", "A-253")
     max_impact_kmh: float | None = metric("largest closing speed at a collision", "A-249")
     max_impact_vehicle_kmh: float | None = metric("the same, with a vehicle", "F-05")
@@ -127,6 +132,7 @@ class Metrics:
     traffic_moved: int | None = metric(
         "background vehicles moved from afar to near the ego", "A-209"
     )
+    traffic_roll_overs: int | None = metric("background vehicles that rolled over", "T-11")
     traffic_km: float | None = metric("distance of all background vehicles", "R-5")
     traffic_contacts_per_100_km: float | None = metric("such contacts per 100 km", "R-5")
     # ticks

@@ -51,6 +51,14 @@ class MovedOn:
     actor: int
 
 
+@dataclass(frozen=True, slots=True)
+class RolledOver:
+    """A vehicle, the ego or another one, came to lie on its side."""
+
+    tick: int
+    actor: int
+
+
 class NoticeSource(str, Enum):
     """The part of the program that a notice comes from."""
 
@@ -78,6 +86,7 @@ Event = (
     | TrafficContact
     | PutBack
     | MovedOn
+    | RolledOver
 )
 KINDS: dict[str, type[Event]] = {
     "contact": ContactEvent,
@@ -88,6 +97,7 @@ KINDS: dict[str, type[Event]] = {
     "traffic_contact": TrafficContact,
     "put_back": PutBack,
     "moved_on": MovedOn,
+    "rolled_over": RolledOver,
 }
 NAMES = {kind: name for name, kind in KINDS.items()}
 

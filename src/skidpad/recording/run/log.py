@@ -20,6 +20,7 @@ from skidpad.recording.run.events import (
     Notice,
     PutBack,
     Relocation,
+    RolledOver,
 )
 
 Floats = NDArray[np.float64]
@@ -153,6 +154,11 @@ class RunLog:
     def moved_on(self) -> tuple[MovedOn, ...]:
         """Vehicles of the background that were moved from afar to near the ego."""
         return tuple(e for e in self.events if isinstance(e, MovedOn))
+
+    @property
+    def rolled_over(self) -> tuple[RolledOver, ...]:
+        """Vehicles, the ego too, that came to lie on their side."""
+        return tuple(e for e in self.events if isinstance(e, RolledOver))
 
     @property
     def invasions(self) -> tuple[LaneInvasion, ...]:

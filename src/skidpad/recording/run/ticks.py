@@ -18,6 +18,7 @@ from skidpad.recording.run.events import (
     NoticeSource,
     PutBack,
     Relocation,
+    RolledOver,
 )
 from skidpad.recording.run.log import (
     ActorSeries,
@@ -93,10 +94,12 @@ class TickLog:
             or truth.background
             or truth.put_back
             or truth.moved_on
+            or truth.rolled
         ):
             self._events += [*truth.contacts, *truth.invasions, *truth.background]
             self._events += [PutBack(truth.tick, actor) for actor in truth.put_back]
             self._events += [MovedOn(truth.tick, actor) for actor in truth.moved_on]
+            self._events += [RolledOver(truth.tick, actor) for actor in truth.rolled]
         if truth.lights != self._lights:
             self._note_lights(truth)
         self._n = k + 1

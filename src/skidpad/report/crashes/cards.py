@@ -91,6 +91,8 @@ def headline(crash: Crash) -> str:
     alone = " in a bend, without a lead" if crash.bend_exit else ""
     if crash.kind is CrashKind.OFF_ROAD:
         return f"Off the road at {format_speed(crash.v_ego)}{alone}"
+    if crash.kind is CrashKind.ROLL_OVER:
+        return f"Rolled over at {format_speed(crash.v_ego)}{alone}"
     if crash.kind is CrashKind.STATIC:
         return f"Into the {crash.other} at {format_speed(crash.v_ego)}{alone}"
     closing = "" if crash.v_closing is None else f", closing at {format_speed(crash.v_closing)}"

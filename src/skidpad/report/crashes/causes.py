@@ -23,6 +23,9 @@ REPORTERS = {
 }
 
 
+ENDS = {CrashKind.OFF_ROAD: " and left the road", CrashKind.ROLL_OVER: " and rolled over"}
+
+
 def write_cause(story: Story) -> str:
     """Returns the cause of a crash as one sentence."""
     crash = story.crash
@@ -158,7 +161,7 @@ def _describe_braking(story: Story) -> str:
 def _describe_departure(story: Story) -> list[str]:
     """A departure: the bend against the grip, what the ego braked for, where in the lane it was."""
     crash, wrong, braked = story.crash, story.worst, story.braked
-    end = f" and hit the {crash.other}" if crash.kind is CrashKind.STATIC else " and left the road"
+    end = f" and hit the {crash.other}" if crash.kind is CrashKind.STATIC else ENDS[crash.kind]
     text = f"the ego drove at {format_speed(crash.v_ego)}{end}"
     if crash.lane_offset is not None and abs(crash.lane_offset) > ASIDE:
         side = "left" if crash.lane_offset > 0.0 else "right"

@@ -147,6 +147,7 @@ DEPARTURES = (
     Kind("into a barrier", ("collisions_static",), (), "or anything else that stands"),
     Kind("off the road", ("off_road",), (), "left all lanes and was put back"),
     Kind("facing the wrong way", ("wrong_way",), (), "and was turned round"),
+    Kind("rolled over", ("roll_overs",), (), "lay on its side and was put back"),
 )  # fmt: skip
 
 

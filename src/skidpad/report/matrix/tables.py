@@ -65,9 +65,10 @@ KINDS = (
     (
         "bend_exits",
         "in a bend without a lead",
-        "of the two before: speed alone was too much for the bend",
+        "of the two before and of roll-overs: speed alone was too much for the bend",
     ),
     ("wrong_way", "wrong-way corrections", ""),
+    ("roll_overs", "rolled over", "lay on its side and was put back"),
     ("stuck_relocations", "stuck and put back", "no intervention"),
 )
 UNGRADED_TITLES = {"rear_ended": "of these struck from behind or touched sideways"}
@@ -97,6 +98,7 @@ BACKGROUND = (
     ("traffic_contacts", "contacts", "of two background vehicles, first touch"),
     ("traffic_contacts_after_ego", "soon after the ego's", "within 20 s of a contact of the ego"),
     ("traffic_put_back", "put back", "stood without a cause or left the lane for 10 s"),
+    ("traffic_roll_overs", "rolled over", "lay on their side"),
     ("traffic_moved", "moved", "far from the ego, and entered anew nearer to it"),
 )
 

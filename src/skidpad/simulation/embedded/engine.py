@@ -79,6 +79,7 @@ class EmbeddedBackend:
             background=w.background,
             put_back=w.put_back,
             moved_on=w.moved_on,
+            rolled=w.rolled,
             notices=w.notices,
         )
 

@@ -29,6 +29,7 @@ def staged(setup: Setup, seed: int) -> World:
         grip=grip,
         stability=setup.stability,
         anti_lock=setup.anti_lock,
+        roll_over=setup.roll_over,
         wind=setup.wind,
     )
     world = World(map, Lights.pretimed(map, seed, setup.dt), conditions)

@@ -61,6 +61,7 @@ class Conditions:
     grip: GripParams
     stability: bool = False  # vehicles have stability and traction control
     anti_lock: AntiLock = AntiLock.IDEAL  # of vehicles that have them
+    roll_over: bool = False  # vehicles can tip over their outer wheels
     wind: Wind | None = None  # None: no air moves
     road_noise: float = ROAD_NOISE  # rad of cross slope, decision M-11
     all_lanes: bool = False  # actors stand on sidewalks and shoulders too
@@ -86,6 +87,7 @@ class World:
         self.contacts, self.background = Touches()
         self.put_back: tuple[int, ...] = ()
         self.moved_on: tuple[int, ...] = ()
+        self.rolled: tuple[int, ...] = ()
         self.invasions: tuple[LaneInvasion, ...] = ()
         self.notices: tuple[str, ...] = ()
         self.gusts = None if conditions.wind is None else Gusts(conditions.wind, conditions.seed)
@@ -142,6 +144,7 @@ class World:
             states=self.states,
             stability=self.conditions.stability,
             cycling=self.conditions.anti_lock is AntiLock.WHEEL_SPEEDS,
+            roll_over=self.conditions.roll_over,
         )
         self.tyres = self.fleet.tire_friction.copy()  # (wheeled, 4) outside friction zones
         self.bodies = bodies_of(members)
@@ -349,11 +352,14 @@ class World:
         if self.gusts is not None:
             self.air = self.gusts.advance(self.dt)
         self.notices, self.put_back, self.moved_on = (), (), ()
+        lay = self.fleet.rolled() if self.conditions.roll_over else None
         if self.traffic is not None and self.tick % CHECK_PERIOD == 0:
             self._advance(stages & ~SETTLE)
             self._put_vehicles(self.traffic)
             stages = SETTLE
         self._advance(stages)
+        if lay is not None:
+            self.rolled = tuple(np.flatnonzero(self.fleet.rolled() & ~lay).tolist())
         if words:
             self.moved[:] = False
         if self.book is not None:

@@ -88,11 +88,11 @@ class Bench:
 
     def __init__(
         self, kinds: Sequence[VehicleType], v: ArrayLike, mu: ArrayLike = MU, *,
-        stability: bool = True, cycling: bool = False,
+        stability: bool = True, cycling: bool = False, sensed: bool = False,
     ) -> None:  # fmt: skip
         """v (n,): m/s. mu: one value, or (n, 4) by wheel."""
         self.n = len(kinds)
-        self.fleet = Fleet(kinds, TICK, stability=stability, cycling=cycling)
+        self.fleet = Fleet(kinds, TICK, stability=stability, cycling=cycling, sensed=sensed)
         self.mu = np.array(np.broadcast_to(np.asarray(mu, dtype=np.float64), (self.n, 4)))
         for i, speed in enumerate(np.broadcast_to(np.asarray(v, dtype=np.float64), self.n)):
             self.fleet.place(i, Pose(0.0, 0.0), float(speed))

@@ -30,13 +30,14 @@ class SplitStop:
 
 
 def split_stop(
-    kind: VehicleType, v: float, *, steers: bool, stability: bool = True, cycling: bool = False
-) -> SplitStop:
+    kind: VehicleType, v: float, *, steers: bool, stability: bool = True, cycling: bool = False,
+    sensed: bool = False,
+) -> SplitStop:  # fmt: skip
     """Full braking from v m/s straight on, left wheels on HIGH, right ones on LOW.
 
-    cycling: anti-lock brakes work from wheel speeds, else they are ideal.
+    cycling: anti-lock brakes work from wheel speeds, sensed: stability control does; else they are ideal.
     """
-    bench = Bench([kind], v, [[HIGH, LOW, HIGH, LOW]], stability=stability, cycling=cycling)
+    bench = Bench([kind], v, [[HIGH, LOW, HIGH, LOW]], stability=stability, cycling=cycling, sensed=sensed)
     lag = round(REACTION / TICK)
     seen = [0.0] * lag  # steer that the driver has decided upon
     steer = 0.0

@@ -72,7 +72,7 @@ def bend(name, mu, *, v=17.0, angle=12.0, on=True, brake=0.0, seconds=6.0):
         commands[0, BRAKE] = brake
         fleet.step(commands, np.full((1, 4), mu))
         most = max(most, abs(float(fleet.wheels.a_load[0, 1])))
-        if fleet.rolled()[0]:
+        if fleet.on_side()[0]:
             break
     return fleet, most / G
 
@@ -120,7 +120,7 @@ def test_static_stability_of_cars_is_that_of_their_class():
 @pytest.mark.parametrize("mu", [0.9, 1.05])
 def test_a_lorry_rolls_over_in_a_tight_bend_on_asphalt(mu):
     fleet, a_y = bend("truck", mu)
-    assert fleet.rolled()[0]
+    assert fleet.on_side()[0]
     assert fleet.states.roll[0] == pytest.approx(ON_SIDE)  # to the right in a left bend
     assert a_y > rollover_threshold(LORRY)
 
@@ -128,7 +128,7 @@ def test_a_lorry_rolls_over_in_a_tight_bend_on_asphalt(mu):
 @pytest.mark.parametrize("name", CARS)
 def test_a_low_car_slides_instead(name):
     fleet, a_y = bend(name, 0.9)
-    assert not fleet.rolled()[0]
+    assert not fleet.on_side()[0]
     assert fleet.wheels.memory[0, TILT] == 0.0
     assert a_y < rollover_threshold(vehicle_type(name))
     assert fleet.wheels.slide[0].max() > 1.0
@@ -137,13 +137,13 @@ def test_a_low_car_slides_instead(name):
 @pytest.mark.parametrize("name", ["truck", "van", "sports_car"])
 def test_nobody_rolls_over_on_ice(name):
     fleet, a_y = bend(name, 0.12)
-    assert not fleet.rolled()[0]
+    assert not fleet.on_side()[0]
     assert a_y < 0.13
 
 
 def test_off_the_lorry_keeps_on_its_wheels():
     fleet, a_y = bend("truck", 0.9, on=False)
-    assert not fleet.rolled()[0]
+    assert not fleet.on_side()[0]
     assert fleet.wheels.memory[0, TILT] == 0.0
     assert a_y > rollover_threshold(LORRY)
 
@@ -168,4 +168,4 @@ def test_what_lies_on_its_side_slides_to_a_stop_and_stays():
     assert np.hypot(s.vx[0], s.vy[0]) < 1e-3
     assert s.x[0] == pytest.approx(12.0**2 / (2.0 * SLIDING * G), rel=0.03)
     fleet.place(0, Pose(0.0, 0.0), 5.0)
-    assert not fleet.rolled()[0]
+    assert not fleet.on_side()[0]

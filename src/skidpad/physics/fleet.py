@@ -14,7 +14,8 @@ from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.core.states import ActorStates
 from skidpad.physics.antilock import PRESSURE
 from skidpad.physics.params import FEEL, STIFFNESS, WATER, WheelStates, vehicle_params
-from skidpad.physics.rollover import MEMORY, OVER
+from skidpad.physics.rollover import OVER
+from skidpad.physics.sensed import MEMORY
 from skidpad.physics.types import TIRE_FRICTION_REFERENCE, VehicleType
 from skidpad.physics.vehicle import step_vehicles
 
@@ -39,6 +40,7 @@ class Fleet:
         anti_lock: bool | None = None,
         stability: bool = False,
         cycling: bool = False,
+        sensed: bool = False,
         roll_over: bool = False,
         substep: float = SUBSTEP,
     ) -> None:
@@ -47,7 +49,7 @@ class Fleet:
         states: arrays to work on whose first rows are these vehicles; None: own ones.
         anti_lock: None leaves it to each type. stability: stability and traction control and
         brake-force distribution. cycling: anti-lock brakes work from wheel speeds.
-        roll_over: vehicles can tip over their outer wheels.
+        sensed: stability control works from wheel speeds, too. roll_over: vehicles can tip over their outer wheels.
         substep: longest inner step, s.
         """
         n = len(types)
@@ -61,6 +63,7 @@ class Fleet:
             self.params.anti_lock[:] = anti_lock
         self.params.stability[:] = stability
         self.params.cycling[:] = cycling
+        self.params.sensed[:] = sensed
         self.params.tips[:] = roll_over
         self.wind = (0.0, 0.0)  # m/s of the air in world axes
         self.wheels = WheelStates(
@@ -157,7 +160,7 @@ class Fleet:
         s.vy[i] += impulse[1] / p.mass[i] - d_r * p.x_cog[i] * c
         s.yaw_rate[i] += d_r
 
-    def rolled(self) -> NDArray[np.bool_]:
+    def on_side(self) -> NDArray[np.bool_]:
         """(n,) which vehicles lie on their side."""
         return np.asarray(self.wheels.memory[:, OVER] > 0.0)
 

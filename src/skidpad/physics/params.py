@@ -48,6 +48,7 @@ class VehicleParams(NamedTuple):
     anti_lock: NDArray[np.bool_]
     cycling: NDArray[np.bool_]  # anti-lock brakes work from wheel speeds
     stability: NDArray[np.bool_]  # stability and traction control, brake-force distribution
+    sensed: NDArray[np.bool_]  # that control works from wheel speeds, `sensed`
     roll_inertia: Floats  # m^2, about the outer wheels, over the mass; `rollover`
     tips: NDArray[np.bool_]  # it can roll over
 
@@ -62,7 +63,7 @@ class WheelStates(NamedTuple):
     slide: Floats  # (n, 4) slip over the slip of full sliding; beyond 1 the tyre slides
     load: Floats  # (n, 4) N
     memory: (
-        Floats  # (n, MEMORY) of anti-lock brakes that cycle and of tipping, `antilock`, `rollover`
+        Floats  # (n, MEMORY) of controls and of tipping: `antilock`, `rollover`, `sensed`
     )
 
 
@@ -112,6 +113,7 @@ def vehicle_params(types: Sequence[VehicleType]) -> VehicleParams:
         anti_lock=np.array([t.abs for t in types], dtype=np.bool_),
         cycling=np.zeros(len(types), dtype=np.bool_),
         stability=np.zeros(len(types), dtype=np.bool_),
+        sensed=np.zeros(len(types), dtype=np.bool_),
         roll_inertia=roll_inertias(types),
         tips=np.zeros(len(types), dtype=np.bool_),
     )

@@ -21,6 +21,7 @@ from skidpad.core.states import ActorStates
 from skidpad.physics.antilock import PRESSURE, regulate
 from skidpad.physics.params import STIFFNESS, WATER, Floats, VehicleParams, WheelStates
 from skidpad.physics.rollover import OVER, SLIDING, TILT, left_arm, tip
+from skidpad.physics.sensed import limit_drive, note_motion, sensed_correction
 from skidpad.physics.stability import Correction, Model, Motion, correction
 from skidpad.physics.tyre import RELAXATION_RADII, V_SLIP_MIN
 from skidpad.physics.wheel import Contact, Torques, Tyre, turn
@@ -84,6 +85,7 @@ class Car(NamedTuple):
     anti_lock: bool  # ideal
     cycling: bool  # anti-lock brakes from wheel speeds
     stability: bool
+    sensed: bool  # stability control from wheel speeds
     tips: bool
     lean: float  # rad per m/s^2
     roll_inertia: float  # m^2
@@ -159,6 +161,7 @@ def _car(i: int, p: VehicleParams, command: Floats, grade: float, bank: float) -
         anti_lock & ~cycling,
         anti_lock & cycling,
         p.stability[i],
+        p.stability[i] & p.sensed[i],
         p.tips[i],
         p.roll_gradient[i],
         p.roll_inertia[i],
@@ -241,6 +244,18 @@ def _stability_correction(
 
 
 @inner_kernel
+def _sense(
+    car: Car, memory: Floats, omega: Floats, r: float, a_load: Floats, steer: float, h: float
+) -> Correction:
+    """What stability and traction control ask for by what they measure."""
+    radius, half, pedal = car.front.radius, car.half_track, car.throttle > 0.0
+    note_motion(memory, omega, radius, half, r, a_load[0], a_load[1], car.brake > 0.0, h)
+    asked = sensed_correction(memory, car.model, car.b, r, a_load[1], steer, h)
+    left = limit_drive(memory, omega, radius, half, r, car.drive_front, pedal, h)
+    return Correction(asked.turn, asked.rear, min(asked.drive, left))
+
+
+@inner_kernel
 def _push(
     car: Car, u: float, v: float, r: float, a_x: float, drive: float, asked: Correction,
     steer: float, omega: Floats, slip_y: Floats, slide: Floats, load: Floats, feel: Floats,
@@ -270,7 +285,7 @@ def _push(
         if car.stability:
             if not front:
                 brake = min(brake, per_load * load[w])
-                if not car.cycling:
+                if not car.cycling and not car.sensed:
                     brake = min(brake, low * load[w])
             if asked.rear != front:
                 brake = max(brake + (twist if left else -twist), 0.0)
@@ -289,7 +304,7 @@ def _push(
                 share * engine_drag * left_on,
                 tyre.inertia * abs(a_x) / tyre.radius,
                 car.anti_lock and speed > V_ABS_MIN,
-                car.stability,
+                car.stability and not car.sensed,
             ),
             h,
         )
@@ -326,10 +341,13 @@ def _advance(
         change = (car.steer * steer_share(speed) - steer) * steer_lag
         steer += min(max(change, -turn_max), turn_max)
         _wheel_loads(car, a_load[0], a_load[1], load)
-        asked = _stability_correction(car, u, v, r, steer, feel)
+        if car.sensed:
+            asked = _sense(car, memory, omega, r, a_load, steer, h)
+        else:
+            asked = _stability_correction(car, u, v, r, steer, feel)
         drive = _drive(car, u, speed, omega) * asked.drive
         if car.cycling:
-            pedal = car.brake > 0.0
+            pedal = car.brake > 0.0 or (car.sensed and asked.turn != 0.0)
             regulate(memory, omega, car.front.radius, car.half_track, r, g_x - a_x, pedal, h)
         if memory[OVER] > 0.0:
             push = _slide(car, u, v, r, feel, h)

@@ -343,7 +343,7 @@ def log_of(spec: RunSpec, stage: Stage, desk: Desk | None = None) -> Log:
 
 def outcome_of(stage: Stage, log: RunLog) -> Outcome:
     """Returns how a drive ended in which nothing failed; one with a supervisor goes on after a roll-over."""
-    rolled = stage.player is not None and any(e.actor == 0 for e in log.rolled_over)
+    rolled = stage.player is not None and any(e.actor == 0 for e in log.roll_overs)
     return Outcome.ROLL_OVER if rolled and stage.outcome is not Outcome.COLLISION else stage.outcome
 
 

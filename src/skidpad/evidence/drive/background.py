@@ -30,7 +30,7 @@ def background(drive: Drive, where: Mask) -> Metrics:
         traffic_put_back=sum(bool(where[drive.row(e.tick)]) for e in log.put_back),
         traffic_moved=sum(bool(where[drive.row(e.tick)]) for e in log.moved_on),
         traffic_roll_overs=sum(
-            e.actor > 0 and bool(where[drive.row(e.tick)]) for e in log.rolled_over
+            e.actor > 0 and bool(where[drive.row(e.tick)]) for e in log.roll_overs
         ),
         traffic_km=km,
         traffic_contacts_per_100_km=100.0 * free / km if km > 0.0 else None,

@@ -156,7 +156,7 @@ class RunLog:
         return tuple(e for e in self.events if isinstance(e, MovedOn))
 
     @property
-    def rolled_over(self) -> tuple[RolledOver, ...]:
+    def roll_overs(self) -> tuple[RolledOver, ...]:
         """Vehicles, the ego too, that came to lie on their side."""
         return tuple(e for e in self.events if isinstance(e, RolledOver))
 

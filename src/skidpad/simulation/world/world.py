@@ -352,14 +352,14 @@ class World:
         if self.gusts is not None:
             self.air = self.gusts.advance(self.dt)
         self.notices, self.put_back, self.moved_on = (), (), ()
-        lay = self.fleet.rolled() if self.conditions.roll_over else None
+        lay = self.fleet.on_side() if self.conditions.roll_over else None
         if self.traffic is not None and self.tick % CHECK_PERIOD == 0:
             self._advance(stages & ~SETTLE)
             self._put_vehicles(self.traffic)
             stages = SETTLE
         self._advance(stages)
         if lay is not None:
-            self.rolled = tuple(np.flatnonzero(self.fleet.rolled() & ~lay).tolist())
+            self.rolled = tuple(np.flatnonzero(self.fleet.on_side() & ~lay).tolist())
         if words:
             self.moved[:] = False
         if self.book is not None:

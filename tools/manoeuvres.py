@@ -137,14 +137,19 @@ class Bench:
 
 
 def circle(
-    kind: VehicleType, a_y: ArrayLike, mu: float = MU, *, stability: bool = False
+    kind: VehicleType,
+    a_y: ArrayLike,
+    mu: float = MU,
+    *,
+    stability: bool = False,
+    sensed: bool = False,
 ) -> tuple[Bench, Floats]:
     """Cars that drive the circle of ISO 4138 steadily, left, and their road-wheel angles.
 
     a_y: m/s^2 that the speeds mean; a car that cannot do it runs wide.
     """
     v = np.sqrt(np.asarray(a_y, dtype=np.float64) * RADIUS)
-    bench = Bench([kind] * len(v), v, mu, stability=stability)
+    bench = Bench([kind] * len(v), v, mu, stability=stability, sensed=sensed)
     trim = np.zeros(len(v))
     steer = trim
     for k in range(round(SETTLE / TICK)):
@@ -175,10 +180,16 @@ def lateral_limit(kind: VehicleType, mu: float = MU) -> float:
 
 
 def pedals_in_turn(
-    kind: VehicleType, a_y: float, brakes: Sequence[float], mu: float = MU, *, stability: bool
+    kind: VehicleType,
+    a_y: float,
+    brakes: Sequence[float],
+    mu: float = MU,
+    *,
+    stability: bool,
+    sensed: bool = False,
 ) -> list[Pedalled]:
     """Throttle released (ISO 9816) and brakes applied (ISO 7975) on the circle, steer held."""
-    bench, steer = circle(kind, [a_y] * len(brakes), mu, stability=stability)
+    bench, steer = circle(kind, [a_y] * len(brakes), mu, stability=stability, sensed=sensed)
     begin = bench.ticks - 1
     for _ in range(round(AFTER / TICK)):
         bench.step(steer, 0.0, np.asarray(brakes))
@@ -214,11 +225,16 @@ def dwell_steer(t: float) -> float:
 
 
 def sine_with_dwell(
-    kind: VehicleType, amplitudes: Sequence[float], mu: float = MU, *, stability: bool
+    kind: VehicleType,
+    amplitudes: Sequence[float],
+    mu: float = MU,
+    *,
+    stability: bool,
+    sensed: bool = False,
 ) -> list[Dwell]:
     """The cars coast through it, one per amplitude."""
     steer = dwell_unit(kind, mu) * np.asarray(amplitudes)
-    bench = Bench([kind] * len(steer), DWELL_SPEED, mu, stability=stability)
+    bench = Bench([kind] * len(steer), DWELL_SPEED, mu, stability=stability, sensed=sensed)
     end = 1.0 / DWELL_FREQUENCY + DWELL
     while bench.ticks * TICK < end + RATIOS[-1][0] + TICK:
         bench.step(steer * dwell_steer(bench.ticks * TICK))

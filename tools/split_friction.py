@@ -37,7 +37,9 @@ def split_stop(
 
     cycling: anti-lock brakes work from wheel speeds, sensed: stability control does; else they are ideal.
     """
-    bench = Bench([kind], v, [[HIGH, LOW, HIGH, LOW]], stability=stability, cycling=cycling, sensed=sensed)
+    bench = Bench(
+        [kind], v, [[HIGH, LOW, HIGH, LOW]], stability=stability, cycling=cycling, sensed=sensed
+    )
     lag = round(REACTION / TICK)
     seen = [0.0] * lag  # steer that the driver has decided upon
     steer = 0.0

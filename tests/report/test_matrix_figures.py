@@ -277,14 +277,14 @@ def test_the_parts_of_a_stacked_bar_are_as_long_as_their_counts():
 def test_interventions_and_contacts_are_counted_in_tables_of_their_own(tmp_path):
     counts = Metrics(
         fatal_collisions=7, serious_contacts=5, road_departures=0, collisions_vehicle=3, rear_ended=1,
-        collisions_static=4, off_road=2, bend_exits=1, wrong_way=0, stuck_relocations=6, contacts=28,
-        contacts_light=8, contacts_medium=4, contacts_heavy=1, contacts_vulnerable=2,
+        collisions_static=4, off_road=2, bend_exits=1, wrong_way=0, roll_overs=2, stuck_relocations=6,
+        contacts=28, contacts_light=8, contacts_medium=4, contacts_heavy=1, contacts_vulnerable=2,
         contacts_static=9, contacts_repeated=6, distance_km=5.0, duration_s=500.0,
     )  # fmt: skip
     MATRIX.write(tmp_path, [(key("1", "clear-noon", seed), counts) for seed in (1, 2)])
     matrix = load_matrix(tmp_path)
     kinds, contacts = kinds_table(matrix), grades_table(matrix)
-    assert [c.text for c in kinds.rows[0][1:]] == ["6", "2", "8", "4", "2", "0", "12"]
+    assert [c.text for c in kinds.rows[0][1:]] == ["6", "2", "8", "4", "2", "0", "4", "12"]
     assert kinds.rows[0][0].note == "2 runs, 10 km"
     assert [t for t, _ in contacts.columns][1:5] == [
         "contacts", "below 5 km/h", "5 to 20 km/h", "above 20 km/h"

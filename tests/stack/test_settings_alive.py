@@ -165,6 +165,19 @@ def full_brake(settings: Settings) -> float:
     return speed
 
 
+def swerve(settings: Settings) -> float:
+    """Yaw rate after two seconds of much steer and throttle on ice."""
+    ready = cell(settings, "icy_30")
+    setup = stage_of(ready).setup
+    backend = EmbeddedBackend()
+    backend.reset(replace(setup, ego=replace(setup.ego, speed=20.0, collides=False)), ready.seed)
+    for _ in range(40):
+        backend.step(VehicleCommand(throttle=1.0, steer=0.2))
+    rate = float(backend.truth().states.yaw_rate[0])
+    backend.close()
+    return rate
+
+
 def tight_bend(settings: Settings) -> float:
     """Roll of an ego that is a lorry after three seconds of much steer."""
     ready = cell(settings)
@@ -258,6 +271,7 @@ OTHERS: dict[str, Scenario] = {
     "lane_material": Scenario(True, lane_friction),
     "esc": Scenario(False, short_drive("icy_30")),
     "anti_lock": Scenario("wheel_speeds", full_brake),
+    "stability": Scenario("wheel_speeds", swerve),
     "roll_over": Scenario(True, tight_bend),
     "wind": Scenario(True, short_drive("rain-noon")),
     "wind_speed": Scenario(12.0, in_wind()),

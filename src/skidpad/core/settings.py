@@ -28,6 +28,7 @@ from skidpad.core.vocabulary import (
     LidarModel,
     RadarModel,
     RangeModel,
+    StabilityControl,
 )
 
 PROFILES = ("recommended", "thesis_text", "thesis_listing", "preliminary")
@@ -92,6 +93,11 @@ class WorldSettings(SettingsPart):
     )
     anti_lock: AntiLock = setting_field(
         AntiLock.IDEAL, "M-1, T-11", "anti-lock brakes: ideal, or cycles by wheel speeds"
+    )
+    stability: StabilityControl = setting_field(
+        StabilityControl.IDEAL,
+        "M-1, T-11",
+        "stability control, with `esc`: ideal, or by wheel speeds and yaw rate",
     )
     roll_over: bool = setting_field(False, "M-1, T-11", "vehicles can tip over in bends")
     wind: bool = setting_field(False, "M-1, T-11", "wind pushes vehicles")

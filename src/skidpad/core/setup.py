@@ -20,6 +20,7 @@ from skidpad.core.vocabulary import (
     RangeModel,
     Scenery,
     SensorLevel,
+    StabilityControl,
     Stratum,
     TrafficStart,
 )
@@ -107,6 +108,7 @@ class Setup:
     radar_model: RadarModel = RadarModel.GEOMETRIC  # of the common radar (embedded backend)
     stability: bool = False  # all vehicles have stability and traction control (embedded backend)
     anti_lock: AntiLock = AntiLock.IDEAL  # of vehicles that have them (embedded backend)
+    stability_control: StabilityControl = StabilityControl.IDEAL  # where there is one
     roll_over: bool = False  # vehicles can tip over their outer wheels (embedded backend)
     wind: Wind | None = None  # that pushes vehicles; None: no air moves (embedded backend)
     level: SensorLevel = SensorLevel.PIXELS

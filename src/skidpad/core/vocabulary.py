@@ -234,6 +234,13 @@ class AntiLock(str, Enum):
     WHEEL_SPEEDS = "wheel_speeds"
 
 
+class StabilityControl(str, Enum):
+    """How stability and traction control work: `ideal` is told the grip, `wheel_speeds` measures motion."""
+
+    IDEAL = "ideal"
+    WHEEL_SPEEDS = "wheel_speeds"
+
+
 class SensorLevel(str, Enum):
     """Real images and radar points, or geometric detection from boxes (decision M-3)."""
 

@@ -49,7 +49,8 @@ class Fleet:
         states: arrays to work on whose first rows are these vehicles; None: own ones.
         anti_lock: None leaves it to each type. stability: stability and traction control and
         brake-force distribution. cycling: anti-lock brakes work from wheel speeds.
-        sensed: stability control works from wheel speeds, too. roll_over: vehicles can tip over their outer wheels.
+        sensed: stability control works from wheel speeds, too. roll_over: vehicles can tip
+        over their outer wheels.
         substep: longest inner step, s.
         """
         n = len(types)

@@ -62,9 +62,7 @@ class WheelStates(NamedTuple):
     a_load: Floats  # (n, 2) specific force behind the load transfer, low-passed
     slide: Floats  # (n, 4) slip over the slip of full sliding; beyond 1 the tyre slides
     load: Floats  # (n, 4) N
-    memory: (
-        Floats  # (n, MEMORY) of controls and of tipping: `antilock`, `rollover`, `sensed`
-    )
+    memory: Floats  # (n, MEMORY) of controls and of tipping: `antilock`, `rollover`, `sensed`
 
 
 # Columns of what the road does to the tyres, (n, 12), each for FL, FR, RL, RR: friction at nominal

@@ -33,11 +33,14 @@ from skidpad.physics.stability import (
 
 Floats = NDArray[np.float64]
 
-# Columns of a vehicle's memory: m/s; share of g that was used; rad; rad/s^2; share of the drive; counts
-SPEED, USED, SIDE, TURN, DRIVE, CUTS, STEPS = range(FIRST, FIRST + 7)
-MEMORY = FIRST + 7
+# Columns of a vehicle's memory: m/s; share of g that was used; rad; rad/s^2; share of the drive; whether
+# it is being taken back; counts
+SPEED, USED, SIDE, TURN, DRIVE, CUTTING, CUTS, STEPS = range(FIRST, FIRST + 8)
+MEMORY = FIRST + 8
 
-MARGIN = 1.5  # m/s^2 by which the speed may change faster than the accelerometer says: slopes of 15 %
+# m/s^2 by which the speed may change faster than the accelerometer says: slopes of 15 %; under brakes
+# all wheels may slip at once
+MARGIN, MARGIN_BRAKED = 1.5, 0.5
 FORGET = 1.5  # s in which the grip that was used is forgotten
 SETTLE = 1.0  # s in which side slip returns to that of the linear car
 EXCESS = 0.10  # rad/s
@@ -64,7 +67,8 @@ def note_motion(
         m[SPEED], m[DRIVE] = wheels, 1.0
     m[STEPS] += 1.0
     expected = m[SPEED] + a_x * h
-    m[SPEED] = min(max(wheels, expected - MARGIN * h), expected + MARGIN * h)
+    margin = (MARGIN_BRAKED if braked else MARGIN) * h
+    m[SPEED] = min(max(wheels, expected - margin), expected + margin)
     used = sqrt(a_x * a_x + a_y * a_y) / G
     m[USED] = max(used, m[USED] * (1.0 - h / FORGET))
 
@@ -104,11 +108,10 @@ def limit_drive(
             over = omega[w] * radius - (m[SPEED] - yaw_rate * arm)
             spin = max(spin, over / max(m[SPEED], V_SPIN))
     if not pedal:
-        m[DRIVE] = 1.0
+        m[DRIVE], m[CUTTING] = 1.0, 0.0
     elif spin > SPIN_HIGH:
-        if m[DRIVE] == 1.0 or m[CUTS] == 0.0:
-            m[CUTS] += 1.0
-        m[DRIVE] = max(m[DRIVE] - CUT * h, 0.0)
+        m[CUTS] += 1.0 - m[CUTTING]
+        m[DRIVE], m[CUTTING] = max(m[DRIVE] - CUT * h, 0.0), 1.0
     elif spin < SPIN_LOW:
-        m[DRIVE] = min(m[DRIVE] + RAISE * h, 1.0)
+        m[DRIVE], m[CUTTING] = min(m[DRIVE] + RAISE * h, 1.0), 0.0
     return float(m[DRIVE])

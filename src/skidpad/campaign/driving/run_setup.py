@@ -283,6 +283,7 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
         radar_model=sensors.radar_model,
         stability=world.esc,
         anti_lock=world.anti_lock,
+        stability_control=world.stability,
         roll_over=world.roll_over,
         wind=wind_of(spec),
         level=spec.sensors,

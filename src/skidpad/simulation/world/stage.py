@@ -29,6 +29,7 @@ def staged(setup: Setup, seed: int) -> World:
         grip=grip,
         stability=setup.stability,
         anti_lock=setup.anti_lock,
+        stability_control=setup.stability_control,
         roll_over=setup.roll_over,
         wind=setup.wind,
     )

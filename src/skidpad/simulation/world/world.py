@@ -18,7 +18,7 @@ from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.core.jit import hold
 from skidpad.core.setup import DT, ActorCommand, Wind
 from skidpad.core.states import LaneInvasion, VehicleCommand
-from skidpad.core.vocabulary import AntiLock
+from skidpad.core.vocabulary import AntiLock, StabilityControl
 from skidpad.physics.contact import CONTACT_LAW, Contacts
 from skidpad.physics.fleet import Fleet
 from skidpad.physics.grip import GripParams, Road
@@ -61,6 +61,7 @@ class Conditions:
     grip: GripParams
     stability: bool = False  # vehicles have stability and traction control
     anti_lock: AntiLock = AntiLock.IDEAL  # of vehicles that have them
+    stability_control: StabilityControl = StabilityControl.IDEAL
     roll_over: bool = False  # vehicles can tip over their outer wheels
     wind: Wind | None = None  # None: no air moves
     road_noise: float = ROAD_NOISE  # rad of cross slope, decision M-11
@@ -144,6 +145,7 @@ class World:
             states=self.states,
             stability=self.conditions.stability,
             cycling=self.conditions.anti_lock is AntiLock.WHEEL_SPEEDS,
+            sensed=self.conditions.stability_control is StabilityControl.WHEEL_SPEEDS,
             roll_over=self.conditions.roll_over,
         )
         self.tyres = self.fleet.tire_friction.copy()  # (wheeled, 4) outside friction zones

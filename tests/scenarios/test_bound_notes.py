@@ -12,6 +12,7 @@ from tests.scenarios.files import (
     private,
     speed,
     story,
+    synchronize,
     teleport,
     time,
     to,
@@ -20,7 +21,15 @@ from tests.scenarios.files import (
     vehicle,
     world,
 )
-from tests.scenarios.oracle.actions import gap, lane_change, limits
+from tests.scenarios.oracle.actions import (
+    beside,
+    gap,
+    lane_change,
+    lane_offset,
+    limits,
+    relative,
+    smooth_profile,
+)
 
 
 def notes(tmp_path, *actions, entities=None, **parts):
@@ -70,6 +79,74 @@ def slow(**limits_of):
 def test_a_bound_of_performance_is_noted_once(tmp_path, action, limits_of, note):
     found, _ = notes(tmp_path, action, entities=slow(**limits_of), end=8.0)
     assert found == [note]
+
+
+def test_a_speed_that_is_kept_to_another_one_is_bounded_and_noted_once(tmp_path):
+    """The ego reaches 20 m/s within 1 s; the other one may gain 2 m/s in a second."""
+    action = speed(relative(0, continuous=True), "linear", 0.5)
+    ego = story(
+        event("ego_e", private(speed(to(20), "linear", 1)), time(1.975)), actor="ego", name="b"
+    )
+    stories = story(event("e", private(action), time(0.975))) + ego
+    found, _ = notes(tmp_path, stories=stories, entities=slow(maxAcceleration=2), end=6.0)
+    (note,) = found
+    assert note.startswith("<SpeedAction> of other: ")
+    assert note.endswith("2 m/s^2 applied (maxAcceleration)")
+
+
+def test_the_acceleration_of_a_profile_is_bounded_and_noted(tmp_path):
+    action = smooth_profile(20, up=2, down=2).replace('"follow"', '"position"')
+    found, _ = notes(tmp_path, action, entities=slow(maxAcceleration=2), end=6.0)
+    (note,) = found
+    assert note.startswith("<SpeedProfileAction> of other: maxAcceleration 3 m/s^2 asked, 2 m/s^2 ")
+    assert note.endswith("(that of its <Performance> or 10)")
+
+
+@pytest.mark.parametrize(
+    ("action", "note"),
+    [
+        (
+            beside(2.5, "left", axes="road", limits='maxSpeed="3"'),
+            "speed to the side 3 m/s asked, 0.999999 m/s applied (it goes no faster)",
+        ),
+        (
+            beside(2.5, "left", limits='maxAcceleration="2000"'),
+            (
+                "maxAcceleration 2000 m/s^2 asked, 3 m/s^2 applied "
+                "(0.001 to 1000 m/s^2 and a turn of 0.5 m or more)"
+            ),
+        ),
+    ],
+)
+def test_a_distance_aside_is_closed_within_bounds_that_are_noted_once(tmp_path, action, note):
+    begins = at("ego", -3, 100, 1) + at("other", -1, 100, 1)
+    found, _ = notes(tmp_path, action, init=begins, end=6.0)
+    assert found == [f"<LateralDistanceAction> of other: {note}"]
+
+
+def test_an_offset_that_is_kept_is_bounded_by_the_own_speed_and_noted_once(tmp_path):
+    """The ego goes aside by 3 m at once; the other one, which keeps its side, goes at 1 m/s."""
+    keeps = lane_offset(3.5, "step", other="ego").replace('continuous="false"', 'continuous="true"')
+    ego = story(
+        event("ego_e", private(lane_offset(3.0, "step")), time(1.975)), actor="ego", name="b"
+    )
+    stories = story(event("e", private(keeps), time(0.975))) + ego
+    begins = at("ego", -2, 100, 20) + at("other", -1, 120, 1)
+    found, _ = notes(tmp_path, init=begins, stories=stories, end=4.0)
+    (note,) = found
+    assert note.startswith("<LaneOffsetAction> of other: speed to the side ")
+    assert note.endswith(" 1 m/s applied (it goes no faster)")
+
+
+def test_a_meeting_that_asks_to_stop_too_late_is_noted_once(tmp_path):
+    """9 s and 6 m before the meeting at 5 m/s it has to stop from 20 m/s: 35 m/s^2."""
+    final = '<FinalSpeed><AbsoluteSpeed value="5"/></FinalSpeed>'
+    action = synchronize("ego", on_lane(-3, 200), on_lane(-1, 146), final)
+    begins = at("ego", -3, 100, 10) + at("other", -1, 120, 20)
+    found, _ = notes(tmp_path, action, init=begins, end=6.0)
+    (note,) = found
+    assert note.startswith("<SynchronizeAction> of other: deceleration ")
+    assert note.endswith("8 m/s^2 applied (of an entity that stops on the way)")
 
 
 def test_no_entity_goes_sideways_faster_than_it_goes_and_the_log_says_so(tmp_path):

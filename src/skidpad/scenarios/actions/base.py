@@ -46,17 +46,23 @@ class NoEffect:
 
 def note_bound(
     scene: Scene, actor: Actor, element: str, asked: float, applied: float, of: str
-) -> None:
-    """Says what a bound makes of an action, once; of: the quantity, its unit and the bound's name."""
+) -> bool:
+    """Says what a bound makes of an action; of: the quantity, its unit and the bound's name.
+
+    Returns whether the bound acts.
+    """
     quantity, unit, bound = of.split(", ")
-    if abs(asked - applied) > SAME * max(abs(asked), abs(applied)):
+    acts = abs(asked - applied) > SAME * max(abs(asked), abs(applied))
+    if acts:
         scene.notice(
             f"<{element}> of {actor.name}: {quantity} {asked:g} {unit} asked, "
             f"{applied:g} {unit} applied ({bound})"
         )
+    return acts
 
 
 SAME = 1e-6  # relative difference of two values that are one
+ASIDE = "speed to the side, m/s, it goes no faster"  # what the own speed bounds
 
 
 class Dimension(Enum):

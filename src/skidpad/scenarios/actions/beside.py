@@ -8,6 +8,7 @@ from math import acos, asin, copysign, cos, inf, pi, sin, sqrt
 
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.roads.queries import LanePoint
+from skidpad.scenarios.actions.base import ASIDE, note_bound
 from skidpad.scenarios.actions.distance import SPRING
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.movement.measures import Axes, between
@@ -20,6 +21,7 @@ REACHED = 0.01  # m from the distance asked for
 MILD = 1.5  # largest curvature on the way to the line beside the other one, per mean
 RADIUS_MIN = 0.5  # m of a turn
 A_RANGE = 1e-3, 1e3  # m/s^2, within which an acceleration makes a turn
+ELEMENT = "LateralDistanceAction"
 
 
 class Side(Enum):
@@ -90,7 +92,7 @@ class DistanceKept:
     def __init__(self, action: LateralDistance, actor: Actor, sign: float) -> None:
         self.action, self.actor, self.sign = action, actor, sign
         self.v = self.a = 0.0  # to the left of the lane as it runs
-        self.waits = not action.straight
+        self.waits, self.noted = not action.straight, False
 
     def step(self, scene: Scene) -> bool:
         """Move the offset towards it as fast as is allowed."""
@@ -118,9 +120,9 @@ class DistanceKept:
     def _choose_speed(self, scene: Scene, excess: float) -> None:
         """Sets the speed to the left: straight to the distance, or by a spring within an acceleration."""
         bounds, dt = self.action.bounds, scene.dt
-        most = min(bounds.v, max(abs(self.actor.guide.v) - SLOW, 0.0))
+        own = max(abs(self.actor.guide.v) - SLOW, 0.0)
         if bounds.a == inf:
-            self.v = min(max(excess / dt, -most), most)
+            self.v = self._bound(scene, excess / dt, own)
             return
         other = scene.actors[self.action.other].motion  # whose drift counts in its own axes
         drift = other.vy * cos(other.yaw) - other.vx * sin(other.yaw)
@@ -128,7 +130,15 @@ class DistanceKept:
         a = stiffness * excess - 2.0 * sqrt(stiffness) * (self.v - drift)
         change = min(max(a - self.a, -bounds.jerk * dt), bounds.jerk * dt)
         self.a = min(max(self.a + change, -bounds.a), bounds.a)
-        self.v = min(max(self.v + self.a * dt, -most), most)
+        self.v = self._bound(scene, self.v + self.a * dt, own)
+
+    def _bound(self, scene: Scene, v: float, own: float) -> float:
+        """Returns a speed to the side within what the file allows and the own one; says the latter once."""
+        asked = min(abs(v), self.action.bounds.v)
+        applied = min(asked, own)
+        if not self.noted:
+            self.noted = note_bound(scene, self.actor, ELEMENT, asked, applied, ASIDE)
+        return copysign(applied, v)
 
     def _end(self, scene: Scene, base: LanePoint) -> float:
         """The offset at which the distance is kept, m; the sides are those of the other entity."""
@@ -156,7 +166,7 @@ class Approach:
 
     def __init__(self, action: LateralDistance, actor: Actor, sign: float, t: float) -> None:
         self.action, self.actor, self.sign = action, actor, sign
-        self.pose, self.t, self.v = actor.pose, t, actor.guide.v
+        self.pose, self.t, self.v, self.noted = actor.pose, t, actor.guide.v, False
         actor.lead(self, self, t)
 
     def at(self, t: float) -> tuple[Pose, float, float]:
@@ -181,7 +191,7 @@ class Approach:
         line = other.moved(left=self.sign * action.size(scene, actor))
         _, left = between(line, self.pose.x, self.pose.y)
         way = self.v * scene.dt
-        yaw = self._aim(line, left, way, scene.dt)
+        yaw = self._aim(scene, line, left, way)
         self.pose = Pose(
             self.pose.x + cos(yaw) * way, self.pose.y + sin(yaw) * way, self.pose.z, yaw=yaw
         )
@@ -190,13 +200,23 @@ class Approach:
         actor.leave_track(scene.network)
         return True
 
-    def _aim(self, line: Pose, left: float, way: float, dt: float) -> float:
+    def _radius(self, scene: Scene) -> float:
+        """Returns the radius of its turn, m; says once where that is not the allowed acceleration's."""
+        asked = self.action.bounds.a
+        a = min(max(asked, A_RANGE[0]), A_RANGE[1])
+        radius = max(RADIUS_MIN, MILD * self.v**2 / a)
+        applied = MILD * self.v**2 / radius
+        if not self.noted:
+            of = "maxAcceleration, m/s^2, 0.001 to 1000 m/s^2 and a turn of 0.5 m or more"
+            self.noted = note_bound(scene, self.actor, ELEMENT, asked, applied, of)
+        return radius
+
+    def _aim(self, scene: Scene, line: Pose, left: float, way: float) -> float:
         """Returns the heading of a step of so many m, from `left` m beside the line."""
-        away, size = abs(left), abs(way)
+        away, size, dt = abs(left), abs(way), scene.dt
         if away < 1e-6 or size < SLOW:
             return line.yaw
-        a = min(max(self.action.bounds.a, A_RANGE[0]), A_RANGE[1])
-        radius = max(RADIUS_MIN, MILD * self.v**2 / a)
+        radius = self._radius(scene)
         if away < 0.5 * size and 0.5 * size > radius:
             return wrap_angle(line.yaw - copysign(asin(away / size), left))
         across = wrap_angle(line.yaw - copysign(0.5 * pi, left) - self.pose.yaw)

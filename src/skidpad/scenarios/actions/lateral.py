@@ -5,7 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import cos, sqrt
 
-from skidpad.scenarios.actions.base import Dimension, Dynamics, Following, dynamics, note_bound
+from skidpad.scenarios.actions.base import (
+    ASIDE,
+    Dimension,
+    Dynamics,
+    Following,
+    dynamics,
+    note_bound,
+)
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.movement.motion import SHARPEST, SLOW, Guide, Shape, Transition
 from skidpad.scenarios.movement.network import next_lane_id
@@ -48,16 +55,18 @@ class ChangeOfOffset:
         pace = v / sqrt(1.0 + slope * slope) if self.by_way else 1.0
         if not self.by_way and abs(slope) > v:
             pace = v / abs(slope)  # no actor goes sideways faster than it goes
-            element = "LaneChangeAction" if self.to_lane else "LaneOffsetAction"
-            if not self.noted:
-                of = "speed to the side, m/s, it goes no faster"
-                note_bound(scene, actor, element, abs(slope), v, of)
-            self.noted = True
+            self._note(scene, abs(slope), v)
         begin, self.done = self.done, self.done + pace * scene.dt
         now = self.done if self.to_lane else begin
         guide.offset, slope, bend = self.change.at(now)
         guide.offset_rate, guide.offset_bend = slope * pace, bend * pace * pace
         return self.change.over(now)
+
+    def _note(self, scene: Scene, asked: float, applied: float) -> None:
+        """Says once that it should move aside faster than it goes."""
+        element = "LaneChangeAction" if self.to_lane else "LaneOffsetAction"
+        if not self.noted:
+            self.noted = note_bound(scene, self.actor, element, asked, applied, ASIDE)
 
 
 class SteeredChange(ChangeOfOffset):
@@ -97,6 +106,7 @@ class OffsetKept(ChangeOfOffset):
             most = abs(guide.v) * scene.dt
             way = self.action.target(scene, self.actor) - guide.offset
             move = min(max(way, -most), most)
+            self._note(scene, abs(way) / scene.dt, abs(move) / scene.dt)
             guide.offset, guide.offset_rate = guide.offset + move, move / scene.dt
         return self.actor.lateral is not self or self.actor.track is not None
 

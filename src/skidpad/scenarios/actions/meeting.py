@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from math import cos, inf, sqrt
 
+from skidpad.scenarios.actions.base import note_bound
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.movement.network import Place
 from skidpad.scenarios.places.positions import Position, position
@@ -77,6 +78,7 @@ class Synchronized:
         v = actor.guide.v or action.v_end or 0.0
         self.sense = -1.0 if v < 0.0 else 1.0  # backwards, or ahead
         self.v_moved = abs(actor.guide.v)  # m/s, of the step before
+        self.noted = False
 
     def step(self, scene: Scene) -> bool:
         """Demand the speed of the end of this step."""
@@ -104,7 +106,10 @@ class Synchronized:
         if v_end is None:
             v = before + 2.0 * (own * pace / its - before) / (its / pace) * dt
         else:
-            v = max(self._speed(before, own, its / pace, self.sense * v_end, scene), 0.0)
+            asked = self._speed(before, own, its / pace, self.sense * v_end, scene)
+            v = max(asked, 0.0)
+            if self.phase is Phase.STRAIGHT:
+                self._note(scene, asked, v, "speed, m/s, it does not turn round")
             self.v_moved = before
         guide.a, guide.v = self.sense * (v - before) / dt, self.sense * v
         return False
@@ -138,7 +143,12 @@ class Synchronized:
         if (a < 0.0) is self.rising and a != 0.0:
             self.phase = Phase.STRAIGHT
             return v
-        return self._stopping(v, v_road, own, v_end, dt) if turn < 0.0 else v + a * dt
+        return self._stopping(scene, v, v_road, own, v_end) if turn < 0.0 else v + a * dt
+
+    def _note(self, scene: Scene, asked: float, applied: float, of: str) -> None:
+        """Says once what bounds its course."""
+        if not self.noted:
+            self.noted = note_bound(scene, self.actor, "SynchronizeAction", asked, applied, of)
 
     def _share_of_road(self, scene: Scene) -> float:
         """Part of its speed that runs along the road, of which esmini plans the course away.
@@ -149,11 +159,15 @@ class Synchronized:
         lane = scene.network.place_of(pose).lane
         return 1.0 if lane is None else abs(cos(pose.yaw - lane.heading))
 
-    def _stopping(self, v: float, v_road: float, own: float, v_end: float, dt: float) -> float:
+    def _stopping(self, scene: Scene, v: float, v_road: float, own: float, v_end: float) -> float:
         """The course would go backwards: stop on the way instead, then go on."""
-        time = 2.0 * v_road * own / (v_road * v_road + v_end * v_end)
+        dt, time = scene.dt, 2.0 * v_road * own / (v_road * v_road + v_end * v_end)
         if time * v_road / 2.0 > own / 2.0:
             self.phase = Phase.STOPPING
+            needed = (v_road * v_road + v_end * v_end) / (2.0 * own)
+            if needed > B_STOP:
+                of = "deceleration, m/s^2, of an entity that stops on the way"
+                self._note(scene, needed, B_STOP, of)
             return v - B_STOP * dt
         slower = v - (v_road / time if time > LEAST else 0.0) * dt
         if slower < 0.0:

@@ -23,6 +23,7 @@ from skidpad.scenarios.reading.entities import Performance
 from skidpad.scenarios.scene import Actor, Running, Scene
 
 ELEMENT, PROFILE = "SpeedAction", "SpeedProfileAction"
+MAX_SPEED = "speed, m/s, maxSpeed"
 
 
 class Relation(Enum):
@@ -67,7 +68,7 @@ class Speed:
         v, limits = actor.guide.v, actor.entity.performance
         asked = self.target.speed(scene)
         end = limit_speed(asked, limits)
-        note_bound(scene, actor, ELEMENT, asked, end, "speed, m/s, maxSpeed")
+        noted = note_bound(scene, actor, ELEMENT, asked, end, MAX_SPEED)
         if self.dynamics.following is Following.FOLLOW:
             bound = limits.a_max if end > v else limits.b_max
             if jerk_of(limits).is_limited or (self.dynamics.shape is Shape.STEP and bound < inf):
@@ -78,12 +79,13 @@ class Speed:
             span = self.dynamics.span(end - v)
         least = least_span(end - v, span, self.dynamics.shape, limits)
         if least > span:
-            note_bound(scene, actor, ELEMENT, span, least, duration_bound(end - v))
+            noted |= note_bound(scene, actor, ELEMENT, span, least, duration_bound(end - v))
         span = max(span, least)
         change = Transition(v, end, span, self.dynamics.shape)
         if self.at_once and self.target.other is not None:
             actor.guide.v = end
         going = ChangeOfSpeed(actor, change, scene.t, self)
+        going.noted = noted
         actor.pace_by(going, scene)
         return going
 
@@ -170,6 +172,7 @@ class ChangeOfSpeed:
     def __init__(self, actor: Actor, change: Transition, began: float, action: Speed) -> None:
         self.actor, self.change, self.began, self.action = actor, change, began, action
         self.late = 0.0  # s that the entity has lost to its own limits
+        self.noted = False
 
     def step(self, scene: Scene) -> bool:
         """Demand the speed of the end of this step."""
@@ -181,7 +184,7 @@ class ChangeOfSpeed:
             return self.change.over(t)
         end = self._aim(scene)
         v, a, _ = self.change.at(t)
-        limited = self._limit(v, scene.dt)
+        limited, self.noted = reachable(scene, self.actor, guide.v, v, self.noted)
         if limited != v and not self.change.over(t):
             self.late += scene.dt * (1.0 - (limited - guide.v) / (v - guide.v))
         guide.v, guide.a = limited, a
@@ -190,7 +193,9 @@ class ChangeOfSpeed:
     def _aim(self, scene: Scene) -> float:
         """Returns the speed asked for, as it is now, which becomes the end of the change."""
         dynamics, limits = self.action.dynamics, self.actor.entity.performance
-        end, span = limit_speed(self.action.target.speed(scene), limits), self.change.span
+        asked, span = self.action.target.speed(scene), self.change.span
+        end = limit_speed(asked, limits)
+        self.noted = self.noted or note_bound(scene, self.actor, ELEMENT, asked, end, MAX_SPEED)
         if dynamics.dimension is Dimension.RATE:
             size = end - self.change.start
             span = dynamics.span(size)
@@ -198,10 +203,16 @@ class ChangeOfSpeed:
         self.change = replace(self.change, end=end, span=span)
         return end
 
-    def _limit(self, v: float, dt: float) -> float:
-        """Returns a speed that the entity can have a step after its own one now."""
-        limits, now = self.actor.entity.performance, self.actor.guide.v
-        return min(max(v, now - limits.b_max * dt), now + limits.a_max * dt)
+
+def reachable(scene: Scene, actor: Actor, now: float, v: float, noted: bool) -> tuple[float, bool]:
+    """Returns a speed that an entity can have a step after another one, and whether a bound is noted."""
+    limits, dt = actor.entity.performance, scene.dt
+    limited = min(max(v, now - limits.b_max * dt), now + limits.a_max * dt)
+    if not noted:
+        asked, applied = abs(v - now) / dt, abs(limited - now) / dt
+        of = f"acceleration, m/s^2, {'maxAcceleration' if v > now else 'maxDeceleration'}"
+        noted = note_bound(scene, actor, ELEMENT, asked, applied, of)
+    return limited, noted
 
 
 class SmoothChange(SmoothProfile):
@@ -211,7 +222,7 @@ class SmoothChange(SmoothProfile):
         self, actor: Actor, began: float, pieces: list[Piece], end: float, follow: Target | None
     ) -> None:
         super().__init__(actor, began, pieces, end)
-        self.follow = follow
+        self.follow, self.noted = follow, False
 
     def step(self, scene: Scene) -> bool:
         """Demand the speed of the end of this step; afterwards that of the target, within limits."""
@@ -219,10 +230,9 @@ class SmoothChange(SmoothProfile):
         over = super().step(scene)
         if not over or self.follow is None or actor.longitudinal is not self:
             return over
-        limits = actor.entity.performance
-        wish = limit_speed(self.follow.speed(scene), limits) - before
-        a = min(max(wish / scene.dt, -limits.b_max), limits.a_max)
-        actor.guide.v, actor.guide.a = before + a * scene.dt, a
+        wish = limit_speed(self.follow.speed(scene), actor.entity.performance)
+        v, self.noted = reachable(scene, actor, before, wish, self.noted)
+        actor.guide.v, actor.guide.a = v, (v - before) / scene.dt
         return False
 
 
@@ -278,8 +288,8 @@ class Profile:
         """Returns the profile as straight lines between its speeds."""
         base = 0.0 if self.other is None else scene.actors[self.other].v_told
         own = actor.entity.performance
-        a = min(self.limits.a_max, own.a_max, DEFAULT_CHANGE)
-        b = min(self.limits.b_max, own.b_max, DEFAULT_CHANGE)
+        a = self._most(scene, actor, "maxAcceleration", self.limits.a_max, own.a_max)
+        b = self._most(scene, actor, "maxDeceleration", self.limits.b_max, own.b_max)
         times, speeds = [scene.t], [actor.guide.v]
         for entry, duration in self.entries:
             v = limit_speed(base + entry, own)
@@ -288,6 +298,14 @@ class Profile:
             times.append(times[-1] + (needed if duration is None else duration))
             speeds.append(v)
         return Profiled(actor, times, speeds)
+
+    def _most(self, scene: Scene, actor: Actor, name: str, asked: float, own: float) -> float:
+        """Returns the acceleration of an entry without a time; says where it is not the file's."""
+        most = min(asked, own, DEFAULT_CHANGE)
+        if asked < inf and any(duration is None for _, duration in self.entries):
+            of = f"{name}, m/s^2, that of its <Performance> or {DEFAULT_CHANGE:g}"
+            note_bound(scene, actor, PROFILE, asked, most, of)
+        return most
 
 
 DEFAULT_CHANGE = 10.0  # m/s^2, where a profile's file and its vehicle set no limit

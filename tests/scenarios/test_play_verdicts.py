@@ -109,6 +109,60 @@ def test_an_event_of_a_partner_that_never_begins_makes_the_run_void(tmp_path):
     assert staging.partners == ("other",)
 
 
+BRAKES = '<ParameterDeclaration name="brakes" parameterType="boolean" value="false"/>'
+CHOSEN = by_value('<ParameterCondition parameterRef="brakes" value="true" rule="equalTo"/>')
+CHOOSE = """<GlobalAction><ParameterAction parameterRef="brakes"><SetAction value="true"/>
+</ParameterAction></GlobalAction>"""
+
+
+def variants(folder: Path, *more: str, delay: int = 1) -> Path:
+    """As Euro NCAP's CCR: one ahead, which brakes in the act of one variant only, after a delay."""
+    stop = event("stops", private(speed(to(0), "linear", 5, "rate")), time(delay))
+    return write(
+        folder,
+        parameters=BRAKES,
+        init=at("ego", -1, 100, 15) + at("other", -1, 145, 10),
+        stories=story(stop, start=CHOSEN) + "".join(more),
+        end=3.0,
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "delay", "verdict", "code"),
+    [
+        ((), 1, "passed", 0),
+        (("--param", "brakes=true"), 1, "passed", 0),
+        (("--param", "brakes=true"), 60, "void", 1),
+    ],
+)
+def test_a_variant_that_the_parameters_do_not_choose_is_not_staged(
+    tmp_path, words, delay, verdict, code
+):
+    file = variants(tmp_path, delay=delay)
+    done = play(file, "--out", tmp_path / "out", *BLIND, *words)
+    assert done.exit_code == code, done.output
+    found = verdict_of(tmp_path / "out")
+    assert found["verdict"] == verdict
+    never = "event 'stops' of other never began"
+    assert found["reasons"] == (never if verdict == "void" else "")
+    assert read_staging(tmp_path / "out").partners == (("other",) if words else ())
+
+
+def test_a_variant_that_an_event_may_choose_is_staged(tmp_path):
+    choose = story(event("chooses", CHOOSE, time(60)), actor="ego", name="later")
+    done = play(variants(tmp_path, choose), "--out", tmp_path / "out", *BLIND)
+    assert done.exit_code == 1, done.output
+    assert verdict_of(tmp_path / "out")["verdict"] == "void"
+
+
+def test_a_variant_without_events_is_void_where_its_partner_never_comes_near(tmp_path):
+    file = variants(tmp_path)
+    file.write_text(file.read_text("utf-8").replace('s="145"', 's="600"'), "utf-8")
+    done = play(file, "--out", tmp_path / "out", *BLIND)
+    assert done.exit_code == 1, done.output
+    assert verdict_of(tmp_path / "out")["verdict"] == "void"
+
+
 @pytest.mark.parametrize(("driver", "verdict"), [(BLIND, "void"), (("--stack", "ideal"), "passed")])
 def test_a_file_that_lets_the_ego_reverse_is_void_where_it_did_not(tmp_path, driver, verdict):
     """As in Euro NCAP's CPRA: a car reverses to somebody behind it, and no stack of ours does that."""

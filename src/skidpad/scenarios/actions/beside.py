@@ -122,7 +122,7 @@ class DistanceKept:
         bounds, dt = self.action.bounds, scene.dt
         own = max(abs(self.actor.guide.v) - SLOW, 0.0)
         if bounds.a == inf:
-            self.v = self._bound(scene, excess / dt, own)
+            self.v = self._limit_speed(scene, excess / dt, own)
             return
         other = scene.actors[self.action.other].motion  # whose drift counts in its own axes
         drift = other.vy * cos(other.yaw) - other.vx * sin(other.yaw)
@@ -130,9 +130,9 @@ class DistanceKept:
         a = stiffness * excess - 2.0 * sqrt(stiffness) * (self.v - drift)
         change = min(max(a - self.a, -bounds.jerk * dt), bounds.jerk * dt)
         self.a = min(max(self.a + change, -bounds.a), bounds.a)
-        self.v = self._bound(scene, self.v + self.a * dt, own)
+        self.v = self._limit_speed(scene, self.v + self.a * dt, own)
 
-    def _bound(self, scene: Scene, v: float, own: float) -> float:
+    def _limit_speed(self, scene: Scene, v: float, own: float) -> float:
         """Returns a speed to the side within what the file allows and the own one; says the latter once."""
         asked = min(abs(v), self.action.bounds.v)
         applied = min(asked, own)

@@ -48,7 +48,10 @@ class Value:
         return self._holds
 
     def _holds(self, scene: Scene) -> bool:
-        values = scene.variables if self.variable else scene.parameters
+        return self.holds_among(scene.variables if self.variable else scene.parameters)
+
+    def holds_among(self, values: Mapping[str, str]) -> bool:
+        """Tells whether it holds among these values."""
         return holds_between(self.rule, values[self.name], self.value)
 
 

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 from skidpad.recording.run.staging import StagedEvent, Staging
 from skidpad.scenarios.actions.base import NoEffect
 from skidpad.scenarios.actions.speed import Speed
+from skidpad.scenarios.actions.world import SetValue
 from skidpad.scenarios.conditions.by_entity import Collision
+from skidpad.scenarios.conditions.by_value import Value
 from skidpad.scenarios.scenario import Scenario
 from skidpad.scenarios.scene import Happening, Move
 from skidpad.scenarios.storyboard import Event, Group
-from skidpad.scenarios.triggers import AnyEntity
+from skidpad.scenarios.triggers import AnyEntity, Trigger
 
 
 def staging_of(
@@ -65,10 +67,37 @@ def _lets_ego_reverse(scenario: Scenario) -> bool:
 
 
 def _events(scenario: Scenario) -> Iterator[tuple[Group, Event]]:
+    """Yield the events that can begin with the run's parameters, each with its group."""
+    fixed = _fixed_parameters(scenario)
     acts = (act for story in scenario.storyboard.stories for act in story.acts)
+    acts = (act for act in acts if not _is_ruled_out(act.start, fixed))
     for group in (group for act in acts for group in act.groups):
-        for manoeuvre in group.manoeuvres:
-            yield from ((group, event) for event in manoeuvre.events)
+        for event in (event for manoeuvre in group.manoeuvres for event in manoeuvre.events):
+            if not _is_ruled_out(event.start, fixed):
+                yield group, event
+
+
+def _fixed_parameters(scenario: Scenario) -> Mapping[str, str]:
+    """Return the parameters that no action changes, with their values."""
+    actions = [a.worldwide for event in scenario.storyboard.events for a in event.actions]
+    changed = {
+        action.name
+        for action in (*scenario.start.actions, *actions)
+        if isinstance(action, SetValue) and not action.variable
+    }
+    return {name: value for name, value in scenario.parameters.items() if name not in changed}
+
+
+def _is_ruled_out(trigger: Trigger, fixed: Mapping[str, str]) -> bool:
+    """Tell whether parameters keep a trigger from ever firing, as that of a variant not chosen."""
+    never = (
+        any(
+            isinstance(c, Value) and not c.variable and c.name in fixed and not c.holds_among(fixed)
+            for c in (timed.condition for timed in group)
+        )
+        for group in trigger.groups
+    )
+    return bool(trigger) and all(never)
 
 
 def _others(event: Event, group: Group, ego: str) -> tuple[str, ...]:

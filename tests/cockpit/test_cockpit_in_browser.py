@@ -90,6 +90,7 @@ def picture_of(page, selector=".stage canvas"):
 def test_a_person_drives_in_a_browser_and_the_run_can_be_driven_again(browser, tmp_path):
     folder, errors = tmp_path / "run", []
     words = ["drive", "--no-browser", "--out", folder, "--vehicles", "6", "--sensors", "objects"]
+    words += ["--weather", "clear-noon"]
     with running(*words, cwd=tmp_path) as command:
         context, page = opened(browser, command.address(), errors)
         assert "token" not in page.url
@@ -100,6 +101,26 @@ def test_a_person_drives_in_a_browser_and_the_run_can_be_driven_again(browser, t
                 "collisions", "drives"} <= facts  # fmt: skip
         assert page.locator(".tiers li").all_text_contents() == list(TIERS)
         assert page.locator(".tiers li.lit").count() == 1
+        # one key lists all keys
+        keys = page.locator(".keys")
+        assert keys.count() == 0
+        page.keyboard.press("?")
+        keys.get_by_text("take over the wheel, hand it back").wait_for()
+        page.keyboard.press("Escape")
+        keys.wait_for(state="detached")
+        # how far to a stop stands as large as the speed, and is what braking on this grip takes
+        until(page, "() => +document.querySelector('.speed b').textContent > 20")
+        sizes = page.evaluate(
+            "['.speed b', '.stop b'].map(s => getComputedStyle(document.querySelector(s)).fontSize)"
+        )
+        assert sizes[0] == sizes[1]
+        speed, way, grip = page.evaluate(
+            "['.speed b', '.stop b', '.stop small:last-child']"
+            ".map(s => document.querySelector(s).textContent)"
+        )
+        assert float(way) == pytest.approx(
+            (float(speed) / 3.6) ** 2 / (2.0 * 9.81 * float(grip.split()[1])), abs=1.0
+        )
         # keys T, Y, U hide and show views
         depth = "() => document.querySelectorAll('.side figure')[1].style.display"
         page.keyboard.press("t")
@@ -213,6 +234,15 @@ def test_a_run_is_scrubbed_through_in_a_browser(browser, stored, tmp_path):
         page.mouse.click(box["x"] + 0.25 * box["width"], box["y"] + 20)
         until_fact(page, "time", "1.50 s")
         day = picture_of(page)[0]
+        # the address names the moment, and opens it again
+        until(page, "() => location.hash === '#t=1.5'")
+        page.keyboard.press("p")
+        page.goto(page.url.replace("#t=1.5", "#t=2.5"))
+        page.reload()
+        until_fact(page, "time", "2.50 s")
+        until(page, PAUSED)
+        page.mouse.click(box["x"] + 0.25 * box["width"], box["y"] + 20)
+        until_fact(page, "time", "1.50 s")
         page.keyboard.press("ArrowRight")
         until_fact(page, "time", "1.55 s")
         page.mouse.click(box["x"] + 0.6 * box["width"], box["y"] + 20)

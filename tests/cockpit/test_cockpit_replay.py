@@ -23,6 +23,7 @@ from skidpad.cockpit.film import stretch_of, write_film
 from skidpad.cockpit.pictures import colours
 from skidpad.cockpit.replay import RecordedRun, report_of
 from skidpad.cockpit.replaying import Replayer
+from skidpad.cockpit.source import opening_tick
 from skidpad.cockpit.studio import Studio, View, plane
 from skidpad.cockpit.watching import lines, standing
 from skidpad.cockpit.words import Link
@@ -173,6 +174,19 @@ def test_time_goes_where_it_is_told_to(driven):
     turn(100.0)
     feed.close()
     assert where == [20, 20, 23, 70, 0, 0, 10, 10, 99]
+
+
+def test_a_replay_begins_before_the_crash_at_the_highest_speed(driven, monkeypatch):
+    monkeypatch.setattr("skidpad.cockpit.source.BEFORE", 1.0)
+    recording = RecordedRun(driven[0])
+    recording.marks = [(40, "notice", "dusk")]
+    assert opening_tick(recording) == 0
+    speed = recording.log.v_ego
+    slow, fast = sorted((30, 90), key=lambda tick: speed[tick - 1])
+    recording.marks += [(slow, "crash", "contact"), (fast, "crash", "contact")]
+    assert opening_tick(recording) == fast - 20
+    recording.marks = [(10, "crash", "contact")]
+    assert opening_tick(recording) == 0
 
 
 @pytest.mark.req("A-275")

@@ -107,6 +107,7 @@ class Bridge:
         simple: Mapping[str, Callable[[], Word]] = {
             "pause": lambda: Pause(not self.told.get("paused", False)),
             "play": lambda: Pause(False),
+            "stand": lambda: Pause(True),
             "step": lambda: Step(int(value or 1)),
             "rate": lambda: Pace(float(value)),
             "seek": lambda: Seek(int(value)),

@@ -22,7 +22,7 @@ function layout() {  // as it was left in this browser
 }
 
 export default {
-  props: { tab: String, kind: String, tiers: Array, timeline: Object },
+  props: { tab: String, kind: String, tiers: Array, timeline: Object, help: Array },
   template: `
 <div class="cockpit" :class="kind" :style="{ '--side': side }">
   <div class="bar"><span ref="bar" class="said">connecting ...</span><span ref="wrong" class="wrong"></span></div>
@@ -33,10 +33,13 @@ export default {
   <div class="stage"><canvas ref="main"></canvas><div class="beside"><canvas ref="beside"></canvas><div class="hud"><div ref="other" class="mode"></div></div></div>
     <div class="hud">
       <div class="speed"><b ref="speed">-</b> km/h <span ref="gear" class="gear"></span></div>
+      <div class="stop" title="a full braking on the grip that the tyres find now"><small>stop in</small> <b ref="stop">-</b> m
+        <div class="gauge"><i ref="grip"></i></div><small ref="gripSaid"></small></div>
       <div ref="mode" class="mode"></div>
       <div class="pedals"><i ref="throttle" class="throttle"></i><i ref="brake" class="brake"></i>
         <span class="steer"><i ref="steer"></i></span></div>
     </div>
+    <div class="keys" v-if="helpShown" @click="helpShown = false"><h3>Keys</h3><dl><template v-for="[k, does] in help" :key="k"><dt>{{ k }}</dt><dd>{{ does }}</dd></template></dl></div>
     <div class="lamp" ref="lamp"></div>
     <div class="alert" ref="alert"></div>
     <div class="edge" title="drag: width of the small views" @pointerdown="$event.target.setPointerCapture($event.pointerId)"
@@ -56,7 +59,7 @@ export default {
   <div class="line" v-if="timeline"><canvas ref="line" width="1200" height="70" @pointerdown="seek"
     @pointermove="$event.buttons && seek($event)"></canvas></div>
 </div>`,
-  data: () => ({ wheels: [[4, 10], [45, 10], [4, 48], [45, 48]], ...layout() }),
+  data: () => ({ helpShown: false, wheels: [[4, 10], [45, 10], [4, 48], [45, 48]], ...layout() }),
   mounted() {
     this.keys = {}; this.history = []; this.pressed = false; this.shownAt = []; this.waiting = {};
     for (const name of this.tiers) this.$refs.tiers.append(Object.assign(document.createElement("li"), { textContent: name }));
@@ -89,9 +92,15 @@ export default {
       const scheme = location.protocol === "https:" ? "wss" : "ws";
       this.socket = new WebSocket(`${scheme}://${location.host}/stream?tab=${this.tab}`);
       this.socket.binaryType = "arraybuffer";
+      this.socket.onopen = () => this.follow();
       this.socket.onmessage = (e) => typeof e.data === "string" ? this.told(JSON.parse(e.data)) : this.picture(e.data);
       this.socket.onclose = () => { if (this.gone || this.ended) return; this.$refs.bar.textContent = "the connection is lost, trying again ...";
         setTimeout(() => this.open(), 1000); };
+    },
+    follow() {  // a link to a moment of a replay: #t=12.35
+      const at = /^#t=([\d.]+)$/.exec(location.hash);
+      if (this.kind !== "replay" || !at || this.followed) return;
+      this.followed = true; this.say("stand"); this.say("seek", Math.round(+at[1] / this.timeline.dt));
     },
     say(word, value = null) {
       if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ word, value }));
@@ -136,24 +145,28 @@ export default {
       const r = this.$refs, m = h.motion, s = h.stack, seat = h.seat; this.head = h; this.$el.dataset.paused = h.paused; this.$el.dataset.main = h.main; this.$el.dataset.extras = h.extras.join(" ");
       r.speed.textContent = Math.round(Math.abs(m.speed_kmh));
       r.gear.textContent = (m.reverse ? "R" : m.gear > 0 ? `D${m.gear}` : "N") + (seat.pressed_s > 0 ? `, brake held ${seat.pressed_s} s` : "");
+      r.stop.textContent = m.stop_m === null ? "-" : m.stop_m < 1000 ? m.stop_m : "> 999";
+      r.grip.style.width = `${100 * Math.min(m.grip || 0, 1)}%`; r.grip.style.background = this.ink(m.grip);
+      r.gripSaid.textContent = m.grip === null ? "no grip" : `grip ${m.grip.toFixed(2)}`;
       r.mode.textContent = s.mode || ""; this.$el.classList.toggle("manual", !!seat.manual);
       r.throttle.style.height = `${100 * (m.throttle || 0)}%`; r.brake.style.height = `${100 * (m.brake || 0)}%`;
       r.steer.style.left = `${50 - 50 * (m.steer || 0)}%`;
       r.lamp.textContent = (seat.beam ? `lamps ${seat.beam}` : "") + (seat.lamps && seat.lamps !== "sun" ? ` (${seat.lamps})` : "") + (m.handbrake ? "  handbrake" : "");
       const last = h.events.length ? h.events[h.events.length - 1] : null;
       r.alert.textContent = this.ended ? r.alert.textContent : last && h.t - last[0] < 2 && h.t >= last[0] ? last[1] : h.paused ? "paused" : "";
+      if (h.kind === "replay" && h.paused && location.hash !== `#t=${h.t}`) history.replaceState(null, "", `#t=${h.t}`);
       this.now = performance.now(); this.shownAt.push(this.now); this.shownAt = this.shownAt.filter((t) => this.now - t < 1000);
       const unit = (v, u) => v === null || v === undefined ? "-" : `${v} ${u}`;
       this.list([["time", `${h.t.toFixed(2)} s`], ["status", s.status || "-"], ["distance", unit(s.distance, "m")],
         ["time gap", unit(s.time_gap, "s")], ["bumper, roof", `${unit(s.bumper, "")} ${unit(s.roof, "m")}`],
         ["radar", unit(s.radar, "m")], ["radar limit", unit(s.radar_limit, "m/s")],
         ["light", s.light ? `${s.light} at ${s.light_at} m` : "-"], ["weather", seat.weather],
-        ["grip", seat.grip || ""], ["stop in", unit(m.stop_m, "m")], ["collisions", h.collisions], ["real time", h.rtf ? `${h.rtf.toFixed(2)} x` : h.kind === "replay" ? `${h.rate} x` : "-"],
+        ["grip", seat.grip || ""], ["collisions", h.collisions], ["real time", h.rtf ? `${h.rtf.toFixed(2)} x` : h.kind === "replay" ? `${h.rate} x` : "-"],
         ["pictures", `${this.shownAt.length}/s, ${h.dropped} dropped`], ["drives", seat.manual ? `you, by ${seat.method}` : "the stack"],
         ["on", seat.functions ? seat.functions.join(" ") || "nothing" : "-"], ...(h.added || [])]);
       [...r.tiers.children].forEach((li, i) => li.classList.toggle("lit", i === s.tier));
       m.mu.forEach((v, i) => { const w = r[`w${i}`][0], t = r[`m${i}`][0]; t.textContent = v === null ? "" : v.toFixed(2);
-        w.style.fill = v === null ? "#555" : `hsl(${Math.max(0, Math.min(1, (v - 0.1) / 0.8)) * 130}, 70%, 48%)`; });
+        w.style.fill = this.ink(v); });
       r.events.replaceChildren(...h.events.slice(-5).reverse().map(([t, text]) =>
         Object.assign(document.createElement("li"), { textContent: `${t.toFixed(1)} s  ${text}` })));
       if (h.note && h.note !== this.note) { this.note = h.note; r.bar.textContent = h.note; }
@@ -161,6 +174,7 @@ export default {
       if (h.beside) r.other.textContent = `${Math.round(Math.abs(h.beside.speed_kmh))} km/h  ${h.beside.mode}  ${h.beside.weather}  ${h.beside.collisions} collisions`;
       this.radar(h.radar); this.strip(h); if (this.timeline) this.line(h);
     },
+    ink(mu) { return mu === null ? "#555" : `hsl(${Math.max(0, Math.min(1, (mu - 0.1) / 0.8)) * 130}, 70%, 48%)`; },  // red: slippery
     list(rows) {
       const dl = this.$refs.facts;
       if (dl.children.length !== 2 * rows.length) dl.replaceChildren(...rows.flatMap(() => [document.createElement("dt"), document.createElement("dd")]));
@@ -216,6 +230,7 @@ export default {
       if (e.ctrlKey || e.metaKey || e.altKey || (tag === "INPUT" && focus.type !== "checkbox") || tag === "TEXTAREA") return;
       if (e.code in PEDALS && this.kind === "drive") { e.preventDefault(); if (!!this.keys[PEDALS[e.code]] !== down) { this.keys[PEDALS[e.code]] = down; this.beat(true); } return; }
       if (!down) return;
+      if (e.key === "?" || (e.key === "Escape" && this.helpShown)) { this.helpShown = !this.helpShown; return; }
       if (this.kind === "replay") {
         if (e.code === "Space") { e.preventDefault(); return this.say("pause"); }
         if (e.code === "ArrowLeft" || e.code === "ArrowRight") { e.preventDefault();

@@ -31,11 +31,16 @@ def round_value(value: float | None, digits: int = 2) -> float | None:
     return round(float(value), digits)
 
 
+def mean_grip(mu: NDArray[np.float32]) -> float | None:
+    """Returns the mean friction of the tyres that touch a road; None when none does."""
+    known = mu[np.isfinite(mu)]
+    return float(known.mean()) if known.size else None
+
+
 def stopping_distance(v: float, mu: NDArray[np.float32]) -> float | None:
     """Returns the way in m of a full braking from v (m/s) on what the tyres find now; None without grip."""
-    known = mu[np.isfinite(mu)]
-    grip = float(known.mean()) if known.size else 0.0
-    return None if grip <= 0.0 else v * v / (2.0 * grip * G)
+    grip = mean_grip(mu)
+    return None if not grip else v * v / (2.0 * grip * G)
 
 
 def motion(moment: Moment) -> dict[str, Any]:
@@ -51,6 +56,7 @@ def motion(moment: Moment) -> dict[str, Any]:
         "handbrake": bool(handbrake),
         "reverse": bool(reverse),
         "mu": [round_value(v) for v in truth.mu[0].tolist()],
+        "grip": round_value(mean_grip(truth.mu[0])),
         "stop_m": round_value(stopping_distance(ego.speed, truth.mu[0]), 0),
         "x": round_value(float(truth.states.x[0])),
         "y": round_value(float(truth.states.y[0])),

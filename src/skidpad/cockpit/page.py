@@ -47,17 +47,38 @@ EXTRAS = {
     Extra.CALM: "less camera noise",
 }
 RATES = {0.25: "0.25 x", 0.5: "0.5 x", 1.0: "1 x", 2.0: "2 x", 4.0: "4 x", 0.0: "as fast as it can"}
-HELP = (
-    "W S A D or arrows: pedals and wheel (hold the brake at standstill to reverse), space: handbrake, "
-    "M: take over and hand back, L: headlights, N: next weather, H: next time of day, C: camera, "
-    "T Y U: hide depth, classes, top, G: additions to the pictures, P: pause, full stop: one tick further; "
-    "drag a small view onto another to change places, the edge of the main view to change sizes"
-)
-HELP_REPLAY = (
-    "space or P: play and pause, arrows: one tick (with shift: 5 s), full stop: one tick further, "
-    "C: camera, T Y U: hide views, G: additions to the pictures; click a small view or the time line, "
-    "drag a small view onto another, or the edge of the main view"
-)
+Keys = list[tuple[str, str]]  # a key, and what it does
+KEYS_OF_VIEWS: Keys = [
+    ("C", "next camera: driver, follow, top, crash; or click a small view"),
+    ("T, Y, U", "hide or show depth, classes, view from the top"),
+    ("G", "additions to the pictures on and off"),
+    (
+        "drag",
+        "a small view onto another to change places; the edge of the main view to change sizes",
+    ),
+    ("?", "this list"),
+]
+KEYS: dict[str, Keys] = {
+    "drive": [
+        ("M", "take over the wheel, hand it back"),
+        (
+            "W S A D, arrows",
+            "throttle, brake, left, right; hold the brake at standstill to reverse",
+        ),
+        ("space", "handbrake"),
+        ("1 to 7", "switch a driving function on or off"),
+        ("L", "headlights: automatic, low, high, off"),
+        ("N, H", "next weather, next time of day"),
+        ("P, full stop", "pause, one tick further"),
+        *KEYS_OF_VIEWS,
+    ],
+    "replay": [
+        ("space, P", "play, pause"),
+        ("arrows", "one tick back or further, with shift 5 s"),
+        ("time line", "click it to go there"),
+        *KEYS_OF_VIEWS,
+    ],
+}
 
 
 class Canvases(Element, component="cockpit.js"):
@@ -69,6 +90,7 @@ class Canvases(Element, component="cockpit.js"):
         self._props["kind"] = kind
         self._props["tiers"] = list(TIERS)
         self._props["timeline"] = timeline
+        self._props["help"] = KEYS[kind]
 
 
 class Panel:
@@ -148,7 +170,7 @@ def build(bridge: Bridge, about: About) -> Callable[[], None]:
                 if kind == "drive":
                     drive_controls(panel)
                     weather_controls(panel)
-                ui.label(HELP if kind == "drive" else HELP_REPLAY).classes("help")
+                ui.label("?: what every key does").classes("help")
         ui.timer(SYNC, panel.sync)
 
     return page

@@ -13,7 +13,7 @@ from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.film import write_film
 from skidpad.cockpit.opening import open_source
 from skidpad.cockpit.screen import Screen, Shown
-from skidpad.cockpit.source import Source, index_at
+from skidpad.cockpit.source import Source, index_at, opening_tick
 from skidpad.cockpit.studio import MAIN, View
 from skidpad.cockpit.words import Link
 from skidpad.core.errors import OutputError
@@ -34,7 +34,9 @@ def replay_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
     other = None if about["beside"] is None else open_source(Path(about["beside"]))
     feed, link = Feed(feed_name), Link(pipe)
     try:
-        Replayer(source, feed, link, other=other, scenery=Scenery(about["scenery"])).run()
+        replayer = Replayer(source, feed, link, other=other, scenery=Scenery(about["scenery"]))
+        link.seek = opening_tick(source) if about["at"] is None else round(about["at"] / DT)
+        replayer.run()
     finally:
         feed.close()
     return f"replayed {about['path']}"
@@ -66,8 +68,12 @@ class Replayer:
         self._shown_k, self._shown_at = -1, 0.0
 
     def run(self) -> None:
-        """Shows the replay until the page ends it."""
+        """Shows the replay until the page ends it; time stands until a page has taken a picture."""
+        self.turn()
         self.show()
+        while self.screen.feed.taken == 0 and not self.link.ended:
+            self.link.drain(PATIENCE)
+        self._from(self.k)
         while not self.link.ended:
             heard = self.link.drain(PATIENCE)
             if self.link.film is not None:

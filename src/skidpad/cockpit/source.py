@@ -110,6 +110,31 @@ def index_at(source: Source, tick: int) -> int:
     return min(bisect_left(range(source.ticks), tick, key=source.tick), source.ticks - 1)
 
 
+BEFORE = 5.0  # s, with which a replay begins before what is worth seeing
+
+
+def opening_tick(source: Source) -> int:
+    """The tick with which a replay begins: shortly before the crash at the highest speed, or a hazard.
+
+    The first one of the source where there is neither.
+    """
+    crashes = [tick for tick, kind, _ in source.marks if kind == "crash"]
+    hazards = [first for first, _, _ in source.curves().hazards]
+    begin = source.tick(0)
+    if crashes:
+        worst = max(crashes, key=lambda tick: _speed_before(source, tick))
+    elif hazards:
+        worst = hazards[0]
+    else:
+        return begin
+    return max(worst - round(BEFORE / DT), begin)
+
+
+def _speed_before(source: Source, tick: int) -> float:
+    k = max(index_at(source, tick) - 1, 0)
+    return source.moment(k).frame.ego.speed
+
+
 def timeline(source: Source) -> dict[str, Any]:
     """What the page draws along the time: speed, time to collision, events, tiers, hazards."""
     return {

@@ -49,7 +49,7 @@ def drive(
     tuned: Tuned,
     backend: BackendChoice,
     pages: Pages,
-    weather: Annotated[str, typer.Option(help="A preset or a YAML file.")] = "clear-noon",
+    weather: Annotated[str, typer.Option(help="A preset or a YAML file.")] = "rain-noon",
     seed: Annotated[int, typer.Option(help="Of traffic and noise.")] = 1,
     scenario: Annotated[
         str,
@@ -149,6 +149,10 @@ def replay(
     hazard: Annotated[
         str | None, typer.Option("--id", help="Which hazard of a monitor's folder.")
     ] = None,
+    at: Annotated[
+        float | None,
+        typer.Option(min=0.0, help="s, where it begins; default: before the worst crash."),
+    ] = None,
     film: Annotated[
         Path | None, typer.Option(help="Write a film (.mp4 or .webp) instead of a page.")
     ] = None,
@@ -186,6 +190,7 @@ def replay(
     what = {
         "path": str(run),
         "hazard": hazard,
+        "at": at,
         "beside": None if beside is None else str(beside),
         "scenery": scenery.value,
     }

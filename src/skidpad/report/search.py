@@ -15,11 +15,13 @@ from skidpad.recording.campaign.searches import (
     Change,
     Findings,
     Group,
+    Hazard,
     Search,
     Trial,
     distinct_failures,
     failure_folder,
     read_findings,
+    read_hazard,
     read_search,
     read_trials,
 )
@@ -38,6 +40,10 @@ from skidpad.report.elements.page import (
     write_report_page,
 )
 
+VARIED_SCENE = (
+    "The scene holds what one channel saw. EgoSpeed (m/s) and EgoAhead (m) are where and how fast the ego "
+    "begins, OthersPace is how fast all others go their recorded ways; they do not react to the ego."
+)
 LISTED = 20  # failures in the table
 
 
@@ -45,7 +51,9 @@ def write_search_report(out: Path) -> str:
     """Write the page of a search; returns the text to print."""
     search, trials, findings = read_search(out), read_trials(out), read_findings(out)
     write_report_page(search_page(out, search, trials, findings), out)
+    hazard = read_hazard(out)
     lines = [answer(search, trials, findings)]
+    lines += [] if hazard is None else hazard_sentences(hazard)
     lines += [group_sentence(g) for g in findings.groups]
     lines += [f"page: {out / REPORT}"]
     if findings.groups:
@@ -62,6 +70,10 @@ def search_page(out: Path, search: Search, trials: Sequence[Trial], findings: Fi
         Section("Coverage", _coverage(search, trials)),
         Section("What was searched", [_variables(search, trials), Text(_method(search), "note")]),
     ]
+    hazard = read_hazard(out)
+    if hazard is not None:
+        told = [Text(sentence) for sentence in hazard_sentences(hazard)]
+        sections.insert(1, Section("The hazard", [*told, Text(VARIED_SCENE, "note")]))
     course = search.template.course
     title = f"Search: {getattr(course, 'title', 'scenario')}"
     run = search.template
@@ -87,6 +99,42 @@ def answer(search: Search, trials: Sequence[Trial], findings: Findings) -> str:
         f"{count_text(len(failing), 'failure')} of {driver} in {runs}, the first in run "
         f"{failing[0].number + 1}. {known}{kinds}: {judges_text(different)}."
     )
+
+
+def hazard_sentences(hazard: Hazard) -> list[str]:
+    """Return how near a hazard was, and what would have made it a crash, in two or three sentences."""
+    first = (
+        f"{hazard.title}: as recorded {_nearness(hazard.recorded)}; with the searched driver in the "
+        f"ego's place {_nearness(hazard.driven)}."
+    )
+    if hazard.failing is None:
+        return [first, "No crash was found around it; this is no proof that there is none."]
+    if not hazard.changes:
+        return [first, "So it is a crash as it was recorded."]
+    changes = " and ".join(
+        f"{c.name} {_precise(c.failing)} instead of {_precise(c.harmless)}" for c in hazard.changes
+    )
+    found = [first, f"It would have been a crash with {changes}: {hazard.failing.kind}."]
+    if hazard.likelihood is not None:
+        times = f"{hazard.likelihood:.3g} times as likely as the likeliest ones"
+        found += [f"Given the exposure, these values are {times}."]
+    return found
+
+
+def _nearness(trial: Trial) -> str:
+    """Return how near a run came, in words."""
+    if trial.fault:
+        return f"it could not be driven ({trial.fault})"
+    if trial.contact_kmh is not None:
+        return f"there was a contact of {trial.contact_kmh:.1f} km/h with {trial.other}"
+    if trial.departed_s is not None:
+        return "the ego left the road"
+    if trial.min_gap_m is None:
+        return "nobody was met"
+    ttc = (
+        "" if trial.min_ttc_s is None else f", the least time to collision {trial.min_ttc_s:.1f} s"
+    )
+    return f"the least gap was {trial.min_gap_m:.1f} m{ttc}"
 
 
 def judges_text(failures: Sequence[Trial]) -> str:

@@ -17,9 +17,11 @@ from skidpad.core.space import Space
 from skidpad.recording.campaign.searches import (
     CHOICES,
     FOUND,
+    HAZARD,
     Change,
     Findings,
     Group,
+    Hazard,
     Search,
     Trial,
     distinct_failures,
@@ -114,6 +116,11 @@ def look_at_failures(found: Search, trials: Sequence[Trial], runner: Runner) -> 
 def kept_trials(groups: Sequence[Group]) -> list[Trial]:
     """Return the failures that are kept as runs: the first ones of each group."""
     return [trial for group in groups for trial in group.failures[:KEPT]]
+
+
+def write_hazard(out: Path, hazard: Hazard) -> None:
+    """Write what a search found about the hazard that it began from."""
+    write_bytes(out / HAZARD, msgspec.json.format(msgspec.json.encode(hazard)))
 
 
 def write_findings(out: Path, found: Search, findings: Findings) -> None:

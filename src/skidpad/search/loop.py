@@ -32,6 +32,7 @@ from skidpad.search.methods import batch_sizes, make_method
 from skidpad.search.trial import Point, drive_point, unit_tuple, with_reference
 
 DEADLINE_S = 600.0  # of one run
+SCENE = "scene"  # folder of the scenarios that a hazard was made into
 
 
 def write_search(out: Path, search: Search, *, resume: bool) -> list[Trial]:
@@ -51,17 +52,23 @@ def begin_risk(out: Path, asked: Risk, *, resume: bool) -> list[Trial]:
 def _begin(
     out: Path, name: str, asked: Struct, read: Callable[[Path], Struct], runs: str, resume: bool
 ) -> list[Trial]:
+    check_folder(out, name, resume=resume)
     if (out / name).is_file():
-        if not resume:
-            raise OutputError(f"{out} holds results already: give --resume, or another --out")
         if msgspec.json.encode(read(out)) != msgspec.json.encode(asked):
             raise OutputError(f"{out} was begun with other options: give another --out")
         return read_trials(out, runs)
-    if out.exists() and any(out.iterdir()):
-        raise OutputError(f"{out} is not empty and holds no {name}: give another --out")
     out.mkdir(parents=True, exist_ok=True)
     write_bytes(out / name, msgspec.json.format(msgspec.json.encode(asked)))
     return []
+
+
+def check_folder(out: Path, name: str = SEARCH, *, resume: bool) -> None:
+    """Raise OutputError where a folder holds anything but a scene, or results that are not resumed."""
+    if (out / name).is_file():
+        if not resume:
+            raise OutputError(f"{out} holds results already: give --resume, or another --out")
+    elif out.exists() and any(path.name != SCENE for path in out.iterdir()):
+        raise OutputError(f"{out} is not empty and holds no {name}: give another --out")
 
 
 def search(found: Search, out: Path, runner: Runner, known: Sequence[Trial]) -> Iterator[Trial]:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from msgspec import Meta, Struct
 
 from skidpad.cli.options.asked import EgoStack, PlayCross, Tuned
-from skidpad.cli.scenarios.varied import Batches, VariedFile, Vary, scenario_options, vary_scenario
+from skidpad.cli.scenarios.varied import Batches, Vary, scenario_options, vary_scenario
 from skidpad.core.run import RunSpec, Scenario
 
 if TYPE_CHECKING:
     from skidpad.recording.campaign.searches import Search, Trial
+    from skidpad.search.hazard import Scene
 
 
 class Varied(Struct, frozen=True):
@@ -36,7 +38,6 @@ class Varied(Struct, frozen=True):
 
 @scenario_options
 def search(
-    file: VariedFile,
     varied: Varied,
     cross: PlayCross,
     ego: EgoStack,
@@ -44,6 +45,30 @@ def search(
     scenario: Scenario,
     tuned: Tuned,
     how: Batches,
+    file: Annotated[
+        Path | None,
+        typer.Argument(
+            help="A scenario (.xosc), a file of parameter distributions for one, or a name of the "
+            "catalogue; not with --from."
+        ),
+    ] = None,
+    source: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            help="Search around a hazard instead: a folder of `skidpad monitor`, its hazards.txt, a "
+            "fleet's record, or a .xosc of `skidpad hazards export`.",
+        ),
+    ] = None,
+    hazard: Annotated[
+        str | None, typer.Option("--hazard", help="Which one of --from, by its id.")
+    ] = None,
+    exposure: Annotated[
+        Path | None,
+        typer.Option(
+            "--exposure", help="YAML that says how likely values are, as for `skidpad risk`."
+        ),
+    ] = None,
 ) -> None:
     """Find the values of a scenario that make the ego crash or leave the road.
 
@@ -51,27 +76,45 @@ def search(
     reference driver avoids in the same place, or that braking or steering from the same state avoids;
     others are listed apart. The page shows each kind with the smallest change that makes it harmless.
     """
-    from skidpad.core.errors import require_choice
+    from skidpad.core.errors import ConfigError, require_choice
     from skidpad.recording.campaign.searches import Search
-    from skidpad.search.loop import write_search
+    from skidpad.search.exposure import NO_EXPOSURE, read_exposure
+    from skidpad.search.loop import check_folder, write_search
     from skidpad.search.margin import OBJECTIVES
     from skidpad.search.methods import METHODS
 
     require_choice("--method", varied.method, tuple(METHODS))
     require_choice("--objective", varied.objective, tuple(OBJECTIVES))
-    template, space = vary_scenario(file, varied.vary, (), cross, ego, run, scenario, tuned)
+    if (file is None) == (source is None):
+        raise ConfigError("a search begins from a scenario or from a hazard: give FILE or --from")
+    if hazard is not None and source is None:
+        raise ConfigError("--hazard chooses one of --from")
+    likely = NO_EXPOSURE if exposure is None else read_exposure(exposure)
+    scene = None
+    below = likely.variables
+    if source is not None:
+        from skidpad.search.hazard import prepare_scene
+
+        check_folder(how.out, resume=how.resume)
+        scene = prepare_scene(source, hazard, how.out)
+        file, below = scene.varied, (*scene.variables, *below)
+    assert file is not None
+    template, space = vary_scenario(file, varied.vary, below, cross, ego, run, scenario, tuned)
     found = Search(
         run=template.to_plain(), space=space, method=varied.method, objective=varied.objective,
         budget=varied.budget, seed=varied.search_seed,
     )  # fmt: skip
-    _drive(found, how, write_search(how.out, found, resume=how.resume))
+    known = write_search(how.out, found, resume=how.resume)
+    _drive(found, how, known, scene, has_exposure=exposure is not None)
     from skidpad.report.search import write_search_report
 
     typer.echo(write_search_report(how.out))
 
 
-def _drive(found: Search, how: Batches, known: Sequence[Trial]) -> None:
-    from skidpad.search.failures import look_at_failures, write_findings
+def _drive(
+    found: Search, how: Batches, known: Sequence[Trial], scene: Scene | None, *, has_exposure: bool
+) -> None:
+    from skidpad.search.failures import look_at_failures, write_findings, write_hazard
     from skidpad.search.loop import search as drive_search
 
     with how.drive() as (runner, shown):
@@ -83,3 +126,7 @@ def _drive(found: Search, how: Batches, known: Sequence[Trial]) -> None:
             shown.update(bar, advance=1, description=f"searching, {failures} failures")
         shown.update(bar, description="looking at failures")
         write_findings(how.out, found, look_at_failures(found, trials, runner))
+        if scene is not None:
+            from skidpad.search.hazard import judge_hazard
+
+            write_hazard(how.out, judge_hazard(found, scene, trials, runner, has_exposure))

@@ -15,6 +15,7 @@ from skidpad.core.space import Space, Value
 
 SEARCH, TRIALS = "search.json", "trials.jsonl"
 FOUND, FAILURES, CHOICES = "found.json", "failures", "failures.xosc"
+HAZARD = "hazard.json"
 LARGEST = 1024**3  # bytes of a file
 FRONT = "front"  # of the ego
 
@@ -142,6 +143,26 @@ class Findings(Struct, frozen=True, forbid_unknown_fields=True):
     groups: tuple[Group, ...]
 
 
+class Hazard(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The hazard that a search began from: `hazard.json` in its folder.
+
+    Attributes:
+        title: its id and type, or the name of its file.
+        recorded: the scene as recorded, the ego, too.
+        driven: the same with the searched driver in the ego's place.
+        changes: what would have made it a crash: the values that part `driven` from `failing`.
+        failing: the nearest failure on the way from `driven`; None where none was found.
+        likelihood: of its values beside the likeliest ones; None without an exposure.
+    """
+
+    title: str
+    recorded: Trial
+    driven: Trial
+    changes: tuple[Change, ...] = ()
+    failing: Trial | None = None
+    likelihood: float | None = None
+
+
 def distinct_failures(trials: Iterable[Trial]) -> list[Trial]:
     """Return the failures, each drive once (decision T-3)."""
     found: dict[str, Trial] = {}
@@ -180,6 +201,11 @@ def read_trials(out: Path, name: str = TRIALS) -> list[Trial]:
 def failure_folder(out: Path, number: int) -> Path:
     """Return the folder of a failure that is kept as a run."""
     return out / FAILURES / f"{number:05d}"
+
+
+def read_hazard(out: Path) -> Hazard | None:
+    """Return the hazard that a search began from; None where it began from a scenario."""
+    return read_stored(out, HAZARD, Hazard) if (out / HAZARD).is_file() else None
 
 
 def read_findings(out: Path) -> Findings:

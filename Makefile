@@ -9,7 +9,7 @@ TEST_ARGS ?=
 DRIVE_ARGS ?=
 NIGHTLY_ARGS ?=
 
-.PHONY: cockpit run published results test test-all test-times test-bare check wheel-check bench oracle fuzz nightly soak refs data fleet fleet-load docs figures gallery arm64 channels campaigns tables clean
+.PHONY: cockpit run published results test test-all test-times test-bare check wheel-check bench oracle fuzz nightly soak refs data fleet fleet-load docs figures gallery arm64 channels campaigns tables docs-run clean
 
 # ten seeds of every distinct cell on objects, one of them once more on pixels
 run: $(VENV)/.installed
@@ -123,6 +123,10 @@ tables: $(VENV)/.installed
 docs: $(VENV)/.documented-with
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 	@echo "the site is at build/site/index.html"
+
+# every block of README and docs/ in full, before a release; the times are kept in docs/results/docs-run.csv
+docs-run: $(VENV)/.tested-with
+	$(BIN)/python tools/docs_run.py
 
 # figures of docs/physics.md and the README's pictures; REPORT=out/adas: its first page too
 REPORT ?=

@@ -11,6 +11,7 @@ from skidpad.campaign.runs.run import run
 from skidpad.core.errors import ConfigError
 from skidpad.core.registry import Source
 from skidpad.core.run import AdasDriver, Function, run_from_plain
+from skidpad.core.specs import PointSensorSpec
 from skidpad.core.vocabulary import Outcome
 from skidpad.stack.configurations import parse_functions
 from skidpad.stack.functions import FUNCTIONS, FunctionType
@@ -36,6 +37,34 @@ class Limp:
         return {"ticks": self.ticks}
 
 
+class Cautious(Limp):
+    """Asks for a sensor of its own and takes the throttle away above 1 m/s."""
+
+    def __init__(self, map, dt):
+        self.v = 0.0
+
+    def sensors(self):
+        """A speedometer, which the stack itself has not."""
+        return (PointSensorSpec("speed", "speedometer"),)
+
+    def update(self, frame, command):
+        """No throttle above 1 m/s."""
+        self.v = frame.extra["speed"]
+        return replace(command, throttle=0.0) if self.v > 1.0 else command
+
+    def numbers(self):
+        """What the sensor said."""
+        return {"v_mps": self.v}
+
+
+class Raises(Limp):
+    """Fails in its first tick."""
+
+    def update(self, frame, command):
+        """A fault of its author's."""
+        raise KeyError("thermometer")
+
+
 class Wrong(Limp):
     """Gives no command."""
 
@@ -43,10 +72,13 @@ class Wrong(Limp):
         """Nothing."""
 
 
+KINDS = {"limp": Limp, "cautious": Cautious, "careful": Cautious, "raises": Raises, "wrong": Wrong}
+
+
 @pytest.fixture(autouse=True)
 def _registered(monkeypatch):
     found = dict(FUNCTIONS.sources())
-    for name, kind in (("limp", Limp), ("wrong", Wrong)):
+    for name, kind in KINDS.items():
         entry = FunctionType(name, f"To {name}", "ticks", kind)
         found[name] = Source(name, "a package", partial(lambda entry: entry, entry))
     monkeypatch.setattr(FUNCTIONS, "_sources", found)
@@ -84,6 +116,21 @@ def test_it_changes_what_the_stack_asks_for_and_is_shown_and_recorded():
     assert before[0][2] == []
     assert plain.readings is None
     assert changed.readings.table["limp.ticks"].to_list() == list(range(1, len(after) + 1))
+
+
+def test_functions_read_the_sensors_that_they_ask_for():
+    ended, seen = driven("cautious", "careful")  # both ask for the same
+    v = ended.readings.table["cautious.v_mps"].to_numpy()
+    assert v.max() > 1.0
+    assert all(throttle == 0.0 for (throttle, *_), v in zip(seen, v, strict=True) if v > 1.0)
+
+
+def test_a_function_that_raises_is_named_with_its_package():
+    ended, _ = driven("limp", "raises")
+    assert ended.outcome is Outcome.AGENT_ERROR
+    assert "function raises (package a package) raised in tick 0: " in ended.error
+    assert "KeyError" in ended.error
+    assert "AdasStack" not in ended.error
 
 
 def test_one_that_gives_no_command_ends_the_run_as_the_stack_would():

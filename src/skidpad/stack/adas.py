@@ -123,6 +123,10 @@ class AdasStack:
         own = mode_text(self.report, Function.LCA in self.functions, self.verified_by)
         return own + self.added.mode
 
+    def sensors(self) -> tuple[SensorSpec, ...]:
+        """Returns the sensors that added functions ask for; the stack itself needs the common ones."""
+        return self.added.sensors()
+
     def switch(self, functions: Functions) -> None:
         """Turn functions on and off while driving (A-011); the controllers start afresh."""
         c = self.config

@@ -6,10 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
+from skidpad.core.errors import StackError
 from skidpad.core.frames import SensorFrame
 from skidpad.core.registry import Registry
 from skidpad.core.run import Function
+from skidpad.core.specs import SensorSpec
 from skidpad.core.states import VehicleCommand
+from skidpad.core.told import describe_value
 
 if TYPE_CHECKING:  # kernels come with it
     from skidpad.roads.queries import RoadMap
@@ -18,8 +21,9 @@ if TYPE_CHECKING:  # kernels come with it
 class DrivingFunction(Protocol):
     """A function that acts after those of the stack, on what the stack would do.
 
-    Optional: `numbers()` returns numbers of the last tick by "name_unit", which are recorded;
-    `mode` is a text on its present state, for the cockpit.
+    Optional: `sensors()` returns specs of further sensors, whose readings arrive in `frame.extra` by id;
+    `numbers()` returns numbers of the last tick by "name_unit", which are recorded; `mode` is a text
+    on its present state, for the cockpit.
     """
 
     def update(self, frame: SensorFrame, command: VehicleCommand) -> VehicleCommand:
@@ -73,10 +77,29 @@ class AddedFunctions:
         factories = [kind.factory for kind in self.kinds if kind.factory is not None]
         self._functions = [factory(self._map, self._dt) for factory in factories]
 
-    def update(self, frame: SensorFrame, command: VehicleCommand) -> VehicleCommand:
-        """Returns the command after each function has changed it."""
+    def sensors(self) -> tuple[SensorSpec, ...]:
+        """Returns the further sensors that the functions ask for; one that two ask for alike is one."""
+        asked: list[SensorSpec] = []
         for function in self._functions:
-            command = function.update(frame, command)
+            specs = function.sensors() if hasattr(function, "sensors") else ()
+            asked += [spec for spec in specs if spec not in asked]
+        return tuple(asked)
+
+    def update(self, frame: SensorFrame, command: VehicleCommand) -> VehicleCommand:
+        """Returns the command after each function has changed it.
+
+        Raises:
+            StackError: a function raised; the sentence names it and its package.
+        """
+        for kind, function in zip(self.kinds, self._functions, strict=True):
+            try:
+                command = function.update(frame, command)
+            except Exception as error:
+                package = FUNCTIONS.sources()[kind.name].package
+                raise StackError(
+                    f"function {kind.name} (package {package}) raised in tick {frame.tick}: "
+                    f"{describe_value(error)}"
+                ) from error
         return command
 
     @property

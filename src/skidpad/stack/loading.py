@@ -131,6 +131,8 @@ class GuardedStack:
         self._tick = frame.tick
         try:
             command = self._call(self.stack.tick, frame)
+        except StackError:
+            raise
         except FOREIGN as error:
             raise StackError(
                 f"{self.name} raised in tick {frame.tick}: {describe_value(error)}"

@@ -9,6 +9,8 @@ import typer
 if TYPE_CHECKING:
     from skidpad.core.registry import Registry
 
+OF_FLEET = "relays"
+
 
 def extensions(
     kind: Annotated[
@@ -16,10 +18,12 @@ def extensions(
     ] = "",
 ) -> None:
     """List what packages can add, what is registered, and which package added it."""
-    from skidpad.core.errors import require_choice
+    from skidpad.core.errors import ConfigError, install_command, require_choice
 
     points = extension_points()
     names = [registry.group.partition(".")[2] for registry in points]
+    if kind == OF_FLEET and kind not in names:
+        raise ConfigError(f"relays belong to the fleet; install it with {install_command('fleet')}")
     chosen = [require_choice("kind", kind, names)] if kind else names
     for name, registry in zip(names, points, strict=True):
         if name not in chosen:

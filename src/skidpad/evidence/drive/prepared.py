@@ -63,15 +63,27 @@ class Pairs(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """A log, the ego on its lanes, and its leads. T ticks."""
+    """What metrics are measured from: a log of T ticks, the ego on its lanes, and its leads.
+
+    Attributes:
+        log: States, commands and events of the run; row 0 of its actors is the ego; accelerations
+            (`log.ego.ax`, `ay`) are m/s^2 forward and to the left.
+        place: The lane that the ego is on in each tick, with s in m along and t in m across.
+        lead: The true vehicle ahead: `gap` in m bumper to bumper, `v_closing` in m/s; NaN where
+            there is none.
+        v: (T,) m/s, true speed of the ego.
+        free: (T,) the driver drives, and not the supervisor, which brakes and moves the ego after a crash.
+        sample: (T,) free, and the driver reported what it perceived: ticks that count for perception (A-250).
+        strays: (T,) all wheels are off every lane, and no counted departure follows (R-6).
+    """
 
     log: RunLog
     place: LaneMatch
     lead: Leads
-    v: Floats  # (T,) m/s
-    free: Mask  # (T,) the supervisor does not drive
-    sample: Mask  # (T,) ticks that count for perception (A-250)
-    strays: Mask  # (T,) all wheels off every lane, and no counted departure follows (R-6)
+    v: Floats
+    free: Mask
+    sample: Mask
+    strays: Mask
 
     def row(self, tick: int) -> int:
         """The row of a tick, or of the first one after it."""

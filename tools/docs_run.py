@@ -1,0 +1,192 @@
+"""Runs the console and Python blocks of README and docs, as a reader would who types them.
+
+    python tools/docs_run.py                 # all pages in full; writes docs/results/docs-run.csv
+    python tools/docs_run.py README.md       # one page, nothing written
+
+A comment before a block says how it is run:
+
+    <!-- quick: --seeds 24 => --seeds 1; --duration 60 => --duration 2 -->   in CI with smaller values
+    <!-- not run: needs Docker -->                                           never, and why
+
+Blocks of one page share a folder and run in order. Lines without `$` are what the commands print.
+Tutorials and docs/extending.md are run by tests of their own.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+RECORD = ROOT / "docs" / "results" / "docs-run.csv"
+COLUMNS = ("page", "block", "begins", "processor_s", "date", "commit")
+BLOCK = re.compile(
+    r"(?:^<!-- (?P<word>quick|not run): (?P<note>[^\n]*?) -->\n\s*)?"
+    r"^```(?P<language>console|python)(?P<title>[^\n]*)\n(?P<text>.*?)^```",
+    re.DOTALL | re.MULTILINE,
+)
+ELSEWHERE = ("tutorials/", "extending.md")
+SET_UP = re.compile(r"^(make run|source |pip install)")  # what the environment has been through
+LONGEST_S = 3600.0
+
+
+@dataclass(frozen=True)
+class Block:
+    """One block of a page: its text, and what the comment before it says."""
+
+    page: str
+    number: int
+    language: str
+    text: str
+    word: str | None
+    note: str
+
+    @property
+    def is_run(self) -> bool:
+        """Whether it is run at all."""
+        return self.word != "not run"
+
+    def script(self, quick: bool) -> tuple[str, list[str]]:
+        """Return what is run, and lines that it must print."""
+        text = self.text
+        for change in self.note.split(";") if quick and self.word == "quick" else ():
+            old, new = (part.strip() for part in change.split("=>"))
+            if old not in text:
+                raise ValueError(f"{self.page}, block {self.number}: there is no {old!r} to change")
+            text = text.replace(old, new)
+        if self.language == "python":
+            return text, []
+        return split_console(text)
+
+
+def split_console(text: str) -> tuple[str, list[str]]:
+    """Return the commands of a console block as one script, and the lines printed beside them."""
+    commands: list[str] = []
+    printed: list[str] = []
+    goes_on = False
+    for line in text.splitlines():
+        if line.startswith("$ ") or goes_on:
+            command = line.removeprefix("$ ")
+            goes_on = command.endswith("\\")
+            commands.append(command)
+        elif line.strip():
+            printed.append(line.rstrip())
+    script = "\n".join(c for c in commands if not SET_UP.match(c))
+    return script, printed
+
+
+def pages() -> list[Path]:
+    """Return README and the pages of docs/ whose blocks are run here."""
+    docs = sorted((ROOT / "docs").rglob("*.md"))
+    return [ROOT / "README.md", *(p for p in docs if not any(e in str(p) for e in ELSEWHERE))]
+
+
+def blocks_of(page: Path) -> Iterator[Block]:
+    """Yield the console and Python blocks of a page in order."""
+    text = page.read_text(encoding="utf-8")
+    for number, found in enumerate(BLOCK.finditer(text), start=1):
+        yield Block(
+            page.relative_to(ROOT).as_posix(), number,
+            found["language"], found["text"], found["word"], found["note"] or "",
+        )  # fmt: skip
+
+
+def run_block(block: Block, folder: Path, quick: bool) -> float:
+    """Run a block in a folder and return the seconds of processor time.
+
+    Raises:
+        RuntimeError: it failed, or did not print what the page says.
+    """
+    script, printed = block.script(quick)
+    if not script.strip():
+        return 0.0
+    if block.language == "python":
+        name = "test_block.py" if "def test_" in script else "block.py"
+        (folder / name).write_text(script, encoding="utf-8")
+        words = [sys.executable, *(("-m", "pytest", "-q") if name.startswith("test") else ()), name]
+    else:
+        words = ["bash", "-e", "-o", "pipefail", "-c", script]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    code, said = call(words, folder)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    missing = [line for line in printed if line not in said]
+    if code or missing:
+        raise RuntimeError(
+            f"{block.page}, block {block.number} ended with code {code}; not printed: {missing}\n"
+            f"{script}\n{said[-3000:]}"
+        )
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def call(words: list[str], folder: Path) -> tuple[int, str]:
+    """Run a command, end what it left running, and return its code and what it printed."""
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    environment = {**os.environ, "PATH": path, "COLUMNS": "120"}
+    with (folder / "said.txt").open("w+", encoding="utf-8") as said:
+        process = subprocess.Popen(
+            words, cwd=folder, env=environment, stdout=said, stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL, start_new_session=True,
+        )  # fmt: skip
+        try:
+            code = process.wait(LONGEST_S)
+        finally:
+            try:
+                os.killpg(process.pid, signal.SIGTERM)
+            except ProcessLookupError:
+                pass
+        said.seek(0)
+        return code, said.read()
+
+
+def prepare(folder: Path) -> None:
+    """Lay out what a reader's folder has: the examples of a clone."""
+    shutil.copytree(ROOT / "examples", folder / "examples", dirs_exist_ok=True)
+
+
+def main(names: list[str]) -> int:
+    """Run pages in full; 1 when a block does not do what its page says."""
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.strip()
+    rows, failed = [], 0
+    for page in [ROOT / name for name in names] or pages():
+        with tempfile.TemporaryDirectory() as name:
+            prepare(Path(name))
+            for block in blocks_of(page):
+                if not block.is_run:
+                    print(f"{block.page}, block {block.number}: not run, {block.note}")
+                    continue
+                try:
+                    seconds = run_block(block, Path(name), quick=False)
+                except RuntimeError as error:
+                    failed += 1
+                    print(error)
+                    continue
+                begins = block.text.strip().splitlines()[0]
+                print(f"{block.page}, block {block.number}: {seconds:.0f} s", flush=True)
+                rows.append(
+                    (block.page, block.number, begins, f"{seconds:.0f}", date.today(), commit)
+                )
+    if not names and not failed:
+        with RECORD.open("w", newline="", encoding="utf-8") as stream:
+            csv.writer(stream).writerows([COLUMNS, *rows])
+    return int(failed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -74,7 +74,7 @@ def test_what_crashed_has_a_row_and_is_driven_again_by_resume(tmp_path):
     campaign = Campaign(RECIPE, tosses(2, even=0.5))
     summary = campaign.run(tmp_path, crashing)
     assert (summary.failed, list(summary.warnings())) == (
-        2, ["2 runs crashed or timed out; --resume tries them again"]
+        2, ["2 runs crashed or timed out (gone); --resume tries again"]
     )  # fmt: skip
     table = read_results(tmp_path)
     assert table["outcome"].to_list() == ["crashed"] * 2

@@ -23,6 +23,7 @@ from skidpad.fleet.alerting.hub import Hub
 from skidpad.fleet.alerting.receiver import Receiver, Verdict
 from skidpad.fleet.alerting.relays import Mqtt, Webhook
 from skidpad.fleet.broker import Broker
+from skidpad.fleet.store.accounts import find_tenant
 
 SCENE = {"map": "town", "ego": {"x": 1.0, "y": 2.0, "heading": 0.1}, "v": 8.0}
 ALERT = {"kind": "hazard", "text": "car ahead stopped", "scene": SCENE}
@@ -207,6 +208,13 @@ def http_server(answer: int, location: str | None = None):
         finally:
             server.shutdown()
             thread.join()
+
+
+def test_a_relay_for_an_operator_that_nobody_enrolled_is_refused(lite):
+    with lite.fleet.engine.begin() as connection:
+        assert find_tenant(connection, "red")
+        with pytest.raises(ConfigError, match="unknown operator 'Nobody'; the fleet knows: "):
+            find_tenant(connection, "Nobody")
 
 
 def test_a_webhook_goes_to_its_host_and_nowhere_else():

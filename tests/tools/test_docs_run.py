@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import docs_run
 import pytest
+
+import docs_run
 
 PAGES = [p for p in docs_run.pages() if list(docs_run.blocks_of(p))]
 

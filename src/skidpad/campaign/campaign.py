@@ -52,6 +52,7 @@ class Summary:
     failed: int  # crashed or timed out
     content_hash: str
     mixed_machines: bool  # byte equality is not promised across this campaign (X-2)
+    error: str = ""  # what the first of the failed runs said
     damaged: int = 0  # lines of the ledger that were set aside; their runs were driven again
 
     def warnings(self) -> Iterator[str]:
@@ -64,7 +65,9 @@ class Summary:
         if self.mixed_machines:
             yield "runs of different machines or versions: bytes may differ"
         if self.failed:
-            yield f"{self.failed} runs crashed or timed out; --resume tries them again"
+            runs = "1 run" if self.failed == 1 else f"{self.failed} runs"
+            said = f" ({self.error})" if self.error else ""
+            yield f"{runs} crashed or timed out{said}; --resume tries again"
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,9 +188,12 @@ class Campaign(Generic[T, K, M]):
             out, rows, timing, csv=csv, fingerprints=places, added=added
         )
         self.recipe.finish(self.tasks, out, runner)
-        failed = sum(Outcome(e.key.outcome) in RETRIED for e in entries)
+        failed = [e for e in entries if Outcome(e.key.outcome) in RETRIED]
+        error = failed[0].error if failed else ""
         mixed = len(fingerprints(entries)) > 1
-        return Summary(out, len(entries), driven, failed, digest, mixed, len(ledger.damaged))
+        return Summary(
+            out, len(entries), driven, len(failed), digest, mixed, error, len(ledger.damaged)
+        )
 
     def _uncertain_runs(self, batch: Sequence[T], entries: Sequence[Entry[K, M]]) -> Sequence[T]:
         """The runs of a batch whose cells are uncertain, or distinct, after the batches before it."""

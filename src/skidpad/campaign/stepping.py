@@ -26,6 +26,7 @@ from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import find_weather
 from skidpad.scenarios.scene import State
+from skidpad.scenarios.shipped import find_scenario
 
 PLAIN = "clear-noon"  # what a file leaves open of the weather, as in `skidpad play`
 HOLDS, ENDS = " holds", " ends"  # how the story tells of a condition
@@ -47,7 +48,7 @@ class Scenario:
     """A scenario file that is played one tick after the other, as `skidpad play` plays it.
 
     Args:
-        file: An OpenSCENARIO XML file.
+        file: An OpenSCENARIO XML file, or a name of the catalogue.
         stack: Which stack drives the ego, as `--stack`: 0 to 4 (our own), "ideal" for the file
             itself, a class as "module:Class", ...
         actors: "physical" or "ideal", as `--actors`.
@@ -92,7 +93,9 @@ class Scenario:
             driver=find_driver(stack, label=STACK),
         )
         outside = find_weather(weather) if isinstance(weather, str) else weather
-        (self.spec,) = runs_of(spec, [Path(file)], [outside], [Friction.REDUCED], [seed])
+        (self.spec,) = runs_of(
+            spec, [find_scenario(Path(file))], [outside], [Friction.REDUCED], [seed]
+        )
         stage = stage_of(self.spec)
         assert stage.player is not None
         self.player = stage.player

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from lxml import etree
 
-from skidpad.core.errors import require_choice
+from skidpad.core.errors import FileError, require_choice
 
 FOLDER = Path(__file__).parent / "catalogue"
 NAMES = ("ghost_cut_in", "lead_slowdown", "front_accident")  # in the study's order, B-090 to B-092
@@ -27,6 +27,17 @@ class Shipped:
 def scenario_file(name: str) -> Path:
     """The 1.2 file of a scenario of the catalogue."""
     return FOLDER / f"{require_choice('scenario', name, NAMES)}.xosc"
+
+
+def find_scenario(file: Path) -> Path:
+    """Return a file or folder, also of a name of the catalogue; FileError where there is neither."""
+    if not file.exists() and str(file) in NAMES:
+        return scenario_file(str(file))
+    if not file.exists():
+        raise FileError(
+            f"scenario {file}: there is no such file or folder; the catalogue has {', '.join(NAMES)}"
+        )
+    return file
 
 
 @cache

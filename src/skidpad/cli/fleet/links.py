@@ -57,16 +57,14 @@ def relays(
 ) -> list[Relay]:
     """Makes the relays of alerts. others: NAME=SETTING of registered kinds.
 
-    Raises ConfigError for an unknown kind or a setting that cannot be used.
+    Raises ConfigError for an unknown kind, an unknown operator or a setting that cannot be used.
     """
-    import time
-
     from skidpad.fleet.alerting.relay_types import RelayHost, make_relays
-    from skidpad.fleet.store.accounts import tenant_id
+    from skidpad.fleet.store.accounts import find_tenant
 
     def find_operator(tenant: str) -> str:
         with committing(places) as connection:
-            return tenant_id(connection, tenant, time.time())
+            return find_tenant(connection, tenant)
 
     asked = [f"webhook={text}" for text in webhooks]
     asked += ["mqtt"] if broker is not None else []

@@ -39,7 +39,9 @@ def rerun(
     from skidpad.campaign.runs import rerun as again
     from skidpad.campaign.runs.stored import read_run, read_segment
 
-    for foreign in (read_segment if is_segment else read_run)(run).foreign_code:
+    described = (read_segment if is_segment else read_run)(run)
+    require_backend(run, described.backend.backend)
+    for foreign in described.foreign_code:
         if not yes:
             typer.confirm(f"{run} names {foreign}, which would be run; go on?", abort=True)
     if is_segment:
@@ -55,6 +57,18 @@ def rerun(
         )
         raise typer.Exit(1)
     typer.echo("the same drive as the stored one, by content hash")
+
+
+def require_backend(run: Path, name: str) -> None:
+    """ConfigError where a run's backend is of a package that is not installed."""
+    from skidpad.core.errors import ConfigError
+    from skidpad.core.simulator import BACKENDS
+
+    if name not in BACKENDS.names():
+        raise ConfigError(
+            f"{run} was driven on the backend {name!r}, which is not installed; there are: "
+            f"{', '.join(BACKENDS.names())}"
+        )
 
 
 def _show(result: Rerun) -> None:

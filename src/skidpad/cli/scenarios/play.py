@@ -68,6 +68,7 @@ def play(
 ) -> None:
     """Play a scenario, or all of a folder; ends with verdicts, a page and a table."""
     from skidpad.core.errors import ConfigError
+    from skidpad.scenarios.shipped import find_scenario
 
     file = find_scenario(file)
     template = play_template(cross, ego, run, scenario, tuned, backend)
@@ -115,20 +116,6 @@ def _drive_all(
 
     how(campaign, concluded)
     exit_by_verdicts(ends[0])
-
-
-def find_scenario(file: Path) -> Path:
-    """Return a file or folder, also of a name of the catalogue; FileError where there is neither."""
-    from skidpad.core.errors import FileError
-    from skidpad.scenarios.shipped import NAMES, scenario_file
-
-    if not file.exists() and str(file) in NAMES:
-        return scenario_file(str(file))
-    if not file.exists():
-        raise FileError(
-            f"scenario {file}: there is no such file or folder; the catalogue has {', '.join(NAMES)}"
-        )
-    return file
 
 
 def play_template(

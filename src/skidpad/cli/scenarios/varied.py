@@ -97,9 +97,9 @@ def vary_scenario(
 
 def _read_varied(file: Path) -> tuple[Path, tuple[Variable, ...]]:
     """Return the scenario that a file is or names, and what the file itself says that varies."""
-    from skidpad.cli.scenarios.play import find_scenario
     from skidpad.core.errors import FileError
     from skidpad.scenarios.reading.distributions import is_distribution
+    from skidpad.scenarios.shipped import find_scenario
     from skidpad.search.files import read_space
 
     file = find_scenario(file)

@@ -37,6 +37,17 @@ def tenant_id(connection: Connection, name: str, at: float) -> str:
     return known
 
 
+def find_tenant(connection: Connection, name: str) -> str:
+    """Returns the id of the tenant of that name; ConfigError for one that nobody has enrolled."""
+    known = {
+        str(r.name): str(r.id) for r in connection.execute(select(tenants.c.id, tenants.c.name))
+    }
+    if name not in known:
+        names = ", ".join(sorted(known)) or "nobody yet"
+        raise ConfigError(f"unknown operator {name!r}; the fleet knows: {names}")
+    return known[name]
+
+
 def add_person(connection: Connection, tenant: str, role: Role, name: str, at: float) -> Account:
     """A person of `tenant` (its name) with a fresh credential."""
     if role is Role.VEHICLE:

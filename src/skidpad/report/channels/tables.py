@@ -127,7 +127,9 @@ def _indicator_columns(drive: MonitoredDrive) -> tuple[Column[Row], ...]:
 
     def name(row: Row) -> Cell:
         entry = meanings.get(row["indicator"])  # None: of a package that is not installed
-        return Cell(words(row["indicator"]), hint="" if entry is None else entry.meaning)
+        return Cell(
+            words(row["indicator"]), hint="" if entry is None else f"{entry.label}: {entry.meaning}"
+        )
 
     def violations(row: Row) -> Quantity:
         events, share = row["violation_events"], row["violation_cycles"] / cycles

@@ -24,8 +24,9 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
-from datetime import date
+from datetime import datetime, timezone
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -141,10 +142,8 @@ def call(words: list[str], folder: Path) -> tuple[int, str]:
         try:
             code = process.wait(LONGEST_S)
         finally:
-            try:
+            with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGTERM)
-            except ProcessLookupError:
-                pass
         said.seek(0)
         return code, said.read()
 
@@ -163,6 +162,7 @@ def main(names: list[str]) -> int:
         text=True,
         check=True,
     ).stdout.strip()
+    day = f"{datetime.now(timezone.utc):%Y-%m-%d}"
     rows, failed = [], 0
     for page in [ROOT / name for name in names] or pages():
         with tempfile.TemporaryDirectory() as name:
@@ -179,9 +179,7 @@ def main(names: list[str]) -> int:
                     continue
                 begins = block.text.strip().splitlines()[0]
                 print(f"{block.page}, block {block.number}: {seconds:.0f} s", flush=True)
-                rows.append(
-                    (block.page, block.number, begins, f"{seconds:.0f}", date.today(), commit)
-                )
+                rows.append((block.page, block.number, begins, f"{seconds:.0f}", day, commit))
     if not names and not failed:
         with RECORD.open("w", newline="", encoding="utf-8") as stream:
             csv.writer(stream).writerows([COLUMNS, *rows])

@@ -38,7 +38,7 @@ def tenant_id(connection: Connection, name: str, at: float) -> str:
 
 
 def find_tenant(connection: Connection, name: str) -> str:
-    """Returns the id of the tenant of that name; ConfigError for one that nobody has enrolled."""
+    """Returns the id of the tenant of that name; ConfigError where no tenant has it."""
     known = {
         str(r.name): str(r.id) for r in connection.execute(select(tenants.c.id, tenants.c.name))
     }

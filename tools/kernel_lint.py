@@ -4,6 +4,9 @@ A kernel allocates nothing (scratch room is a field of the state), uses no NumPy
 scalar ufuncs (`math` has them): of NumPy it may name constants and types only, and of an array's
 methods none but `fill`.
 
+No kernel of any package puts another value behind the pointer of a `Held`: machine code without counted
+references would free what is still read.
+
     python tools/kernel_lint.py            lists every violation; exit status 1 when there is one
 """
 
@@ -94,13 +97,28 @@ def _reason(node: ast.AST) -> str | None:
     return f".{node.attr}" if node.attr in METHODS else None
 
 
+def writes_held(text: str) -> Iterator[tuple[int, str]]:
+    """Line and reason wherever a kernel in this source text replaces the value of a `Held`."""
+    for function in filter(is_kernel, ast.walk(ast.parse(text))):
+        assert isinstance(function, ast.FunctionDef)
+        for node in ast.walk(function):
+            written = isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)
+            if written and node.attr == "value":  # type: ignore[attr-defined]
+                yield node.lineno, f"{function.name}: .value is replaced"  # type: ignore[attr-defined]
+
+
 def main() -> int:
-    """Print what violates the rule."""
+    """Print what violates the rules."""
     files = [path for house in HOUSES for path in sorted((SOURCE / house).rglob("*.py"))]
     found = [
         f"src/skidpad/{path.relative_to(SOURCE).as_posix()}:{line}: {reason}"
         for path in files
         for line, reason in violations(path.read_text(encoding="utf-8"))
+    ]
+    found += [
+        f"src/skidpad/{path.relative_to(SOURCE).as_posix()}:{line}: {reason}"
+        for path in sorted(SOURCE.rglob("*.py"))
+        for line, reason in writes_held(path.read_text(encoding="utf-8"))
     ]
     print(*found, sep="\n", end="\n" if found else "")
     return 1 if found else 0

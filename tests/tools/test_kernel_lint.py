@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from kernel_lint import violations
+from kernel_lint import violations, writes_held
 
 HEAD = "@kernel\ndef f(x: Floats, out: Floats) -> float:\n    "
 
@@ -39,3 +39,13 @@ def test_what_it_may(body: str) -> None:
 
 def test_only_kernels_are_held_to_it() -> None:
     assert not list(violations("def f(x):\n    return np.empty(64)"))
+
+
+@pytest.mark.parametrize("body", ["x.value = out", "x.value += 1", "x.value, y = out, 2"])
+def test_no_kernel_replaces_what_is_held(body: str) -> None:
+    assert list(writes_held(HEAD + body)) == [(3, "f: .value is replaced")]
+
+
+@pytest.mark.parametrize("body", ["y = x.value", "x.value[0] = 1.0", "x.values = out"])
+def test_what_is_held_may_be_read_and_its_arrays_written(body: str) -> None:
+    assert not list(writes_held(HEAD + body))

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.slots import fill_slots
 from skidpad.core.states import ContactEvent, EgoEstimate, LaneInvasion
 from skidpad.core.vocabulary import LightState, Supervision
 
@@ -119,6 +120,7 @@ class Segments(NamedTuple):
     label: NDArray[np.uint8]
 
 
+@fill_slots
 @dataclass(frozen=True, slots=True)
 class SensorFrame:
     """One tick of all sensors of the ego (decision L-3)."""

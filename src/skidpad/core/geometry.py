@@ -8,9 +8,12 @@ from math import atan2, cos, pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.slots import fill_slots
+
 Array = NDArray[np.float64]
 
 
+@fill_slots
 @dataclass(frozen=True, slots=True)
 class Pose:
     """Position in metres and attitude in radians of a frame seen from another.

@@ -180,6 +180,8 @@ else:
     class Held(structref.StructRefProxy):
         """A named tuple of arrays behind one pointer; see above."""
 
+        _numba_type_ = structref.StructRefProxy._type  # numba's is a property, asked at every call
+
         def __new__(cls, value):
             """Behind its pointer."""
             return structref.StructRefProxy.__new__(cls, value)

@@ -36,6 +36,7 @@ class LeanLibrary(JITCodeLibrary):  # type: ignore[misc]
             module = binding.parse_assembly(without_counting(text))
             module.name = self._final_module.name
             self._final_module = module
+        self.state = None  # all that the compiler knew; libraries live as long as the process
         super()._optimize_final_module()
 
     def _returns_references(self) -> bool:

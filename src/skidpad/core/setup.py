@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from skidpad.core.geometry import Pose
+from skidpad.core.slots import fill_slots
 from skidpad.core.specs import SensorSpec
 from skidpad.core.states import VehicleCommand
 from skidpad.core.surface import SurfacePatch
@@ -120,6 +121,7 @@ class Setup:
     dt: float = DT
 
 
+@fill_slots
 @dataclass(frozen=True, slots=True)
 class ActorCommand:
     """A scenario player's word to one actor for the coming step; one of the three forms.

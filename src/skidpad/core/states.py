@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.geometry import Pose
+from skidpad.core.slots import fill_slots
 from skidpad.core.vocabulary import DetectionStatus, LightSource, LightState, Tier
 
 Floats = NDArray[np.float64]
 
 
+@fill_slots
 @dataclass(frozen=True, slots=True)
 class VehicleCommand:
     """What a driver does: pedals in [0, 1], steer in [-1, 1] with left positive (ISO 8855)."""
@@ -84,6 +86,7 @@ class ActorTable:
         return len(self.names)
 
 
+@fill_slots
 @dataclass(frozen=True, slots=True)
 class EgoEstimate:
     """What localisation and the ego's own sensors say."""
@@ -129,6 +132,7 @@ class LaneInvasion:
     road: int
 
 
+@fill_slots
 @dataclass(frozen=True, slots=True)
 class StackReport:
     """What a stack says about one tick, for the recording; every field may be absent.
@@ -160,6 +164,7 @@ class StackReport:
     resume_timer: float | None = None  # s
 
 
+@fill_slots
 @dataclass(frozen=True, slots=True)
 class WorldTruth:
     """The simulator's truth after a step: for recording, supervision and evaluation only (A-014)."""

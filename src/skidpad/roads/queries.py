@@ -15,6 +15,7 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import Held, hold
 from skidpad.core.setup import LanePosition
+from skidpad.core.slots import fill_slots
 from skidpad.roads import entries, kernels
 from skidpad.roads.baked import BakedMap
 from skidpad.roads.edge import RoadEdge
@@ -25,6 +26,7 @@ from skidpad.roads.roadside import Roadside
 Table = TypeVar("Table", LaneSamples, LaneTable, SignalTable, kernels.LaneArrays)
 
 
+@fill_slots
 @dataclass(frozen=True, slots=True)
 class LanePoint:
     """A place on a lane centre line."""

@@ -289,20 +289,21 @@ class Actor:
 
         z: of the ground, m, for whom the file does not place.
         """
-        v, before, bound = self.v, self.motion, STANDING[self.placed_by_file]
+        placed, v, before = self.placed_by_file, self.v, self.motion
         self.motion = motion
+        now = self.v
         dt, self.seen = dt if self.seen else 0.0, True
         box = self.entity.box
-        at = Pose(motion.x, motion.y, self.pose.z if self.placed_by_file else z, yaw=motion.yaw)
+        at = Pose(motion.x, motion.y, self.pose.z if placed else z, yaw=motion.yaw)
         if box.forward or box.left:
             at = at.moved(forward=-box.forward, left=-box.left)
         self.pose = at
         self.a, self.acceleration = 0.0, (0.0, 0.0)
         if dt > 0.0:
-            self.a = (self.v - v) / dt
+            self.a = (now - v) / dt
             self.acceleration = (motion.vx - before.vx) / dt, (motion.vy - before.vy) / dt
-        self.travelled += self.v * dt
-        self.stood = self.stood + dt if max(v, self.v) < bound else 0.0
+        self.travelled += now * dt
+        self.stood = self.stood + dt if max(v, now) < STANDING[placed] else 0.0
         waited = self.at_end + dt if self.at_end else JUST
         self.at_end = waited if self.guide.at_end else 0.0
 
@@ -349,12 +350,11 @@ class Scene:
         """Take over positions and velocities of a tick."""
         self.t, self.lights, self.truth = truth.tick * self.dt, truth.lights, truth
         s = truth.states
-        columns = (s.x.tolist(), s.y.tolist(), s.yaw.tolist(), s.vx.tolist(), s.vy.tolist())
-        z = s.z.tolist()
+        x, y, z, yaw = s.x.tolist(), s.y.tolist(), s.z.tolist(), s.yaw.tolist()
+        vx, vy = s.vx.tolist(), s.vy.tolist()
         for actor in self.actors.values():
             i = actor.row
-            motion = Motion(*(column[i] for column in columns))
-            actor.observe(motion, z[i], self.dt)
+            actor.observe(Motion(x[i], y[i], yaw[i], vx[i], vy[i]), z[i], self.dt)
         self.contacts = {c.static or truth.table.names[c.actor] for c in truth.contacts}
 
     def between(self, a: str, b: str) -> Point:

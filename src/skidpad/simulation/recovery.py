@@ -16,6 +16,7 @@ import numpy as np
 from skidpad.core.errors import require_range
 from skidpad.core.geometry import Pose, mps_from_kmh
 from skidpad.core.jit import Held, hold, kernel
+from skidpad.core.slots import fill_slots
 from skidpad.core.states import ActorStates, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import (
     ActorKind,
@@ -95,6 +96,7 @@ class Relocate:
     moved: Moved | None = None
 
 
+@fill_slots
 @dataclass(frozen=True, slots=True)
 class Action:
     """What is done in a tick: the command that is applied, after a relocation if there is one."""

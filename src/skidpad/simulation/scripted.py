@@ -6,11 +6,14 @@ succeeds. On every backend, as it only sees poses and velocities.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import atan, cos, hypot, sin
+from typing import NamedTuple
 
 from skidpad.core.constants import G
 from skidpad.core.errors import ConfigError
+from skidpad.core.jit import Held, hold, kernel
+from skidpad.core.slots import fill_slots
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import ActorKind
 from skidpad.physics.types import VehicleType, vehicle_type, vehicle_types
@@ -26,6 +29,7 @@ HOLD_BRAKE = 0.6
 LOOK_BACK, LOOK_BACK_TIME = 5.0, 1.5  # m at least, and s, over which a reversing driver corrects
 
 
+@fill_slots
 @dataclass(frozen=True, slots=True)
 class Demand:
     """What a scenario asks of an actor in a tick, relative to a point of its path."""
@@ -39,6 +43,7 @@ class Demand:
     reverse: bool = False  # the actor shall go backwards
 
 
+@fill_slots
 @dataclass(frozen=True, slots=True)
 class Motion:
     """State of an actor as its driver knows it."""
@@ -55,6 +60,22 @@ class Motion:
         return self.vx * cos(self.yaw) + self.vy * sin(self.yaw)
 
 
+class Hands(NamedTuple):
+    """What a driver knows of its vehicle, and how firmly it corrects; SI."""
+
+    speed_gain: float  # 1/s
+    omega: float  # rad/s
+    a_drive: float
+    p_drive: float  # W/kg
+    a_brake: float
+    drag: float  # 1/m
+    rolling: float  # m/s^2
+    engine_drag: float  # m/s^2
+    wheelbase: float
+    steer_max: float  # rad
+    understeer: float  # rad s^2/m
+
+
 class ActorDriver:
     """Feedforward through the vehicle's own dynamics plus feedback; no state between ticks.
 
@@ -64,18 +85,33 @@ class ActorDriver:
     def __init__(self, kind: str, skill: float = 1.0) -> None:
         t = vehicle_type(kind)
         self.type = t
-        self.speed_gain, self.omega = SPEED_GAIN * skill, OMEGA * skill
-        self.a_drive, self.p_drive = t.a_drive, t.power / t.mass
-        self.drag = 0.5 * AIR_DENSITY * t.drag_area / t.mass
-        self.rolling = t.rolling_resistance * G
-        self.engine_drag = t.engine_drag
+        self._hands = hold(
+            Hands(
+                speed_gain=SPEED_GAIN * skill,
+                omega=OMEGA * skill,
+                a_drive=t.a_drive,
+                p_drive=t.power / t.mass,
+                a_brake=t.a_brake,
+                drag=0.5 * AIR_DENSITY * t.drag_area / t.mass,
+                rolling=t.rolling_resistance * G,
+                engine_drag=t.engine_drag,
+                wheelbase=t.wheelbase,
+                steer_max=t.steer_max,
+                understeer=t.understeer,
+            )
+        )
 
     def command(self, motion: Motion, demand: Demand) -> VehicleCommand:
         """Pedals and steer for the coming step."""
-        if demand.reverse and motion.speed < V_STANDING:
-            return self._backwards(motion, demand)
-        throttle, brake = self._pedals(motion.speed, demand)
-        return VehicleCommand(throttle=throttle, brake=brake, steer=self._steer(motion, demand))
+        d = demand
+        if d.reverse and motion.speed < V_STANDING:
+            return self._backwards(motion, d)
+        return VehicleCommand(
+            *drive_forwards(
+                self._hands, motion.yaw, motion.vx, motion.vy, d.v, d.a, d.curvature, d.error,
+                d.error_rate, d.a_lateral,
+            )
+        )  # fmt: skip
 
     def _backwards(self, motion: Motion, d: Demand) -> VehicleCommand:
         """Pedals as forwards, seen the other way round; the steering brings the rear axle to the path.
@@ -83,32 +119,53 @@ class ActorDriver:
         Over the way driven the offset obeys e'' = -2 (e + L e') / L^2, as in pure pursuit.
         """
         v, look = abs(motion.speed), max(LOOK_BACK, LOOK_BACK_TIME * abs(motion.speed))
-        throttle, brake = self._pedals(-motion.speed, replace(d, v=-d.v, a=-d.a))
+        throttle, brake = press_pedals(self._hands, -motion.speed, -d.v, -d.a)
         slope = d.error_rate / max(v, V_STANDING)
         kappa = d.curvature - 2.0 * (d.error + look * slope) / (look * look)
         angle = atan(self.type.wheelbase * kappa)
         steer = min(max(angle / (self.type.steer_max * steer_share(v)), -1.0), 1.0)
         return VehicleCommand(throttle=throttle, brake=brake, steer=float(steer), reverse=True)
 
-    def _steer(self, motion: Motion, d: Demand) -> float:
-        v = max(motion.speed, V_LATERAL_MIN)
-        w = self.omega
-        a = d.a_lateral - w * w * d.error - 2.0 * ZETA * w * d.error_rate
-        most = A_LATERAL_MAX / (v * v)
-        kappa = min(max(d.curvature + a / (v * v), -most), most)
-        angle = atan(self.type.wheelbase * kappa) + self.type.understeer * v * v * kappa
-        return float(min(max(angle / (self.type.steer_max * steer_share(v)), -1.0), 1.0))
 
-    def _pedals(self, v: float, d: Demand) -> tuple[float, float]:
-        if d.v < V_STANDING and v < V_STANDING:
-            return 0.0, HOLD_BRAKE
-        a = d.a + self.speed_gain * (d.v - v)
-        dragged = self.engine_drag * min(abs(v) / V_CLUTCH, 1.0)  # by a closed throttle
-        wanted = a + self.drag * v * v + self.rolling + dragged
-        if wanted >= 0.0:
-            most = min(self.a_drive, self.p_drive / max(v, 1.0))
-            return min(wanted / (most + dragged), 1.0), 0.0
-        return 0.0, min(-wanted / self.type.a_brake, 1.0)
+@kernel
+def drive_forwards(
+    held: Held[Hands],
+    yaw: float,
+    vx: float,
+    vy: float,
+    v_told: float,
+    a_told: float,
+    curvature: float,
+    error: float,
+    error_rate: float,
+    a_lateral: float,
+) -> tuple[float, float, float]:
+    """Throttle, brake and steer for a motion and what is asked, as in `Motion` and `Demand`."""
+    h = held.value
+    speed = vx * cos(yaw) + vy * sin(yaw)
+    v, w = max(speed, V_LATERAL_MIN), h.omega
+    a = a_lateral - w * w * error - 2.0 * ZETA * w * error_rate
+    most = A_LATERAL_MAX / (v * v)
+    kappa = min(max(curvature + a / (v * v), -most), most)
+    angle = atan(h.wheelbase * kappa) + h.understeer * v * v * kappa
+    steer = min(max(angle / (h.steer_max * steer_share(v)), -1.0), 1.0)
+    throttle, brake = press_pedals(held, speed, v_told, a_told)
+    return throttle, brake, steer
+
+
+@kernel
+def press_pedals(held: Held[Hands], v: float, v_told: float, a_told: float) -> tuple[float, float]:
+    """Throttle and brake at speed v, m/s, for a speed and its rate that are asked."""
+    h = held.value
+    if v_told < V_STANDING and v < V_STANDING:
+        return 0.0, HOLD_BRAKE
+    a = a_told + h.speed_gain * (v_told - v)
+    dragged = h.engine_drag * min(abs(v) / V_CLUTCH, 1.0)  # by a closed throttle
+    wanted = a + h.drag * v * v + h.rolling + dragged
+    if wanted >= 0.0:
+        most = min(h.a_drive, h.p_drive / max(v, 1.0))
+        return min(wanted / (most + dragged), 1.0), 0.0
+    return 0.0, min(-wanted / h.a_brake, 1.0)
 
 
 def nearest_type(kind: ActorKind, length: float, width: float, height: float) -> str:

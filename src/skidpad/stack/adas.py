@@ -130,7 +130,7 @@ class AdasStack:
     def switch(self, functions: Functions) -> None:
         """Turn functions on and off while driving (A-011); the controllers start afresh."""
         c = self.config
-        self.functions = functions
+        self.functions, self.assists = functions, Function.TLA in functions
         self.hierarchy = Hierarchy(functions, c.settings, c.dt)
         self.steering = steering_of(functions, c.settings)
         self.caps = SpeedCaps(functions, c.cruise_kmh, c.limiter_kmh, c.settings.cap_scope)
@@ -158,7 +158,7 @@ class AdasStack:
         view = self.tracker.update(frame.ego.pose)
         sight = self.front.look(frame, v, view)
         light, hsv = self._light(frame, v, view)
-        stop = self.lock.update(light, v, frame.lights, hsv) if self._assists() else None
+        stop = self.lock.update(light, v, frame.lights, hsv) if self.assists else None
         stop_distance = stop.distance if stop is not None else None
         lane_curvature = view.ego.curvature if view.ego is not None else 0.0
         self.resume.update(stop is not None, kmh_from_mps(v), lane_curvature)
@@ -186,14 +186,11 @@ class AdasStack:
             self.relocated()
         self.supervision = phase
 
-    def _assists(self) -> bool:
-        return Function.TLA in self.functions
-
     def _light(
         self, frame: SensorFrame, v: float, view: LaneView
     ) -> tuple[LightReading, LightState | None]:
         """The light ahead by map, and what the camera sees while the map reports one (M-4)."""
-        if not self._assists():
+        if not self.assists:
             return NO_LIGHT, None
         light = self.scan.look(frame.ego.pose, v, view, frame.lights)
         if light.signal is None:
@@ -269,7 +266,7 @@ class AdasStack:
             v_target=s.cruise_kmh / 3.6,
             light_distance=light.distance,
             light_state=light.state,
-            light_source=light.source if self._assists() else None,
+            light_source=light.source if self.assists else None,
             light_stop=s.stop_distance is not None,
             hsv=hsv,
             lane_offset=view.ego.offset if view.ego is not None else None,

@@ -19,6 +19,7 @@ from typing import Protocol
 from skidpad.core.errors import StackError
 from skidpad.core.frames import SensorFrame
 from skidpad.core.setup import ActorCommand
+from skidpad.core.slots import fill_slots
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import Supervision
 from skidpad.simulation.backend import Backend
@@ -72,6 +73,7 @@ class Script(Protocol):
         ...
 
 
+@fill_slots
 @dataclass(frozen=True, slots=True)
 class Moment:
     """One tick once it is answered; its arrays are valid until the next step (decision X-11)."""

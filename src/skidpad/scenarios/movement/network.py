@@ -10,6 +10,7 @@ import numpy as np
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, wrap_angle
+from skidpad.core.slots import fill_slots
 from skidpad.roads.bundled import map_file
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.opendrive.document import RoadRecord, parse
@@ -24,6 +25,7 @@ STEP = 1e-3  # m into the next lane
 END_SLACK = 0.5  # m beyond the end of a road that still is its end
 
 
+@fill_slots
 @dataclass(frozen=True, slots=True)
 class Place:
     """A pose and, where it was given by lane, the lane's point with the offset from it."""

@@ -242,14 +242,14 @@ class Telling:
 
     def __init__(self, board: Storyboard) -> None:
         self.stories = [ToldStory(s) for s in board.stories]
+        self.acts = [a for s in self.stories for a in s.acts]
         self.halt = Watch(board.stop)
         self.begun = self.ended = False
 
     @property
     def events(self) -> list[ToldEvent]:
         """Every event of all stories."""
-        acts = [a for s in self.stories for a in s.acts]
-        return [e for a in acts for g in a.groups for m in g.manoeuvres for e in m.events]
+        return [e for a in self.acts for g in a.groups for m in g.manoeuvres for e in m.events]
 
     def look(self, scene: Scene) -> None:
         """Looks at the triggers of all stories."""
@@ -266,6 +266,5 @@ class Telling:
         """Go on with what is under way."""
         for story in self.stories:
             story.step(scene)
-        acts = [a for s in self.stories for a in s.acts]
-        if not self.halt and acts and all(a.complete for a in acts):
+        if not self.halt and self.acts and all(a.complete for a in self.acts):
             self.ended = True

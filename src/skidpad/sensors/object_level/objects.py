@@ -54,6 +54,10 @@ from skidpad.sensors.object_level.object_radar import (
 SIGHT = 150.0  # m, boxes farther away are ignored: 80 m is the last range that any tier reads
 
 
+EMPTY = np.empty(0, np.float32)
+NOTHING = Segments(EMPTY, EMPTY, EMPTY, EMPTY, EMPTY, np.empty(0, np.uint8))
+
+
 class Surroundings(NamedTuple):
     """Everything that sensors can meet: actors and what stands beside the road; and room to work."""
 
@@ -118,6 +122,7 @@ class ObjectSuite:
             for s in self._specs
             if isinstance(s, RadarSpec)
         ]
+        self._held_antennas = [hold(antenna) for antenna in self.antennas]
         lit = Beam.LOW if beam is None else beam
         self.limit = SIGHT if weather is None else min(label_range(weather, lit), SIGHT)
 
@@ -127,6 +132,9 @@ class ObjectSuite:
         seen = {}
         for (spec, _), eye, held in zip(self.cameras, self._eyes, self._held_eyes, strict=True):
             m = look(around, held, self.limit)
+            if m == 0:
+                seen[spec.id] = NOTHING
+                continue
             u, width, top, bottom, depth = eye.runs[:, :m].copy()
             seen[spec.id] = Segments(u, width, top, bottom, depth, eye.classes[:m].copy())
         return seen
@@ -137,7 +145,7 @@ class ObjectSuite:
             return RadarPoints.none()
         around = self._around(states)
         self._find_slope(states)
-        m = listen(around, self.antennas[0], tick)
+        m = listen(around, self._held_antennas[0], tick)
         return RadarPoints(*self._radar.echoes[:, :m].copy())
 
     def _find_slope(self, states: ActorStates) -> None:
@@ -160,10 +168,10 @@ class ObjectSuite:
 
 
 @kernel
-def listen(around: Held[Surroundings], radar: Antenna, tick: int) -> int:
+def listen(around: Held[Surroundings], radar: Held[Antenna], tick: int) -> int:
     """Echoes of a radar in this tick into the surroundings' array; returns how many."""
     a = around.value
-    return cast_radar(radar, tick, a.boxes, a.states, a.walls, a.posts, a.radar)
+    return cast_radar(radar.value, tick, a.boxes, a.states, a.walls, a.posts, a.radar)
 
 
 @kernel

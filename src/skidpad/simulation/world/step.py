@@ -52,6 +52,17 @@ class Wheeled(NamedTuple):
     active: Flags  # (w,) moved by physics in this step
 
 
+class Rules(NamedTuple):
+    """What holds in every step."""
+
+    lights: NDArray[np.uint8]  # (K,) LightState by signal row
+    law: ContactLaw
+    free_choice: bool  # drivers draw branches instead of taking the straightest
+    care: Care  # what drivers know of weather
+    road_noise: float  # rad
+    driving_only: bool
+
+
 class Arena(NamedTuple):
     """Everything that a step reads and writes, until actors come or go."""
 
@@ -67,51 +78,43 @@ class Arena(NamedTuple):
     drivers: Drivers
     occupancy: Occupancy
     markings: Markings
-
-
-class Now(NamedTuple):
-    """What changes from step to step."""
-
-    stages: int  # DECIDE, MOVE, SETTLE as bits
-    tick: int
-    dt: float  # s
-    substeps: int
-    lights: NDArray[np.uint8]  # (K,) LightState by signal row
-    law: ContactLaw
-    free_choice: bool  # drivers draw branches instead of taking the straightest
-    care: Care  # what drivers know of weather
-    road_noise: float  # rad
-    driving_only: bool
-    wind_x: float  # m/s of the air in world axes
-    wind_y: float
+    rules: Rules
 
 
 @kernel
-def advance(arena: Held[Arena], now: Now) -> tuple[int, int]:
-    """The asked stages of a step; returns contacts found, and markings crossed as bits."""
+def advance(
+    arena: Held[Arena], stages: int, tick: int, dt: float, substeps: int, wx: float, wy: float
+) -> tuple[int, int]:
+    """The asked stages of a step; returns contacts found, and markings crossed as bits.
+
+    stages: DECIDE, MOVE, SETTLE as bits; dt: s; wx, wy: m/s of the air in world axes. Numbers cross
+    into a kernel for nothing, a named tuple takes 2 us.
+    """
     a = arena.value
-    if now.stages & DECIDE:
-        rows = a.rows
+    if stages & DECIDE:
+        rows, rules = a.rows, a.rules
         note_walkers(a.streets, rows.placed)
-        view = View(a.streets, a.occupancy, rows.placed, now.lights, now.tick, now.dt,
-                    now.free_choice, now.care)  # fmt: skip
+        view = View(a.streets, a.occupancy, rows.placed, rules.lights, tick, dt,
+                    rules.free_choice, rules.care)  # fmt: skip
         drive_all(view, a.drivers, rows.commands)
-    return advance_undriven(arena, now)
+    return advance_undriven(arena, stages, tick, dt, substeps, wx, wy)
 
 
 @kernel
-def advance_undriven(arena: Held[Arena], now: Now) -> tuple[int, int]:
+def advance_undriven(
+    arena: Held[Arena], stages: int, tick: int, dt: float, substeps: int, wx: float, wy: float
+) -> tuple[int, int]:
     """The same without drivers: half as much to compile where there are none."""
     a = arena.value
-    rows = a.rows
+    rows, rules = a.rows, a.rules
     touches = crossed = 0
-    if now.stages & MOVE:
-        _drive(rows, a.moved, a.wheeled, now)
-        _glide(rows, a.moved, len(a.wheeled.active), now.dt)
+    if stages & MOVE:
+        _drive(rows, a.moved, a.wheeled, dt, substeps, wx, wy)
+        _glide(rows, a.moved, len(a.wheeled.active), dt)
         states = _touchable(a)
-        touches = resolve_contacts(states, a.bodies, a.segments, now.law, now.dt, a.touching)
-    if now.stages & SETTLE:
-        settle(a.lanes, rows, now.road_noise, now.driving_only, now.tick)
+        touches = resolve_contacts(states, a.bodies, a.segments, rules.law, dt, a.touching)
+    if stages & SETTLE:
+        settle(a.lanes, rows, rules.road_noise, rules.driving_only, tick)
         crossed = cross_markings(a.markings, a.lanes, rows.placed)
     return touches, crossed
 
@@ -134,7 +137,9 @@ def feel_grip(rows: Rows, w: Wheeled) -> None:
 
 
 @inner_kernel
-def _drive(rows: Rows, moved: Flags, w: Wheeled, now: Now) -> None:
+def _drive(
+    rows: Rows, moved: Flags, w: Wheeled, dt: float, substeps: int, wx: float, wy: float
+) -> None:
     """Vehicles through their physics, or as they are told."""
     s = rows.states
     feel_grip(rows, w)
@@ -142,7 +147,7 @@ def _drive(rows: Rows, moved: Flags, w: Wheeled, now: Now) -> None:
         w.active[i] = s.present[i] and rows.simulated[i] and not moved[i]
     step_vehicles(
         s, w.wheels, w.params, rows.commands, w.feel, rows.grade, rows.bank, w.active,
-        now.wind_x, now.wind_y, now.dt / now.substeps, now.substeps,
+        wx, wy, dt / substeps, substeps,
     )  # fmt: skip
     for i in range(len(w.active)):
         for k in range(4):

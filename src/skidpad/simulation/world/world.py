@@ -35,7 +35,7 @@ from skidpad.simulation.world.step import (
     MOVE,
     SETTLE,
     Arena,
-    Now,
+    Rules,
     Wheeled,
     advance,
     advance_undriven,
@@ -204,6 +204,14 @@ class World:
             drivers(n) if traffic is None else traffic.drivers,
             occupancy(0, n) if traffic is None else traffic.occupancy,
             self.markings,
+            Rules(
+                self.lights.by_row,
+                CONTACT_LAW,
+                traffic is not None and traffic.free_choice,
+                CARELESS if traffic is None else traffic.care,
+                self.conditions.road_noise,
+                not self.conditions.all_lanes,
+            ),
         )
         self.arena = hold(arena)
 
@@ -371,22 +379,8 @@ class World:
         self.lights.advance(self.dt)
 
     def _advance(self, stages: int) -> None:
-        c = self.conditions
-        now = Now(
-            stages,
-            self.tick,
-            self.dt,
-            self.fleet.steps,
-            self.lights.by_row,
-            CONTACT_LAW,
-            self.traffic is not None and self.traffic.free_choice,
-            CARELESS if self.traffic is None else self.traffic.care,
-            c.road_noise,
-            not c.all_lanes,
-            *self.air,
-        )
         step = advance_undriven if self.traffic is None else advance
-        touches, crossed = step(self.arena, now)
+        touches, crossed = step(self.arena, stages, self.tick, self.dt, self.fleet.steps, *self.air)
         if stages & MOVE:
             self.touches = touches
         if stages & SETTLE:

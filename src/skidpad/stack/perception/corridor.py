@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.jit import Held, inner_kernel, kernel
 from skidpad.core.vocabulary import SemanticClass
 
 
@@ -223,6 +223,30 @@ def read_segments(
     if vehicle < c.min_vehicle or total < c.min_kept or kept == 0:
         return np.nan
     return weighted_percentile(z[:kept], weight[:kept], fraction)
+
+
+@kernel
+def read_held_segments(
+    u: NDArray[np.float32],
+    width: NDArray[np.float32],
+    top: NDArray[np.float32],
+    bottom: NDArray[np.float32],
+    depth: NDArray[np.float32],
+    label: NDArray[np.uint8],
+    held: Held[Corridor],
+    near: float,
+    far: float,
+    fraction: float,
+    sin_yaw: float,
+    kappa: float,
+) -> float:
+    """As `read_segments`, between the depths `near` and `far`; the corridor is behind its pointer."""
+    h = held.value
+    c = Corridor(
+        h.focal, h.cx, h.row_first, h.row_end, h.half_width, h.widening, h.half_width_max,
+        near, far, h.min_vehicle, h.min_kept, h.wanted,
+    )  # fmt: skip
+    return read_segments(u, width, top, bottom, depth, label, c, fraction, sin_yaw, kappa)
 
 
 @kernel

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import CameraImage, SensorFrame, image_rows
+from skidpad.core.jit import hold
 from skidpad.core.specs import CameraSpec, Modality, SensorSpec
 from skidpad.stack.perception import corridor
 from skidpad.stack.perception.corridor import VEHICLES, Corridor, Labels
@@ -80,23 +81,29 @@ class CameraPair:
                 f"{depth.width}x{depth.height} and {semantic.width}x{semantic.height} px"
             )
         self.depth_id, self.semantic_id, self.keep = depth.id, semantic.id, keep
+        self._held = hold(keep)
         self.scratch = np.empty(depth.width * (keep.row_end - keep.row_first), dtype=np.float32)
 
     def read(self, frame: SensorFrame, yaw_error: float, kappa: float) -> float | None:
         """Distance of the 10th percentile in m; None: no target, or no image yet (A-037)."""
-        return self.read_through(self.keep, frame, yaw_error, kappa)
+        return self.read_between(self.keep.near, self.keep.far, frame, yaw_error, kappa)
 
-    def read_through(
-        self, keep: Corridor, frame: SensorFrame, yaw_error: float, kappa: float
+    def read_between(
+        self, near: float, far: float, frame: SensorFrame, yaw_error: float, kappa: float
     ) -> float | None:
-        """Reads as `read` does, through another corridor of the same rows."""
+        """Reads as `read` does, between other depths in m."""
         segments = frame.segments.get(self.depth_id)
         if segments is not None:
-            distance = corridor.read_segments(*segments, keep, PERCENTILE, sin(yaw_error), kappa)
+            if not len(segments.u):
+                return None
+            distance = corridor.read_held_segments(
+                *segments, self._held, near, far, PERCENTILE, sin(yaw_error), kappa
+            )
         else:
             images = self._pair(frame.images)
             if images is None:
                 return None
+            keep = self.keep._replace(near=near, far=far)
             distance = corridor.read_pixels(
                 *images, keep, PERCENTILE, sin(yaw_error), kappa, self.scratch
             )
@@ -201,10 +208,8 @@ class Verification:
         """Whether, and which pair says so; the bumper is asked first, the roof without its
         minimum depth (D-009)."""
         for name, pair in self.pairs:
-            keep = pair.keep._replace(
-                near=max(distance - VERIFY_TOLERANCE, BUMPER_DEPTHS[0]),
-                far=distance + VERIFY_TOLERANCE,
-            )
-            if pair.read_through(keep, frame, yaw_error, kappa) is not None:
+            near = max(distance - VERIFY_TOLERANCE, BUMPER_DEPTHS[0])
+            far = distance + VERIFY_TOLERANCE
+            if pair.read_between(near, far, frame, yaw_error, kappa) is not None:
                 return True, name
         return False, "none"

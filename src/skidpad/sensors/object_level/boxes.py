@@ -148,6 +148,8 @@ def walls_in_view(
         aside += max(groups.y_min[g] - origin[1], origin[1] - groups.y_max[g], 0.0)
         if aside > 1.5 * reach + groups.longest[g] + ROUNDING:
             continue
+        if _is_out_of_view(origin, c, s, slope, groups, g):
+            continue
         for w in range(GROUP * g, min(GROUP * (g + 1), walls.x0.size)):
             ax, ay = walls.x0[w] - origin[0], walls.y0[w] - origin[1]
             bx, by = walls.x1[w] - origin[0], walls.y1[w] - origin[1]
@@ -162,6 +164,20 @@ def walls_in_view(
                 keep[n] = w
                 n += 1
     return n
+
+
+@inner_kernel
+def _is_out_of_view(
+    origin: Floats, c: float, s: float, slope: float, groups: WallGroups, g: int
+) -> bool:
+    """Whether a rectangle about all walls of a group lies behind, or beyond one side of the view."""
+    x = 0.5 * (groups.x_min[g] + groups.x_max[g]) - origin[0]
+    y = 0.5 * (groups.y_min[g] + groups.y_max[g]) - origin[1]
+    half_x = 0.5 * (groups.x_max[g] - groups.x_min[g]) + groups.longest[g] + ROUNDING
+    half_y = 0.5 * (groups.y_max[g] - groups.y_min[g]) + groups.longest[g] + ROUNDING
+    farthest = c * x + s * y + abs(c) * half_x + abs(s) * half_y
+    nearest = abs(c * y - s * x) - abs(s) * half_x - abs(c) * half_y
+    return farthest < 0.0 or nearest > slope * farthest
 
 
 @inner_kernel

@@ -37,6 +37,8 @@ MARGIN = 1e-4  # m by which a ray must pass beside a box to be left out
 # it is where rays and both ends of the wall lie ahead of the antenna: by a share and by m.
 ASIDE = 1e-4
 AHEAD = 0.1
+BINS = 128  # of slopes across the beam
+NARROWEST = 1e-6  # half width of a beam, for its bins
 
 
 class Antenna(NamedTuple):
@@ -63,8 +65,9 @@ class Rays(NamedTuple):
     down: Floats
     best: Floats  # m to what was met, or the reach
     hit: Ints  # row of the actor, 0: road, wall or post, -1: nothing
-    slope: Floats  # left by forward, rising; -inf: not ahead
-    order: Ints  # the ray of each slope
+    bin: Ints  # of the slope
+    order: Ints  # rays by bin
+    ends: Ints  # (BINS,) where each bin ends in `order`
 
 
 class NearBoxes(NamedTuple):
@@ -100,11 +103,11 @@ def _make_near(n: int) -> NearBoxes:
 
 def make_scratch(rays: int, walls: Walls, posts: int, boxes: int) -> RadarScratch:
     """Returns arrays for these walls, and for so many rays, posts and actors."""
-    x, y, z, right, down, best, slope = np.empty((7, rays))
-    hit, order = np.empty((2, rays), np.int64)
+    x, y, z, right, down, best = np.empty((6, rays))
+    hit, bin, order = np.empty((3, rays), np.int64)
     return RadarScratch(
         empty_mount(),
-        Rays(x, y, z, right, down, best, hit, slope, order),
+        Rays(x, y, z, right, down, best, hit, bin, order, np.empty(BINS, np.int64)),
         group_walls(walls),
         np.empty(len(walls.x0), np.int64),
         _make_near(posts),
@@ -142,13 +145,13 @@ def cast_radar(
     height = origin[2] - boxes.z[0] - slope[0] * ox - slope[1] * oy
     vx0 = states.vx[0] - states.yaw_rate[0] * oy
     vy0 = states.vy[0] + states.yaw_rate[0] * ox
-    _aim(beam, tick, rotation, reach, rays)
+    are_ahead = _aim(beam, tick, rotation, reach, rays)
     for k in range(beam.rays):
         fall = rays.z[k] - slope[0] * rays.x[k] - slope[1] * rays.y[k]
         if fall < 0.0 and -height / fall < reach:  # the road
             rays.best[k], rays.hit[k] = -height / fall, 0
     m_walls = walls_in_view(origin, yaw, edge, walls, work.groups, reach, work.walls)
-    _meet_walls(rays, origin, yaw, walls, work.walls, m_walls)
+    _meet_walls(rays, are_ahead, beam.half_width, origin, yaw, walls, work.walls, m_walls)
     n = 0
     for k in range(beam.rays):
         dx, dy, dz, best, hit = rays.x[k], rays.y[k], rays.z[k], rays.best[k], rays.hit[k]
@@ -194,10 +197,14 @@ def find_slope(lanes: LaneArrays, x: float, y: float, z: float, slope: Floats) -
 
 
 @inner_kernel
-def _aim(beam: Beam, tick: int, rotation: Floats, reach: float, rays: Rays) -> None:
+def _aim(beam: Beam, tick: int, rotation: Floats, reach: float, rays: Rays) -> bool:
+    """Draws the rays of a tick and sorts them by the bin of their slope; whether all look ahead."""
     n = beam.rays
     yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
     c, s = np.cos(yaw), np.sin(yaw)
+    are_ahead = True
+    for b in range(BINS):
+        rays.ends[b] = 0
     for k in range(n):
         right, down = direction(beam, tick, k)
         fx = 1.0 / np.sqrt(1.0 + right * right + down * down)
@@ -208,22 +215,44 @@ def _aim(beam: Beam, tick: int, rotation: Floats, reach: float, rays: Rays) -> N
         rays.z[k] = rotation[2, 0] * fx + rotation[2, 1] * fy + rotation[2, 2] * fz
         rays.right[k], rays.down[k], rays.best[k], rays.hit[k] = right, down, reach, -1
         forward = c * dx + s * dy
-        slope = (c * dy - s * dx) / forward if forward > AHEAD else -np.inf
-        j = k
-        while j > 0 and rays.slope[j - 1] > slope:
-            rays.slope[j], rays.order[j] = rays.slope[j - 1], rays.order[j - 1]
-            j -= 1
-        rays.slope[j], rays.order[j] = slope, k
+        is_ahead = forward > AHEAD
+        are_ahead = are_ahead and is_ahead
+        slope = (c * dy - s * dx) / forward if is_ahead else 0.0
+        rays.bin[k] = _bin_of(slope, beam.half_width)
+        rays.ends[rays.bin[k]] += 1
+    begin = 0
+    for b in range(BINS):
+        size = rays.ends[b]
+        rays.ends[b] = begin
+        begin += size
+    for k in range(n):
+        b = rays.bin[k]
+        rays.order[rays.ends[b]] = k
+        rays.ends[b] += 1
+    return are_ahead
+
+
+@inner_kernel
+def _bin_of(slope: float, half_width: float) -> int:
+    """Of BINS across a beam; it never falls as the slope rises, and the outer ones have no end."""
+    half = max(half_width, NARROWEST)
+    return int(min(max((slope + half) * (0.5 * BINS / half), 0.0), BINS - 1.0))
 
 
 @inner_kernel
 def _meet_walls(
-    rays: Rays, origin: Floats, yaw: float, walls: Walls, chosen: Ints, count: int
+    rays: Rays,
+    are_ahead: bool,
+    half_width: float,
+    origin: Floats,
+    yaw: float,
+    walls: Walls,
+    chosen: Ints,
+    count: int,
 ) -> None:
-    """A wall is compared with the rays whose slope lies between those of its ends."""
+    """A wall is compared with the rays in the bins from one of its ends to the other."""
     c, s = np.cos(yaw), np.sin(yaw)
     n = rays.x.size
-    are_ahead = rays.slope[0] > -np.inf
     for m in range(count):
         w = chosen[m]
         px, py = walls.x0[w] - origin[0], walls.y0[w] - origin[1]
@@ -231,33 +260,19 @@ def _meet_walls(
         ex, ey = walls.x1[w] - walls.x0[w], walls.y1[w] - walls.y0[w]
         across = ex * py - ey * px
         p, q = c * px + s * py, c * qx + s * qy
-        first, last = 0, np.inf
+        first, end = 0, n
         if are_ahead and p > AHEAD and q > AHEAD:
             one, other = (c * py - s * px) / p, (c * qy - s * qx) / q
-            last = max(one, other) + ASIDE
-            first = _first_from(rays.slope, min(one, other) - ASIDE)
-        for j in range(first, n):
-            if rays.slope[j] > last:
-                break
+            low = _bin_of(min(one, other) - ASIDE, half_width)
+            first = rays.ends[low - 1] if low > 0 else 0
+            end = rays.ends[_bin_of(max(one, other) + ASIDE, half_width)]
+        for j in range(first, end):
             k = rays.order[j]
             t, f = _ray_line(rays.x[k], rays.y[k], px, py, ex, ey, across)
             if t < rays.best[k]:
                 rise = origin[2] + t * rays.z[k] - (walls.z0[w] + f * (walls.z1[w] - walls.z0[w]))
                 if 0.0 <= rise <= walls.height[w]:
                     rays.best[k], rays.hit[k] = t, 0
-
-
-@inner_kernel
-def _first_from(rising: Floats, value: float) -> int:
-    """The first of rising values that is not below `value`."""
-    low, high = 0, rising.size
-    while low < high:
-        middle = (low + high) // 2
-        if rising[middle] < value:
-            low = middle + 1
-        else:
-            high = middle
-    return low
 
 
 @inner_kernel

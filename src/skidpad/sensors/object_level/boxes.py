@@ -177,7 +177,7 @@ def _is_out_of_view(
     half_y = 0.5 * (groups.y_max[g] - groups.y_min[g]) + groups.longest[g] + ROUNDING
     farthest = c * x + s * y + abs(c) * half_x + abs(s) * half_y
     nearest = abs(c * y - s * x) - abs(s) * half_x - abs(c) * half_y
-    return farthest < 0.0 or nearest > slope * farthest
+    return bool(farthest < 0.0 or nearest > slope * farthest)
 
 
 @inner_kernel

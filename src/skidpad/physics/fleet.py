@@ -184,7 +184,10 @@ class Fleet:
         return np.where(np.hypot(u, v) > 1.0, np.arctan2(v, u), 0.0)
 
     def gear(self, i: int, reverse: bool = False) -> int:
-        """Gear that an automatic box shows: -1 in reverse, else 1 to 6 by speed."""
-        if reverse:
-            return -1
-        return 1 + bisect_left(GEAR_UP_V, abs(self.speed(i)))
+        """Gear that the box of vehicle i shows, see `shown_gear`."""
+        return shown_gear(self.speed(i), reverse)
+
+
+def shown_gear(speed: float, reverse: bool) -> int:
+    """Gear that an automatic box shows: -1 in reverse, else 1 to 6 by speed in m/s."""
+    return -1 if reverse else 1 + bisect_left(GEAR_UP_V, abs(speed))

@@ -45,10 +45,12 @@ class AnyEntity:
         return [n for n in names if self.condition.holds(scene, n)]
 
     def _holds(self, scene: Scene) -> bool:
-        found = (
-            scene.actors[name].present and self.condition.holds(scene, name) for name in self.names
-        )
-        return all(found) if self.of_all else any(found)
+        for name in self.names:
+            if (
+                scene.actors[name].present and self.condition.holds(scene, name)
+            ) is not self.of_all:
+                return not self.of_all
+        return self.of_all
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,8 +121,13 @@ class Watch:
 
     def fires(self, scene: Scene) -> bool:
         """Every condition is looked at in every step, so that delays and edges stay true."""
-        results = [[c.holds(scene) for c in group] for group in self.groups]
-        self.fired = [g for g, said in zip(self.groups, results, strict=True) if all(said)]
+        self.fired = []
+        for group in self.groups:
+            are_met = True
+            for condition in group:
+                are_met = condition.holds(scene) and are_met
+            if are_met:
+                self.fired.append(group)
         return bool(self.fired)
 
     def triggering(self, scene: Scene) -> list[str]:

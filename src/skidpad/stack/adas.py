@@ -162,12 +162,8 @@ class AdasStack:
         stop_distance = stop.distance if stop is not None else None
         lane_curvature = view.ego.curvature if view.ego is not None else 0.0
         self.resume.update(stop is not None, kmh_from_mps(v), lane_curvature)
-        situation, sight = self._situation(frame, v, view, sight, stop_distance)
         v_bends = self._speed_for_bends(frame, v, view)
-        told_kmh = kmh_from_mps(self.v_told)
-        slower_kmh = min(situation.cruise_kmh, kmh_from_mps(v_bends), told_kmh)
-        slower_cap_kmh = min(situation.follow_cap_kmh, told_kmh)
-        situation = situation._replace(cruise_kmh=slower_kmh, follow_cap_kmh=slower_cap_kmh)
+        situation, sight = self._situation(frame, v, v_bends, view, sight, stop_distance)
         supervised = frame.supervision is not Supervision.NONE
         request = Request(Tier.NONE)
         if not supervised:
@@ -212,6 +208,7 @@ class AdasStack:
         self,
         frame: SensorFrame,
         v: float,
+        v_bends: float,
         view: LaneView,
         sight: Sight,
         stop_distance: float | None,
@@ -219,13 +216,14 @@ class AdasStack:
         """What the tiers see; a target that the cameras do not confirm at standstill is dropped
         before them, so that all tiers go on without it (A-116, D-043)."""
         active, self.verified_by = self.resume.active, ""
+        told_kmh = kmh_from_mps(self.v_told)
         s = Situation(
             v=v,
             v_kmh=kmh_from_mps(v),
             lead=_lead(sight, v),
             stop_distance=stop_distance,
-            cruise_kmh=self.caps.cruise_kmh(active),
-            follow_cap_kmh=self.caps.following_kmh(active),
+            cruise_kmh=min(self.caps.cruise_kmh(active), kmh_from_mps(v_bends), told_kmh),
+            follow_cap_kmh=min(self.caps.following_kmh(active), told_kmh),
         )
         if sight.distance is None or not (self.hierarchy.brakes and needs_verification(s)):
             return s, sight

@@ -99,8 +99,8 @@ class FileChanges:
     def news(self) -> Outside | None:
         """What has changed since it was asked last."""
         scene = self.player.scene
-        unseen = frozenset(actor.name for actor in scene.actors.values() if not actor.visible)
-        lights, before = held_lights(scene), self.outside
+        unseen = frozenset([actor.name for actor in scene.actors.values() if not actor.visible])
+        lights, before = held_lights(scene) if scene.signals else (), self.outside
         is_same = lights == before.lights and unseen == before.unseen and not scene.lamps
         if is_same and self.done == len(scene.environments):
             return None  # as in most ticks

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import fields
 from operator import attrgetter
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidpad.core.frames import SensorFrame
-from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
+from skidpad.core.jit import Held, hold, kernel
+from skidpad.core.states import ActorStates, ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import LightState, Supervision
 from skidpad.recording.run.events import (
     Event,
@@ -31,11 +34,18 @@ from skidpad.recording.run.log import (
 
 REPORT_FIELDS = tuple(f.name for f in fields(StackReport))
 read_report = attrgetter(*REPORT_FIELDS)
-read_states = attrgetter(*ActorSeries._fields)
 NO_REPORT = (None,) * len(REPORT_FIELDS)
 N_EGO, N_COMMAND, N_REPORT = len(EgoSeries._fields), len(CommandSeries._fields), len(REPORT_FIELDS)
 N_ROW = N_EGO + 2 * N_COMMAND + N_REPORT
 GROWTH = 2
+
+
+class ActorColumns(NamedTuple):
+    """The recorder's arrays of n actors over T ticks."""
+
+    actors: NDArray[np.float32]  # (fields of ActorSeries in their order, T, n)
+    present: NDArray[np.bool_]  # (T, n)
+    mu: NDArray[np.float32]  # (T, n, 4)
 
 
 class TickLog:
@@ -57,6 +67,8 @@ class TickLog:
         self._lights: dict[int, LightState] = {}
         self._weathers = [weather]
         self._weather = 0
+        self._states: ActorStates | None = None  # those of `_held`
+        self._columns = hold(ActorColumns(self._actors, self._present, self._mu))
 
     def __len__(self) -> int:
         return self._n
@@ -84,10 +96,9 @@ class TickLog:
             *(command.handbrake, command.reverse),
             *(NO_REPORT if report is None else read_report(report)),
         )
-        for buffer, values in zip(self._actors, read_states(truth.states), strict=True):
-            buffer[k] = values
-        self._present[k] = truth.states.present
-        self._mu[k] = truth.mu
+        if truth.states is not self._states:
+            self._states, self._held = truth.states, hold(truth.states)
+        copy_actors(self._held, truth.mu, self._columns, k)
         if (
             truth.contacts
             or truth.invasions
@@ -157,3 +168,19 @@ class TickLog:
         self._actors = np.concatenate([self._actors, empty], axis=1)
         self._present = np.concatenate([self._present, np.zeros((more, n), np.bool_)])
         self._mu = np.concatenate([self._mu, np.full((more, n, 4), np.nan, np.float32)])
+        self._columns = hold(ActorColumns(self._actors, self._present, self._mu))
+
+
+@kernel
+def copy_actors(
+    states: Held[ActorStates], mu: NDArray[np.float64], columns: Held[ActorColumns], k: int
+) -> None:
+    """Writes tick k of every actor; mu: (n, 4)."""
+    s, c = states.value, columns.value
+    for i in range(len(s.x)):
+        c.actors[0, k, i], c.actors[1, k, i], c.actors[2, k, i] = s.x[i], s.y[i], s.z[i]
+        c.actors[3, k, i], c.actors[4, k, i], c.actors[5, k, i] = s.yaw[i], s.vx[i], s.vy[i]
+        c.actors[6, k, i], c.actors[7, k, i], c.actors[8, k, i] = s.yaw_rate[i], s.ax[i], s.ay[i]
+        c.present[k, i] = s.present[i]
+        for wheel in range(4):
+            c.mu[k, i, wheel] = mu[i, wheel]

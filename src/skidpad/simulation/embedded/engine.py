@@ -7,6 +7,7 @@ from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidpad.core.errors import BackendError
 from skidpad.core.frames import Frame, SensorFrame
@@ -15,10 +16,12 @@ from skidpad.core.inputs import Outside
 from skidpad.core.randomness import stream
 from skidpad.core.setup import ActorCommand, Setup
 from skidpad.core.states import EgoEstimate, VehicleCommand, WorldTruth
+from skidpad.physics.fleet import shown_gear
 from skidpad.physics.grip import road_of
 from skidpad.roads.queries import RoadMap
 from skidpad.sensors.requested import AskedSensors
 from skidpad.simulation.sensing import sensing_of
+from skidpad.simulation.world.feel import feel_motion
 from skidpad.simulation.world.stage import staged
 from skidpad.simulation.world.world import EGO, World
 
@@ -51,7 +54,7 @@ class EmbeddedBackend:
         """Begin a run: everything is built anew (decision X-12)."""
         self._world, self._noise = staged(setup, seed), setup.localisation_noise
         self._setup, self._seed = setup, seed
-        self._unseen = np.zeros(len(self.world.table), dtype=np.bool_)
+        self._unseen: NDArray[np.bool_] | None = None  # hidden from all sensors; None: none is
         self._brake_lamps: list[tuple[int, bool]] = []
         self._localisation = stream(seed, "ego", "localisation")
         self.sensing = sensing_of(self.map, self.world.table, setup, seed, self.poison)
@@ -106,7 +109,9 @@ class EmbeddedBackend:
             self.world.blow(*outside.wind)
         self.world.lights.hold(outside.lights)
         names = self.world.table.names
-        self._unseen = np.array([name in outside.unseen for name in names], dtype=np.bool_)
+        self._unseen = None
+        if outside.unseen:
+            self._unseen = np.array([name in outside.unseen for name in names], dtype=np.bool_)
         self._brake_lamps = [(names.index(name), lit) for name, lit in outside.brake_lamps]
         self.sensing.change(outside)
         self._setup = changed
@@ -124,7 +129,7 @@ class EmbeddedBackend:
     def _frame(self) -> SensorFrame:
         w, asked = self.world, self._asked
         states = w.states
-        if self._unseen.any():
+        if self._unseen is not None:
             states = states._replace(present=states.present & ~self._unseen)
         lights, braking = w.lights.by_id, w.braking()
         for row, lit in self._brake_lamps:
@@ -144,18 +149,18 @@ class EmbeddedBackend:
         )
 
     def _estimate(self) -> EgoEstimate:
-        w, s = self.world, self.world.states
-        pose = s.pose(EGO)
-        sigma = self._noise
+        w, sigma = self.world, self._noise
+        x, y, z, roll, pitch, yaw, speed, yaw_rate, ax, ay, *wheels = feel_motion(w.arena, EGO)
+        pose = Pose(x, y, z, roll, pitch, yaw)
         if sigma > 0.0:
             dx, dy = self._localisation.normal(0.0, sigma, 2).tolist()
             pose = replace(pose, x=pose.x + dx, y=pose.y + dy)
         return EgoEstimate(
             pose=pose,
-            speed=w.fleet.speed(EGO),
-            yaw_rate=float(s.yaw_rate[EGO]),
-            ax=float(s.ax[EGO]),
-            ay=float(s.ay[EGO]),
-            wheel_speeds=w.fleet.wheel_speeds(EGO),
-            gear=w.fleet.gear(EGO, bool(w.commands[EGO, REVERSE])),
+            speed=speed,
+            yaw_rate=yaw_rate,
+            ax=ax,
+            ay=ay,
+            wheel_speeds=(wheels[0], wheels[1], wheels[2], wheels[3]),
+            gear=shown_gear(speed, bool(w.commands[EGO, REVERSE])),
         )

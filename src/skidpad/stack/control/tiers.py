@@ -356,7 +356,12 @@ class Hierarchy:
 
     def decide(self, s: Situation) -> Request:
         """The first request in the order of the tiers."""
-        request = next(r for rule in self.rules if (r := rule(s)) is not None)
+        request = NO_ACTION
+        for rule in self.rules:  # the last one always makes a request
+            found = rule(s)
+            if found is not None:
+                request = found
+                break
         if request.tier in RESET_BY:
             self.reset_pids()
         elif request.tier is Tier.CRUISE and self.last is not Tier.CRUISE:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from functools import lru_cache
+from functools import cache, lru_cache, partial
 from math import hypot, inf
 from typing import NamedTuple
 
@@ -52,6 +52,7 @@ PUT_BACK_SPEED = 0.8  # of the desired speed there
 NOSE = 5.0  # m from a car's middle to where it stands before a line
 BUBBLE = 500.0  # m, random traffic lives within this distance of the ego (A-209)
 CHECK_PERIOD = 20  # ticks between two looks at wrecks and the bubble
+Claimed = Callable[[], Places]  # of `claims`, made at the first call
 
 
 @lru_cache(maxsize=8)
@@ -183,7 +184,8 @@ class Traffic:
         """Vehicles to put somewhere in this tick; apply each before asking for the next."""
         if tick % CHECK_PERIOD:
             return
-        driver, claimed = self.drivers.state, claims(placed, self.drivers)
+        driver = self.drivers.state
+        claimed = cache(partial(claims, placed, self.drivers))  # most ticks need none
         if self.setup.put_wrecks_back:
             wrecks = np.flatnonzero(driver["active"] & (driver["stuck"] > STUCK_TIME))
             for i in wrecks.tolist():
@@ -197,7 +199,7 @@ class Traffic:
         elif self.waiting:
             yield from self._let_in(states, claimed, Area(UNSEEN, BUBBLE))
 
-    def _keep_pack(self, states: ActorStates, claimed: Places, pack: Pack) -> Iterator[Move]:
+    def _keep_pack(self, states: ActorStates, claimed: Claimed, pack: Pack) -> Iterator[Move]:
         def area(*sides: bool) -> Area:
             found = [pack.entrances(self.places.candidates, ahead) for ahead in sides]
             return Area(UNSEEN, RADIUS, np.concatenate(found))
@@ -207,14 +209,14 @@ class Traffic:
         for i, ahead in pack.lost(self.drivers, states):
             yield from self._put(i, states, claimed, area(ahead), Reason.FAR)
 
-    def _let_in(self, states: ActorStates, claimed: Places, area: Area) -> Iterator[Move]:
+    def _let_in(self, states: ActorStates, claimed: Claimed, area: Area) -> Iterator[Move]:
         for id in list(self.waiting):
             for move in self._put(self.row[id], states, claimed, area, Reason.ENTERS):
                 self.waiting.remove(id)
                 self.drivers.state["active"][move.actor] = True
                 yield move
 
-    def _keep_bubble(self, states: ActorStates, claimed: Places) -> Iterator[Move]:
+    def _keep_bubble(self, states: ActorStates, claimed: Claimed) -> Iterator[Move]:
         area = Area(UNSEEN, BUBBLE)
         yield from self._let_in(states, claimed, area)
         x, y = float(states.x[0]), float(states.y[0])
@@ -226,7 +228,7 @@ class Traffic:
                 yield from self._put(i, states, claimed, area, Reason.FAR)
 
     def _put(
-        self, i: int, states: ActorStates, claimed: Places, area: Area, reason: Reason
+        self, i: int, states: ActorStates, claimed: Claimed, area: Area, reason: Reason
     ) -> Iterator[Move]:
         at = self.places.draw(
             states,
@@ -243,7 +245,11 @@ class Traffic:
         me["at"], me["s"] = at, point["s"]
         me["change"] = me["cap"] = np.inf
         me["trim"] = me["stuck"] = me["v_desired"] = 0.0
-        for row in (claimed[i], claimed[i + len(claimed) // 2]):  # who is put next looks there
+        all_claims = claimed()
+        for row in (
+            all_claims[i],
+            all_claims[i + len(all_claims) // 2],
+        ):  # who is put next looks there
             row["lane"], row["s"], row["speed"] = self.places.lane[at], point["s"], v
             row["present"] = True
         pose = Pose(
@@ -254,18 +260,19 @@ class Traffic:
         )
         yield Move(i, pose, v, reason)
 
-    def _is_alone(self, i: int, states: ActorStates, claimed: Places) -> bool:
+    def _is_alone(self, i: int, states: ActorStates, claimed: Claimed) -> bool:
         """Whether nobody is so near to vehicle i that its vanishing would be noticed."""
         v = float(np.hypot(states.vx[i], states.vy[i]))
-        rows = claimed[[i, i + len(claimed) // 2]]
+        found = claimed()
+        rows = found[[i, i + len(found) // 2]]
         return all(
-            seconds_to_others(self.net, claimed, int(row["lane"]), float(row["s"]), v, i)
+            seconds_to_others(self.net, found, int(row["lane"]), float(row["s"]), v, i)
             >= LEAST_TIME
             for row in rows[rows["lane"] >= 0]
         )
 
     def _has_room(
-        self, i: int, at: int, d: NDArray[np.float64], states: ActorStates, claimed: Places
+        self, i: int, at: int, d: NDArray[np.float64], states: ActorStates, claimed: Claimed
     ) -> bool:
         """Whether vehicle i can be put on sample `at`, d m from every actor."""
         v = self._speed_at(i, at)
@@ -273,8 +280,8 @@ class Traffic:
             return False
         lane, s = int(self.places.lane[at]), float(self.net.point["s"][at])
         return (
-            is_crossing_free(self.streets, claimed, lane, s, i)
-            and seconds_to_others(self.net, claimed, lane, s, v, i) >= LEAST_TIME
+            is_crossing_free(self.streets, claimed(), lane, s, i)
+            and seconds_to_others(self.net, claimed(), lane, s, v, i) >= LEAST_TIME
         )
 
     def _speed_at(self, i: int, at: int) -> float:

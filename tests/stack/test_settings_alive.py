@@ -234,6 +234,19 @@ def lidar(settings: Settings) -> bytes:
     return found
 
 
+def sprayed(settings: Settings) -> bytes:
+    """What a physical lidar returns behind a fast vehicle in rain."""
+    ready = cell(settings.with_values({"lidar": "physical"}), "rain-noon")
+    spec = LidarSpec("lidar", Pose(0.0, 0.0, 2.0), range=80.0)
+    setup = stage_of(ready).setup
+    ego = replace(setup.ego, speed=30.0)
+    setup = replace(setup, ego=ego, specs=(*setup.specs, spec), asked=frozenset({"lidar"}))
+    backend = EmbeddedBackend()
+    found = backend.reset(setup, ready.seed).extra["lidar"].xyz.tobytes()
+    backend.close()
+    return found
+
+
 def recovery(settings: Settings) -> list[Any]:
     """A contact with a car standing 10 m ahead, until the ego drives again."""
     start = figure8().ahead(figure8().place(figure8().ego_start), 300.0)
@@ -267,6 +280,7 @@ OTHERS: dict[str, Scenario] = {
     "tyre_stiffness": Scenario(True, short_drive("rain-noon")),
     "water_drag": Scenario(True, short_drive("rain-noon")),
     "lidar": Scenario("physical", lidar),
+    "spray": Scenario(True, sprayed),
     "radar_model": Scenario("physical", short_drive("clear-noon")),
     "lane_material": Scenario(True, lane_friction),
     "esc": Scenario(False, short_drive("icy_30")),

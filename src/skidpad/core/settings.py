@@ -126,6 +126,9 @@ class SensorSettings(SettingsPart):
     lidar: LidarModel = setting_field(
         LidarModel.EXACT, "M-1, T-11", "lost and false returns of lidars in rain, fog, snow"
     )
+    spray: bool = setting_field(
+        False, "M-1, T-11", "spray behind vehicles, for lidars with lidar=physical"
+    )
     radar_model: RadarModel = setting_field(
         RadarModel.GEOMETRIC, "M-1, T-11", "echoes of the radar: noise, clutter, rain, wet radome"
     )

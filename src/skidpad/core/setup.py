@@ -106,6 +106,7 @@ class Setup:
     # mu_ref that <material friction> of the map replaces; None: it is not read (embedded backend)
     material_base: float | None = None
     lidar: LidarModel = LidarModel.EXACT  # of the lidars that a stack asks for (embedded backend)
+    spray: bool = False  # behind vehicles, for such lidars (embedded backend)
     radar_model: RadarModel = RadarModel.GEOMETRIC  # of the common radar (embedded backend)
     stability: bool = False  # all vehicles have stability and traction control (embedded backend)
     anti_lock: AntiLock = AntiLock.IDEAL  # of vehicles that have them (embedded backend)

@@ -27,11 +27,13 @@ from skidpad.core.specs import (
 )
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LidarModel, LightState, RangeModel
+from skidpad.physics.grip import road_surface
 from skidpad.physics.optics import LidarAir, extinction, lidar_air
 from skidpad.sensors import inertial
 from skidpad.sensors.channels.presets import senses_of
 from skidpad.sensors.channels.suite import CYCLE, ChannelSuite
 from skidpad.sensors.object_level.eyes import Eyes
+from skidpad.sensors.ranging.clouds import SprayClouds
 from skidpad.sensors.ranging.lidar import Lidar
 from skidpad.sensors.ranging.lidar_returns import ReturnModel
 from skidpad.sensors.raster.live_scene import LiveScene, SceneMap
@@ -162,8 +164,13 @@ def make_lidar(spec: LidarSpec, sensors: AskedSensors) -> Callable[[], LidarPoin
         air = lidar_air(setup.weather) if physical else LidarAir()
         returns = ReturnModel(air, spec.range)
     key = stream_key(sensors.seed, "lidar", spec.id)
-    lidar = Lidar(spec, setup.dt, sensors.air, returns, key)
-    return lambda: lidar.measure(sensors.tick, sensors.states.pose(EGO), sensors.scene(), EGO)
+    clouds = None
+    if setup.spray:
+        clouds = SprayClouds(sensors.table, road_surface(setup.weather).film_mm / 1000.0)
+    lidar = Lidar(spec, setup.dt, sensors.air, returns, key, clouds)
+    return lambda: lidar.measure(
+        sensors.tick, sensors.states.pose(EGO), sensors.scene(), EGO, sensors.states
+    )
 
 
 def make_gnss(spec: PointSensorSpec, sensors: AskedSensors) -> Callable[[], GnssFix]:

@@ -280,6 +280,7 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
         water_drag=world.water_drag,
         material_base=world.mu_ref if world.lane_material else None,
         lidar=sensors.lidar,
+        spray=sensors.spray,
         radar_model=sensors.radar_model,
         stability=world.esc,
         anti_lock=world.anti_lock,

@@ -18,14 +18,17 @@ from skidpad.core.frames import LidarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import kernel
 from skidpad.core.specs import LidarSpec
+from skidpad.core.states import ActorStates
 from skidpad.sensors.ranging.around import (
     SECTORS,
     STEEPEST_DEG,
     Fan,
     RayHits,
+    directions,
     look_around,
     sectors_of,
 )
+from skidpad.sensors.ranging.clouds import SprayClouds, Sprayed, no_spray
 from skidpad.sensors.ranging.lidar_returns import BeamAir, ReturnModel, find_returns
 from skidpad.sensors.raster.live_scene import LiveScene
 
@@ -42,8 +45,12 @@ class Lidar:
         extinction: float = 0.0,
         returns: ReturnModel | None = None,
         key: int = 0,
+        spray: SprayClouds | None = None,
     ) -> None:
-        """extinction: of light in the air, 1/m. returns: instead of it. key: of their random numbers."""
+        """extinction: of light in the air, 1/m. returns: instead of it. key: of their random numbers.
+
+        spray: behind vehicles, with `returns`.
+        """
         steepest = max(abs(spec.upper_fov_deg), abs(spec.lower_fov_deg))
         if steepest > STEEPEST_DEG:
             raise ConfigError(
@@ -51,16 +58,24 @@ class Lidar:
                 f"got {spec.lower_fov_deg:g} to {spec.upper_fov_deg:g}"
             )
         self.spec, self._extinction = spec, extinction
-        self._returns, self._key = returns, key
+        self._returns, self._key, self._spray = returns, key, spray
         self._sweep = 2.0 * pi * spec.rotation_hz * dt
         self._columns = max(1, round(spec.points_per_second * dt / spec.channels))
         angles = np.linspace(spec.upper_fov_deg, spec.lower_fov_deg, spec.channels)
         self._elevation = np.radians(angles)
 
     def measure(
-        self, tick: int, pose_world_carrier: Pose, scene: LiveScene, carrier: int
+        self,
+        tick: int,
+        pose_world_carrier: Pose,
+        scene: LiveScene,
+        carrier: int,
+        states: ActorStates | None = None,
     ) -> LidarPoints:
-        """The returns of one tick. carrier: row of the actor that carries it unseen, or -1."""
+        """The returns of one tick.
+
+        carrier: row of the actor that carries it unseen, or -1. states: of all, for their spray.
+        """
         turn = -(tick * self._sweep + self._sweep * np.arange(self._columns) / self._columns)
         azimuth = (turn + pi / SECTORS) % (2.0 * pi) - pi / SECTORS
         azimuth = azimuth[np.argsort(sectors_of(azimuth), kind="stable")]
@@ -70,7 +85,10 @@ class Lidar:
         pose = pose_world_carrier @ self.spec.mount
         seen = look_around(scene, pose, fan, self.spec.range, carrier)
         if self._returns is not None:
-            return self._through_weather(self._returns, fan, seen, tick)
+            spray = no_spray()
+            if self._spray is not None and states is not None:
+                spray = self._sprayed(self._spray, states, pose, fan, seen, tick)
+            return self._through_weather(self._returns, fan, seen, tick, spray)
         return LidarPoints(
             (seen.direction * seen.distance[:, None]).astype(np.float32),
             np.exp(-self._extinction * seen.distance).astype(np.float32),
@@ -79,8 +97,24 @@ class Lidar:
             seen.instance.astype(np.uint16),
         )
 
+    def _sprayed(
+        self,
+        clouds: SprayClouds,
+        states: ActorStates,
+        eye: Pose,
+        fan: Fan,
+        seen: RayHits,
+        tick: int,
+    ) -> Sprayed:
+        """What spray does to every beam of a tick."""
+        n = len(fan.column)
+        distance = np.full(n, self.spec.range)
+        distance[seen.ray] = seen.distance
+        ways = directions(fan, np.arange(n))
+        return clouds.of_beams(states, eye, fan.azimuth, ways, distance, np.uint64(self._key), tick)
+
     def _through_weather(
-        self, model: ReturnModel, fan: Fan, seen: RayHits, tick: int
+        self, model: ReturnModel, fan: Fan, seen: RayHits, tick: int, spray: Sprayed
     ) -> LidarPoints:
         """What is noticed of the beams of a tick; false returns have class 0 and no actor."""
         n = len(fan.column)
@@ -90,14 +124,14 @@ class Lidar:
         )  # fmt: skip
         aside = np.column_stack([np.cos(fan.azimuth), np.sin(fan.azimuth)])
         up = np.column_stack([np.cos(fan.elevation), np.sin(fan.elevation)])
-        m = scan_weather(model.air, fan, seen, aside, up, np.uint64(self._key), tick, out)
+        m = scan_weather(model.air, fan, seen, aside, up, np.uint64(self._key), tick, out, spray)
         return LidarPoints._make(column[:m] for column in out)
 
 
 @kernel
 def scan_weather(
     air: BeamAir, fan: Fan, seen: RayHits, aside: Floats, up: Floats, key: np.uint64, tick: int,
-    out: LidarPoints,
+    out: LidarPoints, spray: Sprayed,
 ) -> int:  # fmt: skip
     """All beams of a tick into `out`, without those that nothing came back of; their number.
 
@@ -106,7 +140,7 @@ def scan_weather(
     distance, label = np.full(fan.column.size, np.inf), np.zeros(fan.column.size, np.int64)
     for k in range(seen.ray.size):
         distance[seen.ray[k]], label[seen.ray[k]] = seen.distance[k], seen.label[k]
-    found, m, k = find_returns(air, distance, label, key, tick), 0, 0
+    found, m, k = find_returns(air, distance, label, key, tick, spray), 0, 0
     for i in range(distance.size):
         met = distance[i] < np.inf
         far = found.distance[i]

@@ -28,6 +28,7 @@ from skidpad.core.splitmix import GOLDEN, scrambled, unit
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.physics.droplets import SMALLEST_MM, Drops
 from skidpad.physics.optics import LidarAir
+from skidpad.sensors.ranging.clouds import Sprayed, no_spray
 
 Floats = NDArray[np.float64]
 
@@ -101,13 +102,18 @@ def _strongest_drop(m: BeamAir, chance: float, second: float) -> tuple[float, fl
 
 @kernel
 def find_returns(
-    m: BeamAir, distance: Floats, label: NDArray[np.int64], key: np.uint64, tick: int
+    m: BeamAir,
+    distance: Floats,
+    label: NDArray[np.int64],
+    key: np.uint64,
+    tick: int,
+    spray: Sprayed,
 ) -> Returns:
     """What beams bring back; distance: of the surface in the way, inf: none.
 
     One loop: a call per beam that is handed the air's arrays would cost more than all the rest.
     """
-    n = distance.size
+    n, sprayed = distance.size, spray.depth.size > 0
     out, strengths, false = np.empty(n), np.empty(n), np.zeros(n, np.bool_)
     start = scrambled(key + np.uint64(tick) * GOLDEN)  # random bits of a lidar in one tick
     for i in range(n):
@@ -115,6 +121,8 @@ def find_returns(
         power, intensity, found = 0.0, 0.0, distance[i]
         if found < inf:
             depth = m.fog * max(found - m.fog_start, 0.0) + m.falling * found
+            if sprayed:
+                depth += spray.depth[i]
             intensity = m.reflects[label[i]] * exp(-2.0 * depth)
             power = intensity / (found * found)
         chance = unit(scrambled(bits))
@@ -127,6 +135,9 @@ def find_returns(
             at = int(unit(scrambled(bits + np.uint64(2) * GOLDEN)) * m.spread.size)
             power, false[i] = m.fog_power, True
             found = min(m.fog_distance + m.spread[at], distance[i])
+            intensity = power * found * found
+        if sprayed and spray.power[i] > power:
+            power, found, false[i] = spray.power[i], spray.distance[i], True
             intensity = power * found * found
         if power < m.least:
             found, intensity, false[i] = inf, 0.0, False
@@ -164,7 +175,7 @@ class ReturnModel:
         self, distance: Floats, label: NDArray[np.int64], key: int, tick: int = 0
     ) -> Returns:
         """What beams bring back whose surfaces are so far; inf: they meet none."""
-        return find_returns(self.air, distance, label, np.uint64(key), tick)
+        return find_returns(self.air, distance, label, np.uint64(key), tick, no_spray())
 
 
 def fog_response(air: LidarAir, reach: float) -> tuple[float, float]:

@@ -1,0 +1,171 @@
+"""Clouds of spray behind vehicles, as a lidar's beams cross them: what they take, and what they return.
+
+A cloud begins at the rear of a vehicle and thins out with the distance by exp(-d / (v 1 s)), to 1 / 6. Along
+a beam its extinction is taken in six steps. Spray is ragged: in each step of a beam and tick it is
+denser or thinner than the mean by a factor of its own, exponential with mean 1 (assumption). It answers a
+pulse as fog does (`lidar_returns`), with fog's share of backscatter, over half a pulse at most.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, exp, log, pi, sin
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.geometry import Pose
+from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.splitmix import GOLDEN, scrambled, unit
+from skidpad.core.states import ActorStates, ActorTable
+from skidpad.core.vocabulary import ActorKind
+from skidpad.physics.droplets import FOG_BACKSCATTER
+from skidpad.physics.spray import ASIDE, HANGS, HIGHEST, spray_density, spray_extinction
+
+Floats = NDArray[np.float64]
+
+THIN = log(6.0)  # depths of thinning at which a cloud ends
+STEPS = 6
+ROOM = 0.05  # rad, of a column that is not upright as its lidar rolls and pitches
+NEAREST, ANSWER_REACH = 1.5, 30.0  # m, of spray that is noticed, as of drops in `lidar_returns`
+BACKSCATTER = -FOG_BACKSCATTER / log(0.05)  # 1/sr, of the extinction
+ANSWERS = 3.0  # m, half a pulse of 20 ns
+MEETS = (0.9, 10.0)  # m, from and to which receiver and beam come to overlap; `lidar_returns`
+LEAST = 1e-4  # 1/m, clouds thinner than this are left out
+DENSER = -np.log1p(-(np.arange(1024) + 0.5) / 1024)  # quantiles of an exponential distribution
+SALT = np.uint64(0x5BF0_3635_D1F9_B3A7)
+
+
+class Sprayed(NamedTuple):
+    """What spray does to n beams; empty arrays: there is none."""
+
+    depth: Floats  # one way, up to the surface
+    power: Floats  # of its strongest answer, 0: none
+    distance: Floats  # m of that
+
+
+def no_spray() -> Sprayed:
+    """Returns what is there without spray."""
+    none = np.empty(0)
+    return Sprayed(none, none, none)
+
+
+@inner_kernel
+def _span(cloud: Floats, back: float, left: float) -> float:
+    """Half the angle over which an eye `back` m behind the rear and `left` m of its middle sees a cloud."""
+    length, half = cloud[4], cloud[5]
+    if 0.0 <= back <= length and abs(left) <= half:
+        return pi
+    middle, most = atan2(-left, back - 0.5 * length), 0.0
+    for k in range(4):
+        x, y = (length if k < 2 else 0.0), (half if k % 2 == 0 else -half)
+        off = atan2(y - left, back - x) - middle
+        most = max(most, abs((off + pi) % (2.0 * pi) - pi))
+    return most + ROOM
+
+
+@kernel
+def spray_of(
+    clouds: Floats, eye: Floats, azimuth: Floats, ways: Floats, distance: Floats, key: np.uint64,
+    tick: int,
+) -> Sprayed:  # fmt: skip
+    """What clouds (k, 8) do to beams from `eye` (3,) with unit vectors ways (n, 3), both of the world.
+
+    A cloud: x, y, z of the middle of the rear at the road, yaw, length, half width, height in m,
+    extinction in 1/m at its begin. azimuth (m,): of the columns of n / m beams each, roughly.
+    """
+    n = distance.size
+    channels = n // azimuth.size
+    depth, power, where = np.zeros(n), np.zeros(n), np.zeros(n)
+    start = scrambled((key ^ SALT) + np.uint64(tick) * GOLDEN)
+    for c in range(len(clouds)):
+        x, y, z, yaw, length, half, high, first = clouds[c]
+        cy, sy = cos(yaw), sin(yaw)
+        ox, oy = eye[0] - x, eye[1] - y
+        back, left, up = -(ox * cy + oy * sy), oy * cy - ox * sy, eye[2] - z
+        toward = yaw + atan2(-left, back - 0.5 * length)
+        span = _span(clouds[c], back, left)
+        for column in range(azimuth.size):
+            if abs((azimuth[column] - toward + pi) % (2.0 * pi) - pi) > span:
+                continue
+            for i in range(column * channels, (column + 1) * channels):
+                wx, wy, wz = ways[i, 0], ways[i, 1], ways[i, 2]
+                gone, low, far = -(wx * cy + wy * sy), 0.0, distance[i]
+                for axis in range(3):
+                    if axis == 0:
+                        o, w, a, b = back, gone, 0.0, length
+                    elif axis == 1:
+                        o, w, a, b = left, wy * cy - wx * sy, -half, half
+                    else:
+                        o, w, a, b = up, wz, 0.0, high
+                    if abs(w) < 1e-9:
+                        if o < a or o > b:
+                            far = -1.0
+                        continue
+                    t0, t1 = (a - o) / w, (b - o) / w
+                    low, far = max(low, min(t0, t1)), min(far, max(t0, t1))
+                if far <= low:
+                    continue
+                bits = scrambled(start + np.uint64(i * 64 + c) * np.uint64(16) * GOLDEN)
+                step, jitter = (far - low) / STEPS, unit(bits)
+                tau, over = 0.0, min(ANSWERS, far - low)
+                mean = first * exp(-THIN * (back + gone * (low + jitter * step)) / length)
+                thins = exp(-THIN * gone * step / length)
+                for s in range(STEPS):
+                    t = low + (s + jitter) * step
+                    bits += GOLDEN
+                    here = DENSER[int(unit(scrambled(bits)) * DENSER.size)] * mean
+                    tau += 0.5 * here * step
+                    if NEAREST < t < ANSWER_REACH:
+                        overlap = min(max((t - MEETS[0]) / (MEETS[1] - MEETS[0]), 0.0), 1.0)
+                        answer = (
+                            pi * BACKSCATTER * here * over * overlap * exp(-2.0 * tau) / (t * t)
+                        )
+                        if answer > power[i]:
+                            power[i], where[i] = answer, t
+                    tau += 0.5 * here * step
+                    mean *= thins
+                depth[i] += tau
+    return Sprayed(depth, power, where)
+
+
+class SprayClouds:
+    """The clouds behind the vehicles of a run, by the film on the road."""
+
+    def __init__(self, table: ActorTable, film: float) -> None:
+        """film: m of water on the road."""
+        self.table, self.film = table, film
+
+    def of_beams(
+        self,
+        states: ActorStates,
+        eye: Pose,
+        azimuth: Floats,
+        ways: Floats,
+        distance: Floats,
+        key: np.uint64,
+        tick: int,
+    ) -> Sprayed:
+        """Returns what the clouds of this moment do to beams, as `spray_of`, seen in the eye's frame."""
+        clouds = self.at(states)
+        if not len(clouds):
+            return no_spray()
+        place = np.array([eye.x, eye.y, eye.z])
+        return spray_of(
+            clouds, place, azimuth + eye.yaw, ways @ eye.rotation().T, distance, key, tick
+        )
+
+    def at(self, states: ActorStates) -> Floats:
+        """Returns the clouds (k, 8) of this moment, as `spray_of` takes them."""
+        table, rows = self.table, []
+        for i in np.flatnonzero(states.present & (table.kind <= ActorKind.MOTORCYCLE)).tolist():
+            speed = float(np.hypot(states.vx[i], states.vy[i]))
+            width, height = float(table.width[i]), float(table.height[i])
+            first = spray_extinction(spray_density(self.film, speed, width, height))
+            if first < LEAST:
+                continue
+            yaw, rear = float(states.yaw[i]), 0.5 * float(table.length[i])
+            place = (states.x[i] - rear * cos(yaw), states.y[i] - rear * sin(yaw), states.z[i])
+            size = (THIN * HANGS * speed, 0.5 * width + ASIDE, min(height, HIGHEST))
+            rows.append((*map(float, place), yaw, *size, first))
+        return np.array(rows, dtype=np.float64).reshape(-1, 8)

@@ -87,7 +87,7 @@ class Lidar:
         if self._returns is not None:
             spray = no_spray()
             if self._spray is not None and states is not None:
-                spray = self._sprayed(self._spray, states, pose, fan, seen, tick)
+                spray = self._meet_spray(self._spray, states, pose, fan, seen, tick)
             return self._through_weather(self._returns, fan, seen, tick, spray)
         return LidarPoints(
             (seen.direction * seen.distance[:, None]).astype(np.float32),
@@ -97,7 +97,7 @@ class Lidar:
             seen.instance.astype(np.uint16),
         )
 
-    def _sprayed(
+    def _meet_spray(
         self,
         clouds: SprayClouds,
         states: ActorStates,

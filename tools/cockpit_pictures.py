@@ -35,7 +35,7 @@ from skidpad.stack.configurations import functions_of
 WEATHERS = (
     "clear-sunrise", "clear-noon", "clear-night", "rain-sunrise", "rain-noon", "rain-night", "snow"
 )  # fmt: skip
-CHANGES = {220: "clear-noon", 300: "rain-noon", 380: "rain-night", 460: "clear-night", 540: "snow"}
+CHANGES = {190: "clear-noon", 240: "rain-noon", 290: "rain-night", 340: "clear-night", 390: "snow"}
 TICK = 300  # in which there are vehicles before and behind
 VIEWS = (View.DRIVER, View.FOLLOW)
 SIZE = (320, 240)  # px of one picture in the sheet
@@ -70,8 +70,8 @@ def main() -> None:
     out = Path(sys.argv[1])
     with TemporaryDirectory() as name:
         recording = driven(Path(name) / "sheet", "clear-noon", 16.0, {})
-        film = driven(Path(name) / "film", "clear-sunrise", 30.0, CHANGES)
-        write_film(film, stretch_of(film, 7.0, 29.0), View.FOLLOW, out / "cockpit.webp")
+        film = driven(Path(name) / "film", "clear-sunrise", 22.5, CHANGES)
+        write_film(film, stretch_of(film, 7.0, 22.0), View.FOLLOW, out / "cockpit.webp")
     rows = [
         np.hstack([picture(recording, w, v, e) for v in VIEWS for e in (NO_EXTRAS, ALL_EXTRAS)])
         for w in WEATHERS

@@ -13,7 +13,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 OUTSIDE = {
     "SECURITY.md": "reliability.md", "../SECURITY.md": "reliability.md",
-    "CONTRIBUTING.md": "contributing.md", "CITATION.cff": "contributing.md",
+    "CONTRIBUTING.md": "contributing.md", "CITATION.cff": "contributing.md", "gallery.yaml": "gallery.md",
 }  # fmt: skip
 
 

@@ -1,5 +1,6 @@
 """Recordings of channels and hazards as moments; two runs in step; the crash camera."""
 
+import shutil
 from dataclasses import replace
 
 import cv2
@@ -14,6 +15,7 @@ from skidpad.campaign.runs.desk_run import drive_at_desk
 from skidpad.campaign.takeover.desk import Desk, Recorded
 from skidpad.cli.main import app
 from skidpad.cockpit import channel_source
+from skidpad.cockpit.again import drive_again, list_changes
 from skidpad.cockpit.channel_source import ChannelSource
 from skidpad.cockpit.companion import Companion
 from skidpad.cockpit.feed import Feed
@@ -299,3 +301,30 @@ def test_who_is_of_a_foreign_class_is_shown_as_a_car():
     assert [class_of(label) for label in (-1, 104, 2**31)] == 3 * [SemanticClass.CAR]
     assert channel_source._kind(104) is channel_source._kind(-1) is ActorKind.CAR
     assert channel_source._height(104) == channel_source._height(-1) == channel_source.CAR_HEIGHT
+
+
+def test_a_run_is_driven_again_with_one_thing_changed_and_shown_beside_it(two, tmp_path):
+    source = open_source(shutil.copytree(two[0], tmp_path / "run"))
+    assert list(list_changes(source)) == ["wet", "ice", "braking", "envelope"]
+    feed, link = Feed(), Link(None)
+    replayer = Replayer(source, feed, link, lambda: 0.0)
+    link.again, link.seek = "ice", source.tick(30)
+    replayer.turn()
+    replayer._drive_again(link.again)
+    packet = feed.take()
+    assert packet.views["beside"].shape == packet.views["driver"].shape
+    assert b'"weather":"icy_30"' in packet.told
+    other = open_source(tmp_path / "run" / "again" / "ice")
+    assert (other.seed, other.ticks) == (source.seed, source.ticks)
+    slower = other.moment(39).frame.ego.speed
+    assert slower < 0.5 * source.moment(39).frame.ego.speed
+    replayer._drive_again("dry")  # as it is
+    assert "cannot be driven again 'dry'" in replayer.note
+    feed.close()
+
+
+def test_a_run_in_which_a_person_drove_is_not_driven_again(two):
+    source = open_source(two[1])
+    assert list_changes(source) == {}
+    with pytest.raises(ConfigError, match="cannot be driven again"):
+        drive_again(source, "ice")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 
@@ -12,3 +14,6 @@ class About(NamedTuple):
     timeline: dict[str, Any] | None = None  # of a replay
     vehicles: int = 0  # in the background, as a drive began
     pauses: bool = False  # when its last tab is closed
+    again: Mapping[str, str] = MappingProxyType(
+        {}
+    )  # changes with which a replay can be driven again

@@ -13,7 +13,7 @@ from skidpad.cockpit.pictures import Encoder
 from skidpad.cockpit.producer import Producer
 from skidpad.cockpit.studio import MAIN, View
 from skidpad.cockpit.tabs import DeadMan, Tabs
-from skidpad.cockpit.words import Do, End, Film, Pace, Pause, Seek, Show, Step, Word
+from skidpad.cockpit.words import Again, Do, End, Film, Pace, Pause, Seek, Show, Step, Word
 from skidpad.core.errors import ConfigError
 from skidpad.core.inputs import (
     Crowd,
@@ -112,6 +112,7 @@ class Bridge:
             "rate": lambda: Pace(float(value)),
             "seek": lambda: Seek(int(value)),
             "film": lambda: Film(float(value or FILM_SECONDS)),
+            "again": lambda: Again(str(value)),
             "end": End,
         }
         acts: Mapping[str, Callable[[Any], Input]] = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import Enum
 from importlib import resources
 from typing import Any
@@ -166,6 +166,8 @@ def build(bridge: Bridge, about: About) -> Callable[[], None]:
             Canvases(tab, kind, about.timeline)
             with ui.element("aside").classes("panel"):
                 time_controls(panel, kind)
+                if about.again:
+                    again_controls(panel, about.again)
                 picture_controls(panel)
                 if kind == "drive":
                     drive_controls(panel)
@@ -191,6 +193,14 @@ def time_controls(panel: Panel, kind: str) -> None:
         RATES, value=1.0, label="speed", on_change=lambda e: panel.say("rate", e.value)
     )
     panel.elements.append(rate.props("dense outlined options-dense"))
+
+
+def again_controls(panel: Panel, changes: Mapping[str, str]) -> None:
+    """Draws a button per change with which the run is driven again and shown beside this one."""
+    ui.label("Beside it, the same seed driven again:").classes("help")
+    with ui.element("div").classes("row"):
+        for word, title in changes.items():
+            panel.button(title, "again", word)
 
 
 def picture_controls(panel: Panel) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from skidpad.cockpit.again import drive_again
 from skidpad.cockpit.companion import Companion
 from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.film import write_film
@@ -16,7 +17,7 @@ from skidpad.cockpit.screen import Screen, Shown
 from skidpad.cockpit.source import Source, index_at, opening_tick
 from skidpad.cockpit.studio import MAIN, View
 from skidpad.cockpit.words import Link
-from skidpad.core.errors import OutputError
+from skidpad.core.errors import OutputError, SkidpadError
 from skidpad.core.inputs import Beam
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Scenery
@@ -78,6 +79,8 @@ class Replayer:
             heard = self.link.drain(PATIENCE)
             if self.link.film is not None:
                 self._film(self.link.film)
+            if self.link.again is not None:
+                self._drive_again(self.link.again)
             self.turn()
             if heard or (self.k != self._shown_k and self._is_taken()):
                 self.show()
@@ -113,6 +116,20 @@ class Replayer:
         except OutputError as error:
             self.note = str(error)
         self._from(self.k)
+
+    def _drive_again(self, change: str) -> None:
+        """Drives the run with one thing changed and shows that beside it; the page waits meanwhile."""
+        self.link.again = None
+        self.note = "driving it again, please wait ..."
+        self.show()
+        try:
+            self.other = drive_again(self.source, change)
+            self.screen.beside = Companion(self.other, self.source.tick(0), self.scenery)
+            self.note = f"beside it: {self.other.folder}"
+        except SkidpadError as error:
+            self.note = str(error)
+        self._from(self.k)
+        self.show()
 
     def _is_taken(self) -> bool:
         """The page has the picture before, or is too slow to be waited for."""

@@ -67,11 +67,17 @@ class Film(Struct, frozen=True, tag="film"):
     seconds: float = 10.0
 
 
+class Again(Struct, frozen=True, tag="again"):
+    """Drive the run once more with one thing changed, and show that beside it."""
+
+    change: str
+
+
 class End(Struct, frozen=True, tag="end"):
     """Ends the drive or the replay."""
 
 
-Word = Do | Pace | Pause | Step | Seek | Show | Film | End
+Word = Do | Pace | Pause | Step | Seek | Show | Film | Again | End
 
 
 def encode(word: Word) -> bytes:
@@ -91,6 +97,7 @@ class Link:
         self.steps = 0
         self.seek: int | None = None
         self.film: float | None = None  # s of a film that is to be written
+        self.again: str | None = None  # a change with which the run is to be driven again
         self.main, self.hidden = View.DRIVER, frozenset[View]()
         self.extras = ALL_EXTRAS
         self.reshown = False  # another view is asked for
@@ -122,6 +129,8 @@ class Link:
                 self.seek = word.tick
             case Film():
                 self.film = word.seconds
+            case Again():
+                self.again = word.change
             case Show():
                 self.main, self.hidden = word.main, frozenset(word.hidden)
                 self.extras = frozenset(word.extras)

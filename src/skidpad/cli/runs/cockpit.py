@@ -172,6 +172,7 @@ def replay(
     for folder in filter(None, (run, beside)):
         require_run(folder, ".mcap", "hazards.txt")
     from skidpad.cockpit.about import About
+    from skidpad.cockpit.again import list_changes
     from skidpad.cockpit.film import stretch_of, write_film
     from skidpad.cockpit.opening import open_source
     from skidpad.cockpit.producer import Producer
@@ -195,7 +196,7 @@ def replay(
         "scenery": scenery.value,
     }
     producer = Producer(replay_job, what)
-    shown = About("replay", timeline(source))
+    shown = About("replay", timeline(source), again=list_changes(source))
     typer.echo(serve(producer, shown, place_of(pages), typer.echo, not pages.no_browser))
 
 

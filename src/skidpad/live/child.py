@@ -148,6 +148,7 @@ def _waited_ns() -> int:
 
 
 def _faults() -> int:
+    """Returns the page faults of this process up to now, minor and major together."""
     usage = resource.getrusage(resource.RUSAGE_SELF)
     return usage.ru_majflt + usage.ru_minflt
 

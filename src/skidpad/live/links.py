@@ -31,6 +31,7 @@ def open_listeners(
 
 
 def _publisher(name: str, links: Links, channels: Sequence[str], recording: Path) -> Listener:
+    """Returns the publisher that listens to a drive: over ROS 2 for "ros2", else for Foxglove."""
     if name == "ros2":
         from skidpad.live.ros2.publisher import RosPublisher
 

@@ -92,6 +92,7 @@ class MonitorLink:
         )
 
     def _deliver(self, k: int, content: bytes) -> None:
+        """Sends the bytes of cycle `k` to the child; notes `k` as missing when they did not arrive."""
         if not self._push(content):
             self.missing.append(k)
 
@@ -113,6 +114,7 @@ class MonitorLink:
         return not self.ended
 
     def _on_loss(self, why: str) -> None:
+        """Notes why the link ended, with the number of cycles before; the first reason stays."""
         self.ended = self.ended or f"{why}, after {self.cycles} cycles"
 
     def _last_words(self) -> str:
@@ -127,6 +129,7 @@ class MonitorLink:
         return f"the monitor ended with code {code}" + (f" ({said[-1]})" if said else "")
 
     def _await_ready(self) -> None:
+        """Waits for the child's first line, which tells its isolation; kills a child without one."""
         assert self.process.stdout is not None
         ready, _, _ = select.select([self.process.stdout], [], [], START_PATIENCE)
         line = self.process.stdout.readline() if ready else b""
@@ -137,6 +140,7 @@ class MonitorLink:
         self._on_loss(self._last_words())
 
     def _await_end(self) -> None:
+        """Waits at most `patience` s for the child to end, then kills it; notes a failure as a loss."""
         try:
             code = self.process.wait(self.settings.patience)
         except subprocess.TimeoutExpired:
@@ -181,6 +185,7 @@ class _Queue:
             self.thread.join()
 
     def _run(self) -> None:
+        """Delivers the waiting cycles in order until the queue is closing and empty; runs in a thread."""
         while True:
             with self.changed:
                 self.changed.wait_for(lambda: bool(self.waiting) or self.closing)

@@ -70,6 +70,7 @@ class ScenePublisher:
             self.words[ALARM].log(row, log_time=round(t * NS))
 
     def _new_alarms(self) -> list[dict[str, Any]]:
+        """Returns the alarms that were written in whole lines to the alarm file since the last call."""
         if not self.alarms.exists():
             return []
         lines = self.alarms.read_text(encoding="utf-8").split("\n")[:-1]  # whole ones
@@ -98,6 +99,7 @@ def entity_of(name: str, number: int, frame: ChannelFrame) -> Any:
 
 
 def _cube(state: Floats, shape: Floats, colour: Any) -> Any:
+    """Returns a Foxglove cube at `state` (x, y in m, heading in rad), as large as `shape` in m."""
     x, y, h = state[:3].tolist()
     length, width = np.ptp(shape, axis=0).tolist() if len(shape) else (0.1, 0.1)
     pose = fg.Pose(
@@ -108,6 +110,7 @@ def _cube(state: Floats, shape: Floats, colour: Any) -> Any:
 
 
 def _line(points: Floats, thickness: float, colour: Any) -> Any:
+    """Returns a Foxglove line strip through the finite ones of `points` (n, 2) in m, at z = 0.1 m."""
     known = points[np.isfinite(points).all(axis=1)]
     return fg.LinePrimitive(
         type=fg.LinePrimitiveLineType.LineStrip,

@@ -163,9 +163,11 @@ class _ContextTap:
 
     @property
     def losses(self) -> Losses:
+        """Returns the losses that the source has counted."""
         return self.source.losses
 
     def messages(self) -> Iterator[Message]:
+        """Yields the messages of the source; passes the entries of each context to the monitor as well."""
         for message in self.source.messages():
             if isinstance(message.item, Context):
                 self.monitor.note(message.item.entries)

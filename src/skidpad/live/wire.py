@@ -86,6 +86,7 @@ class WireSource:
                 yield Message(None if channel == NOBODY else channel, item.t, item)
 
     def _item(self, kind: int, content: bytes) -> Item | None:
+        """Returns the item that a record's bytes hold; None, counted as a loss, when foreign or malformed."""
         if kind not in _READERS:
             self.losses.foreign += 1
             return None

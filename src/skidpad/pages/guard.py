@@ -92,6 +92,7 @@ class Guard:
         return None
 
     def _is_free(self, path: str) -> bool:
+        """Returns True when a path is below a free prefix of the door and holds no ".."."""
         return ".." not in path and path.startswith(self.door.free)
 
     async def _turn_away(
@@ -124,10 +125,12 @@ class Guard:
 
 
 def _header(scope: Scope, name: bytes) -> list[str]:
+    """Returns the values of all headers of this lower-case name, decoded, in their order."""
     return [value.decode("latin-1") for key, value in scope["headers"] if key == name]
 
 
 def _query(scope: Scope) -> list[tuple[str, str]]:
+    """Returns the names and values of the query string in their order, blank values too."""
     text = scope.get("query_string", b"").decode("latin-1")
     return parse_qsl(text, keep_blank_values=True)
 
@@ -140,10 +143,12 @@ def _token(scope: Scope) -> str | None:
 
 
 def _wants_html(scope: Scope) -> bool:
+    """Returns True when an accept header of the request names text/html."""
     return any("text/html" in value for value in _header(scope, b"accept"))
 
 
 def _cookie(scope: Scope, name: str) -> str | None:
+    """Returns the value of the cookie of this name; None when absent or when a cookie header is malformed."""
     jar: SimpleCookie = SimpleCookie()
     for text in _header(scope, b"cookie"):
         try:
@@ -154,6 +159,7 @@ def _cookie(scope: Scope, name: str) -> str | None:
 
 
 def _set_cookie(door: Door, id: str) -> str:
+    """Returns the Set-Cookie text for the session `id`, marked Secure where the door is."""
     text = f"{door.cookie}={id}; Path=/; HttpOnly; SameSite=Strict"
     return text + "; Secure" if door.secure else text
 
@@ -181,6 +187,7 @@ async def _refuse(scope: Scope, receive: Receive, send: Send, sentence: str) -> 
 
 
 async def _forbid(send: Send, kind: bytes, text: str) -> None:
+    """Sends a response 403 with the text, of the content type `kind`, which must not be stored."""
     headers = [(b"content-type", kind), (b"cache-control", b"no-store"), *HEADERS]
     await send({"type": "http.response.start", "status": 403, "headers": headers})
     await send({"type": "http.response.body", "body": text.encode()})

@@ -68,6 +68,7 @@ class Server:
         self._thread = threading.Thread(target=self._serve, name="pages")
 
     def _serve(self) -> None:
+        """Runs the ASGI server on its bound socket until it stops or its application fails to start."""
         with suppress(SystemExit):  # how uvicorn says that the application did not begin
             self._server.run([self._socket])
 

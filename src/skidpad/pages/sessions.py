@@ -41,6 +41,7 @@ class Sessions:
         return id
 
     def _forget(self) -> None:
+        """Drops the invitations that are older than they are valid for."""
         oldest = self._clock() - self._valid_s
         self._invited = {t: one for t, one in self._invited.items() if one[1] >= oldest}
 

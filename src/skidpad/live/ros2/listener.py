@@ -70,6 +70,7 @@ class RosTopics:
             time.sleep(POLL)
 
     def _read(self, topic: str, writer: Any) -> None:
+        """Opens a reader of the topic; raises FileError if the writer's type or hash does not fit."""
         kind = ros_name(writer.type_name)
         for _, role in self.frames.roles[topic]:
             if kind not in READ[role]:
@@ -115,6 +116,7 @@ class RosTopics:
             yield from self._frames(*entry)
 
     def _rank(self, topic: str) -> int:
+        """Returns the index in ROLES of the first role that the topic has."""
         return min(ROLES.index(role) for _, role in self.frames.roles[topic])
 
     def _take(self, merge: _Merge) -> bool:
@@ -129,6 +131,7 @@ class RosTopics:
         return some
 
     def _frames(self, t: float, topic: str, content: Any) -> Iterator[Message]:
+        """Yields the channel messages in a topic's message at `t` s; counts a malformed one as lost."""
         try:
             yield from self.frames.take(topic, t, content, self.kinds[topic])
         except (FileError, ValueError, KeyError, IndexError, AttributeError, TypeError):

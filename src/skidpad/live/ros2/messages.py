@@ -58,6 +58,7 @@ class Messages:
         return self.types.make(OBJECTS, self._header(frame.t), rows)
 
     def _object(self, frame: ChannelFrame, i: int, step: float) -> Any:
+        """Returns the PredictedObject of object `i`; `step` is the time between its predictions in s."""
         x, y, h, vx, vy = frame.objects[i].tolist()
         said = frame.predictions[i][np.isfinite(frame.predictions[i]).all(axis=1)]
         poses = [self._pose(px, py, h) for px, py in said.tolist()]
@@ -92,25 +93,32 @@ class Messages:
         )
 
     def _make(self, package: str, kind: str, *values: Any) -> Any:
+        """Returns a message of the type `package`/msg/`kind` with these values of its fields, in order."""
         return self.types.make(f"{package}/msg/{kind}", *values)
 
     def _with_covariance(self, kind: str, value: Any) -> Any:
+        """Returns the message `kind`WithCovariance around a value, with the covariance NOTHING_KNOWN."""
         return self._make("geometry_msgs", f"{kind}WithCovariance", value, NOTHING_KNOWN)
 
     def _time(self, t: float, kind: str = "Time") -> Any:
+        """Returns `t` s as a message of builtin_interfaces, a Time or a Duration, rounded to nanoseconds."""
         ns = round(t * NS)
         return self._make("builtin_interfaces", kind, ns // NS, ns % NS)
 
     def _header(self, t: float) -> Any:
+        """Returns a message header in the frame "map" with `t` s as its stamp."""
         return self._make("std_msgs", "Header", self._time(t), "map")
 
     def _vector(self, x: float, y: float, z: float = 0.0) -> Any:
+        """Returns the Vector3 message with these three components."""
         return self._make("geometry_msgs", "Vector3", x, y, z)
 
     def _rest(self) -> tuple[Any, Any]:
+        """Returns two zero vectors, the linear and the angular part of a state at rest."""
         return self._vector(0.0, 0.0), self._vector(0.0, 0.0)
 
     def _pose(self, x: float, y: float, h: float) -> Any:
+        """Returns the Pose message at (x, y, 0) m with the heading `h` in rad about the z axis."""
         place = self._make("geometry_msgs", "Point", x, y, 0.0)
         turn = self._make("geometry_msgs", "Quaternion", 0.0, 0.0, sin(h / 2.0), cos(h / 2.0))
         return self._make("geometry_msgs", "Pose", place, turn)

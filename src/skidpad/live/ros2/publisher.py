@@ -86,11 +86,13 @@ class RosPublisher:
             self._await_readers()
 
     def _writer(self, topic: str, kind: str) -> Any:
+        """Returns a DDS writer of the topic for messages of type `kind`, with the flow's quality."""
         wanted = qos(self.flow, self.types.announced(kind))
         rt = Topic(self.participant, f"rt{topic}", self.types.cls(kind), qos=wanted)
         return DataWriter(self.participant, rt, qos=wanted)
 
     def _await_readers(self) -> None:
+        """Waits until every topic has a reader; after LISTENERS s notes the end of the publisher."""
         deadline = time.monotonic() + LISTENERS
         while any(not w.get_matched_subscriptions() for w in self.writers.values()):
             if time.monotonic() > deadline:

@@ -76,6 +76,7 @@ class Types:
         return self._classes[name]
 
     def _field(self, definition: Any) -> Any:
+        """Returns a field's DDS type by its definition: plain, a message class, array or sequence."""
         kind, what = int(definition[0]), definition[1]
         if kind == BASE:
             return PLAIN[what[0]]
@@ -96,6 +97,7 @@ class Types:
         return self.cls(name)(**{n: self._value(d, getattr(message, n)) for n, d in defs})
 
     def _value(self, definition: Any, value: Any) -> Any:
+        """Returns a field's value as DDS takes it: plain as it is, messages converted, arrays as lists."""
         kind, what = int(definition[0]), definition[1]
         if kind == BASE:
             return value

@@ -39,6 +39,7 @@ def drive_timeline(drive: MonitoredDrive) -> str:
 
 
 def _strip(drive: MonitoredDrive, indicator: AnyIndicator) -> Strip | None:
+    """Returns an indicator's strip of its worst value over time; None where it has no trace."""
     traces = drive.traces(indicator)
     if not traces:
         return None
@@ -58,11 +59,13 @@ def _strip(drive: MonitoredDrive, indicator: AnyIndicator) -> Strip | None:
 
 
 def _label(indicator: AnyIndicator) -> str:
+    """Returns the short label of an indicator for the timeline."""
     name = words(indicator.value)
     return name.replace("object motion prediction", "motion").replace(" planned", "")
 
 
 def _worst(traces: list[Trace], upper: bool) -> NDArray[np.float64]:
+    """Returns (n,) the worst known value per cycle, largest for an upper bound, else least; or nan."""
     values = np.array([trace.value for trace in traces])
     known = np.isfinite(values).any(axis=0)
     fill = -np.inf if upper else np.inf
@@ -102,12 +105,14 @@ def _free_risk(drive: MonitoredDrive, trace: Trace) -> NDArray[np.float64]:
 
 
 def _quantiles(name: str, risks: NDArray[np.float64]) -> str:
+    """Returns a sentence with quantiles of the risks and the share of them above 0.2 in %."""
     q = ", ".join(f"{np.quantile(risks, p):.2f}" for p in QUANTILES)
     above = 100.0 * (risks > 0.2).mean()
     return f"{name}: median, 90 % and 99 % of {risks.size} cycles: {q}; above 0.2 in {above:.1f} %"
 
 
 def _risk_behind(drive: MonitoredDrive) -> str:
+    """Returns a sentence on the mean share of risk behind, per subject; "" where no value is known."""
     means = [
         f"{trace.subject} {np.nanmean(trace.value):.2f}"
         for trace in drive.traces(Indicator.RISK_BEHIND_SHARE)
@@ -140,6 +145,7 @@ def timing(drive: MonitoredDrive) -> list[Block]:
 
 
 def _over_time(timing: pl.DataFrame) -> str:
+    """Returns an SVG of the peak time in ms of each module over the drive in s."""
     seconds = (timing["cycle"].to_numpy() - timing["cycle"][0]) * 0.1
     bins = np.minimum((seconds / max(seconds[-1], 0.1) * TIME_BINS).astype(int), TIME_BINS - 1)
     peaks = []

@@ -76,12 +76,14 @@ def drive_page(drive: MonitoredDrive) -> Page:
 
 
 def _subtitle(drive: MonitoredDrive) -> str:
+    """Returns the drive's title, route or name, and its channels as text."""
     words = drive.context
     where = words.get("title") or words.get("route") or drive.name
     return f"{where}: {', '.join(drive.channels)}"
 
 
 def _facts(drive: MonitoredDrive) -> list[tuple[str, str]]:
+    """Returns names and values of the facts on the drive, with at most 8 short entries of its context."""
     s = drive.summary
     facts = [
         ("rules", s["rules"]),
@@ -94,6 +96,7 @@ def _facts(drive: MonitoredDrive) -> list[tuple[str, str]]:
 
 
 def _warnings(drive: MonitoredDrive) -> list[Block]:
+    """Returns a warning that lists the losses of the recording by kind; empty where there were none."""
     lost = {k: v for k, v in drive.summary["losses"].items() if v}
     if not lost:
         return []
@@ -126,6 +129,7 @@ def _answers(drive: MonitoredDrive) -> Answers:
 
 
 def _headline(drive: MonitoredDrive) -> Numbers:
+    """Returns the head numbers of a drive: minutes, hazards, violations, and agreement where it is known."""
     s = drive.summary
     scored = sum(not _candidate(e["name"]) for e in s["hazards"])
     minutes = s["seconds"] / 60.0
@@ -149,10 +153,12 @@ def _headline(drive: MonitoredDrive) -> Numbers:
 
 
 def _candidate(name: str) -> bool:
+    """Returns True when the hazard type of this name is a candidate, not one of the first three types."""
     return HazardType(name) not in tuple(HazardType)[:3]
 
 
 def _timeline(drive: MonitoredDrive) -> list[Block]:
+    """Returns one figure of the indicators with a threshold over the drive."""
     return [
         Figure(
             figures.drive_timeline(drive),
@@ -164,6 +170,7 @@ def _timeline(drive: MonitoredDrive) -> list[Block]:
 
 
 def _hazards(drive: MonitoredDrive) -> list[Block]:
+    """Returns the list of hazards and cards per type, the most severe first; a sentence if none."""
     if not drive.records:
         return [Text("The rules found no hazard in this drive.")]
     order = sorted(drive.records, key=_severity)

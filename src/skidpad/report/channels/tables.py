@@ -73,11 +73,13 @@ def safety_case_tree(drive: MonitoredDrive) -> Tree:
 
 
 def _argument(nodes: Nodes, argument: Argument) -> Node:
+    """Returns the tree node of an argument with its statements below it and the worst of their states."""
     statements = [_statement(nodes, s) for s in argument.statements]
     return Node(argument.claim, _worst([s.state for s in statements]), children=statements)
 
 
 def _statement(nodes: Nodes, statement: Statement) -> Node:
+    """Returns the node of a statement: silent without values, challenged if any of them violates."""
     evidence = node_evidence(nodes, statement)
     known, against = sum(n.evaluated for n in evidence), sum(n.violated for n in evidence)
     state = SILENT if not known else CHALLENGED if against else SUPPORTED
@@ -98,6 +100,7 @@ def evidence_line(n: NodeEvidence) -> str:
 
 
 def _worst(states: Sequence[str]) -> str:
+    """Returns CHALLENGED if among the states, else SUPPORTED if among them, else SILENT."""
     return next((s for s in (CHALLENGED, SUPPORTED) if s in states), SILENT)
 
 
@@ -114,6 +117,7 @@ def indicators(drive: MonitoredDrive) -> list[Block]:
 
 
 def _indicator_columns(drive: MonitoredDrive) -> tuple[Column[Row], ...]:
+    """Returns the columns of the table of indicators: the drive's statistics, published violations."""
     said = published_rows(Source.VIOLATIONS, "spi")
     values = drive.table.group_by("indicator", "subject", maintain_order=True).agg(
         mean=pl.col("value").mean(), least=pl.col("value").min()
@@ -185,6 +189,7 @@ def timing(drive: MonitoredDrive) -> list[Block]:
 
 
 def _published_time(module: str) -> str:
+    """Returns the least and largest published mean time of a module in ms as text, "" if unknown."""
     name = PUBLISHED_MODULES.get(module, "")
     rows = read_published(Source.TIMING).filter(pl.col("statistic") == "mean_ms")
     known = sorted(rows.filter(pl.col("module") == name)["value"].to_list())

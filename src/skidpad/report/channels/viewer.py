@@ -85,5 +85,6 @@ def outline(state: Floats, polygon: Floats) -> Floats:
 
 
 def _lines(rr: Any, strips: list[Floats], colour: tuple[int, int, int]) -> Any:
+    """Returns strips as Rerun line strips of one RGB colour, with y negated; single points are left out."""
     drawn = [strip * (1.0, -1.0) for strip in strips if len(strip) > 1]
     return rr.LineStrips2D(drawn, colors=[colour] * len(drawn))

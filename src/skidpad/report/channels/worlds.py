@@ -66,6 +66,7 @@ def with_intentions(cycles: Sequence[Cycle]) -> list[Cycle]:
 
 
 def _ego(cycle: Cycle) -> NDArray[np.float64] | None:
+    """Returns (2,) the ego's place in m in the first frame that knows it; None where no frame does."""
     frame = next((f for f in cycle.frames if f is not None and np.isfinite(f.ego[:2]).all()), None)
     return None if frame is None else frame.ego[:2]
 
@@ -87,6 +88,7 @@ def _world(frame: ChannelFrame | None, origin: NDArray[np.float64]) -> list[Any]
 
 
 def _within(path: NDArray[np.float64], ego: NDArray[np.float64]) -> bool:
+    """Returns True when the first point of `path` lies within REACH m of the ego."""
     offset = path[:1] - ego[:2]
     return bool((np.hypot(offset[:, 0], offset[:, 1]) < REACH).any())
 
@@ -94,6 +96,7 @@ def _within(path: NDArray[np.float64], ego: NDArray[np.float64]) -> bool:
 def _box(
     state: NDArray[np.float64], polygon: NDArray[np.float64], origin: NDArray[np.float64]
 ) -> list[int]:
+    """Returns a box's centre x, y, yaw in mrad, length and width; lengths in UNIT, from `origin`."""
     low, high = (polygon.min(axis=0), polygon.max(axis=0)) if len(polygon) else (np.zeros(2),) * 2
     c, s = np.cos(state[2]), np.sin(state[2])
     x, y = 0.5 * (low + high)
@@ -102,10 +105,12 @@ def _box(
 
 
 def _point(p: NDArray[np.float64]) -> list[int]:
+    """Returns the coordinates of a point in m as whole multiples of UNIT."""
     return [round(float(v) / UNIT) for v in p]
 
 
 def _points(points: NDArray[np.float64]) -> list[int]:
+    """Returns the finite ones of (n, 2) points in m as flat whole multiples of UNIT."""
     finite = points[np.isfinite(points).all(axis=1)]
     whole: list[int] = np.round(finite.ravel() / UNIT).astype(int).tolist()
     return whole

@@ -119,6 +119,7 @@ def tags(story: Story) -> list[str]:
 
 
 def _class_mark(contact: Contact | None) -> str:
+    """Returns what graded a contact and its severity as words, "" without a contact."""
     return "" if contact is None else f"{contact.graded_by.value} {contact.severity.value}"
 
 
@@ -148,6 +149,7 @@ def _closing_name(contact: Contact | None) -> str:
 
 
 def _delta_v_name(crash: Crash) -> str:
+    """Returns the name under which the card shows delta-v: by what was hit and whether it bounced."""
     contact = crash.contact
     if contact is not None and contact.actor >= 0:
         return "delta-v, larger of the two"
@@ -177,6 +179,7 @@ def timeline(story: Story) -> list[Event]:
 
 
 def _event(before: float, parts: Sequence[str], is_wrong: bool = False) -> Event:
+    """Returns a card event whose time is `before` s ahead of the crash, shown with a minus sign."""
     sign = "+" if before < 0.0 else "-" if before > 0.0 else ""
     return Event(f"{sign}{abs(before):.2f} s", ", ".join(parts), is_wrong)
 
@@ -224,6 +227,7 @@ def thumbnail_uri(path: Path) -> str:
 
 
 def _webp(path: Path, width: int, bytes_max: int) -> str:
+    """Returns the picture as a WebP data URL, at most `width` px; if too large, at the least quality."""
     with Picture.open(path) as picture:
         small = picture.convert("RGB")
         small.thumbnail((width, width))

@@ -130,6 +130,7 @@ def _describe_perception(story: Story) -> str:
 
 
 def _describe_report(wrong: Sighting, hit: str) -> str:
+    """Returns a clause on what the stack had reported against the true gap, for the sentence on the cause."""
     who = "the stack" if wrong.status is None else REPORTERS.get(wrong.status, "the stack")
     text = f"{who} had reported {format_metres(wrong.distance)}, {format_seconds(wrong.before)} before, "
     if wrong.gap is None:
@@ -195,6 +196,7 @@ def _describe_rebound(crash: Crash) -> str:
 
 
 def _describe_bend(crash: Crash) -> str:
+    """Returns a clause on the bend: the acceleration it takes and, with friction known, what holds."""
     if crash.bend_radius is None or crash.bend_radius > STRAIGHT:
         return "the road was straight"
     takes = crash.v_ego**2 / crash.bend_radius

@@ -93,6 +93,7 @@ class CampaignView(Generic[E]):
 
     @cached_property
     def _run_names(self) -> dict[tuple[Any, ...], str]:
+        """Returns the name of each run by its values in the sort columns."""
         return self.folder.names(*self.columns.sort)
 
     def names(self, runs: pl.DataFrame) -> list[str | None]:
@@ -150,6 +151,7 @@ class CampaignView(Generic[E]):
         return float(timing["cpu_s"].drop_nulls().drop_nans().sum()) / 60.0
 
     def _times(self) -> list[str]:
+        """Returns a sentence with median and least of each known clock per run; empty if none is known."""
         parts = []
         for column, (name, unit) in CLOCKS.items():
             if column in self.folder.timing.columns:

@@ -323,6 +323,7 @@ def legend_columns(names: Iterable[str], width: float) -> int:
 
 
 def _draw_curves(axes: Axes, chart: Chart, named: set[str]) -> None:
+    """Draws a chart's curves, bands and rules on the axes; a name already in `named` gets no label again."""
     for k, curve in enumerate(chart.curves):
         colour = PALETTE[(k if curve.colour is None else curve.colour) % len(PALETTE)]
         if curve.band is not None:

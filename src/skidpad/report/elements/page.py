@@ -70,6 +70,7 @@ class Table:
 
 
 def _csv_columns(heading: str, cells: Sequence[Cell]) -> Iterator[list[Any]]:
+    """Yields the CSV columns of a table column, heading first: values, then limits and published."""
     numeric = any(c.sort is not None for c in cells)
     yield [heading, *(c.sort if numeric else c.text for c in cells)]
     if any(c.limits for c in cells):
@@ -326,6 +327,7 @@ def _script_json(value: Any) -> str:
 
 
 def _asset(name: str) -> str:
+    """Returns the text of a file in the report's assets."""
     return files("skidpad.report").joinpath("assets").joinpath(name).read_text(encoding="utf-8")
 
 
@@ -336,6 +338,7 @@ def _prose(text: str) -> Markup:
 
 @cache
 def _template() -> jinja2.Template:
+    """Returns the HTML template of a page, with escaping on and strict about names."""
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )

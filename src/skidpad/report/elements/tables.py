@@ -107,6 +107,7 @@ def quantity_cell(q: Quantity, style: Format) -> Cell:
 
 
 def _limits(q: Quantity, style: Format) -> str:
+    """Returns a quantity's interval as "low to high" with its remark; the interval must be there."""
     assert q.interval is not None
     low, high = (number(end, style.limits) for end in q.interval)
     return f"{low} to {high}" + (f", {q.remark}" if q.remark else "")

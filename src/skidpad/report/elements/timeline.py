@@ -54,10 +54,12 @@ def timelines(strips: Sequence[Strip], marks: Sequence[Mark], t0: float, t1: flo
 
 
 def _x(t: float, t0: float, t1: float) -> float:
+    """Returns the x coordinate in the drawing of the time `t` between `t0` and `t1`, all in s."""
     return LEFT + WIDTH * (t - t0) / (t1 - t0)
 
 
 def _marks(marks: Sequence[Mark], t0: float, t1: float, top: float, bottom: float) -> list[str]:
+    """Returns an SVG group per mark, a titled band from `top` to `bottom`; t0 and t1 are in s."""
     out = []
     for mark in marks:
         a, b = _x(mark.t_start, t0, t1), _x(mark.t_end, t0, t1)
@@ -71,6 +73,7 @@ def _marks(marks: Sequence[Mark], t0: float, t1: float, top: float, bottom: floa
 
 
 def _strip(s: Strip, y: float, t0: float, t1: float) -> str:
+    """Returns the SVG group of one strip at height `y`: values, threshold, alarms, gaps and note."""
     bins = min(BINS, max(len(s.t) // 2, 1))  # none without a value, where there are few
     edges = np.clip(((s.t - t0) / (t1 - t0) * bins).astype(int), 0, bins - 1)
     known = np.isfinite(s.value)
@@ -123,6 +126,7 @@ def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def _axis(t0: float, t1: float, y: float) -> list[str]:
+    """Returns SVG ticks with labels in s below the strips, at most about 13 over the span."""
     span = t1 - t0
     step = next(
         s for s in (1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600, 1e9) if span / s <= 12

@@ -79,6 +79,7 @@ class GripCampaign(CampaignView[GripEntry]):
         return self.plain.filter(here)
 
     def _order(self, key: Key) -> tuple[int, int, str]:
+        """Returns a key that sorts by scenario, then known weathers in order, then the others by name."""
         scenario, weather = key
         known = WEATHERS.index(weather) if weather in WEATHERS else len(WEATHERS)
         return list(SCENARIOS).index(scenario), known, weather
@@ -104,6 +105,7 @@ class GripCampaign(CampaignView[GripEntry]):
 
     @cached_property
     def _series(self) -> dict[tuple[str, str, str, str], CellSeries]:
+        """Returns an empty cache of series, filled by `series` as it is asked."""
         return {}
 
     def series(self, pair: Pair, friction: str) -> CellSeries | None:

@@ -34,6 +34,7 @@ def both_modes(campaign: GripCampaign) -> list[Block]:
 
 
 def _both(campaign: GripCampaign, pair: Pair) -> Figure:
+    """Returns a figure of a pair's metrics over time and its steering densities, a curve per friction."""
     sides = [(f, s) for f in (ORIGINAL, REDUCED) if (s := campaign.series(pair, f)) is not None]
     charts = [
         Chart([_over_time(name, series, metric) for name, series in sides], "s", label)
@@ -51,12 +52,14 @@ def _both(campaign: GripCampaign, pair: Pair) -> Figure:
 
 
 def _over_time(name: str, series: CellSeries, metric: str) -> Curve:
+    """Returns the median of a metric over time in s, with the 10th to 90th percentile as band."""
     runs, median = series.values[metric], series.median(metric)
     low, high = np.nanpercentile(runs[:, : len(median)], (10, 90), axis=0)
     return Curve(name, np.arange(len(median)) * DT, median, band=(low, high))
 
 
 def _density(name: str, steer: Floats, bins: Floats) -> Curve:
+    """Returns the density of steering as a stepped curve over the bins, at least 1e-3 for the log scale."""
     density, _ = np.histogram(steer[~np.isnan(steer)], bins=bins, density=True)
     return Curve(name, bins[:-1], np.maximum(density, 1e-3), style={"drawstyle": "steps-post"})
 
@@ -86,6 +89,7 @@ def across_weathers(campaign: GripCampaign) -> list[Block]:
 
 
 def _medians(campaign: GripCampaign, pairs: Sequence[Pair], friction: str) -> list[Curve]:
+    """Returns a curve of the median CVIP over time in s per pair whose series with this friction is known."""
     found = ((k, pair.weather, campaign.series(pair, friction)) for k, pair in enumerate(pairs))
     medians = ((k, name, s.median("cvip")) for k, name, s in found if s is not None)
     return [Curve(name, np.arange(len(m)) * DT, m, colour=k) for k, name, m in medians]
@@ -110,6 +114,7 @@ def trajectories(campaign: GripCampaign) -> list[Block]:
 
 
 def _ways(campaign: GripCampaign, sides: Sequence[tuple[str, Pair, str]], caption: str) -> Figure:
+    """Returns a figure of the first WAYS paths of ego and ghost per side; each side needs a series."""
     charts = []
     for title, pair, friction in sides:
         series = campaign.series(pair, friction)

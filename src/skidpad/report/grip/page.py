@@ -94,6 +94,7 @@ def build_page(campaign: GripCampaign) -> Page:
 
 
 def _subtitle(campaign: GripCampaign) -> str:
+    """Returns the campaign's numbers of scenarios, weathers and repeats, and its frictions, as a sentence."""
     r = campaign.plain
     return (
         f"{count_text(r['scenario'].n_unique(), 'scenario')} in "
@@ -104,6 +105,7 @@ def _subtitle(campaign: GripCampaign) -> str:
 
 
 def _warnings(campaign: GripCampaign) -> list[Block]:
+    """Returns notes on missing runs and on cells whose drives are identical with both frictions."""
     same = [f"{scenario_title(s)} in {w}" for (s, w), p in campaign.pairs.items() if p.identical]
     if not same:
         return campaign.missing()
@@ -143,12 +145,14 @@ def _answers(campaign: GripCampaign, judged: Sequence[Judgement]) -> Answers:
 
 
 def _percent(share: Share) -> str:
+    """Returns a share with its 95 % interval as text in %; an unknown value reads 0."""
     low, high = share.interval
     value = 100.0 * (share.value or 0.0)
     return f"{value:.0f} % (95 % {100 * low:.0f} to {100 * high:.0f})"
 
 
 def _headline(campaign: GripCampaign) -> Numbers:
+    """Returns the head numbers: runs, completion per friction, cells that changed, others out of control."""
     all_runs = campaign.plain
     items = [Number(f"{len(all_runs)}", "runs", f"{all_runs['seed'].n_unique()} per cell")]
     for friction in (ORIGINAL, REDUCED):
@@ -171,6 +175,7 @@ def _headline(campaign: GripCampaign) -> Numbers:
 
 
 def _verdicts(judged: Sequence[Judgement]) -> list[Block]:
+    """Returns an introduction and the blocks of the verdicts."""
     intro = Text(
         "Claims are the source's. Tests and margins were written after a trial of three seeds had been "
         "seen, and two rules for verdicts were settled after 65; they are not blind. The other "

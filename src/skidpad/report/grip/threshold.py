@@ -114,6 +114,7 @@ def build_page(campaign: ThresholdMap) -> Page:
 
 
 def _answers(campaign: ThresholdMap) -> Answers:
+    """Returns the answers of a threshold map: whether, where and for which driver friction decides."""
     telling, reached = campaign.telling, campaign.reached
     asked = (
         f"{len(telling)} of {len(campaign.situations)} situations are completed on dry road; in "
@@ -135,6 +136,7 @@ def _answers(campaign: ThresholdMap) -> Answers:
 
 
 def _tally(campaign: ThresholdMap) -> dict[tuple[str, str], tuple[int, int]]:
+    """Returns (situations with a threshold, situations completed on dry road) by driver and actors."""
     found = {}
     for key in dict.fromkeys((s.driver, s.actors) for s in campaign.situations):
         mine = [s for s in campaign.telling if (s.driver, s.actors) == key]
@@ -143,6 +145,7 @@ def _tally(campaign: ThresholdMap) -> dict[tuple[str, str], tuple[int, int]]:
 
 
 def _headline(campaign: ThresholdMap) -> Numbers:
+    """Returns the head numbers: runs, situations completed on dry road, situations with a threshold."""
     n = len(campaign.situations)
     items = [
         Number(f"{len(campaign.results)}", "runs", f"{n} situations"),
@@ -168,6 +171,7 @@ def groups(campaign: ThresholdMap) -> dict[str, list[Situation]]:
 
 
 def _map(campaign: ThresholdMap) -> list[Block]:
+    """Returns the figure of thresholds and the table of situations completed on dry road."""
     caption = (
         "Friction at which half of the drives have ended in an accident, by headway and by what is "
         "demanded of the lead. Grey: not completed on dry road. <: no such level down to the least "
@@ -203,6 +207,7 @@ def _map(campaign: ThresholdMap) -> list[Block]:
 
 
 def _threshold(s: Situation) -> Quantity:
+    """Returns a situation's threshold friction with its interval; text alone where there is none."""
     found = s.threshold
     if found.mu is None:
         return Quantity(value=None, lines=(found.text,))
@@ -210,10 +215,12 @@ def _threshold(s: Situation) -> Quantity:
 
 
 def _completion_at(mu: float, s: Situation) -> Quantity:
+    """Returns the share completed at the friction `mu` in a situation."""
     return share(s.at(mu))
 
 
 def _curves(campaign: ThresholdMap) -> list[Block]:
+    """Returns a figure per group of the share completed over friction."""
     caption = "{}: share completed over friction; bands are exact 95 % intervals."
     return [
         Figure(svg, caption.format(name)) for name, svg in curve_figures(groups(campaign)).items()
@@ -221,6 +228,7 @@ def _curves(campaign: ThresholdMap) -> list[Block]:
 
 
 def _findings(campaign: ThresholdMap) -> list[Block]:
+    """Returns the tallies of verdicts and their table by situation; empty where no situation tells."""
     if not campaign.telling:
         return []
     judged = [(s, {j.finding.id: j for j in s.judgements}) for s in campaign.telling]
@@ -240,11 +248,13 @@ def _findings(campaign: ThresholdMap) -> list[Block]:
 
 
 def _count_verdicts(judged: Sequence[Judgement]) -> str:
+    """Returns how often each verdict was given, as text."""
     counts = Counter(j.verdict for j in judged)
     return ", ".join(f"{v.value} in {counts[v]}" for v in Verdict if counts[v])
 
 
 def _verdict(id: str, row: tuple[Situation, dict[str, Judgement]]) -> Cell:
+    """Returns a cell with a situation's verdict on the finding `id`, coloured by it."""
     found = row[1][id]
     kinds = {Verdict.SUPPORTED: "good", Verdict.CONTRADICTED: "bad"}
     return Cell(found.verdict.value, kind=kinds.get(found.verdict, "muted"), hint=found.text)
@@ -263,6 +273,7 @@ def _replays(campaign: ThresholdMap) -> list[Block]:
 
 
 def _card(campaign: ThresholdMap, s: Situation, run: pl.DataFrame) -> list[Card]:
+    """Returns the replay card of a situation's run, of one row; empty where the run or its log is missing."""
     (name,) = campaign.names(run)
     folder = None if name is None else campaign.folder.log(name)
     if folder is None:

@@ -32,6 +32,7 @@ def map_figure(groups: Mapping[str, Sequence[Situation]]) -> str:
 
 
 def _panel(axes: Axes, found: Sequence[Situation]) -> None:
+    """Draws one map: a coloured square with the threshold per situation, start by deceleration in m/s²."""
     starts = list(dict.fromkeys(s.start for s in sorted(found, key=_order)))
     brakings = sorted({s.deceleration for s in found})
     scale = mpl.colormaps[COLOURS]
@@ -62,6 +63,7 @@ def _panel(axes: Axes, found: Sequence[Situation]) -> None:
 
 
 def _order(s: Situation) -> tuple[float, float]:
+    """Returns the sort key of a start: the highest speed first, then the smallest gap."""
     return (-s.speed_kmh, s.gap_m)
 
 
@@ -89,6 +91,7 @@ def curve_figures(groups: Mapping[str, Sequence[Situation]]) -> dict[str, str]:
 
 
 def _curve(s: Situation, colour: int) -> Curve:
+    """Returns the share completed in % over friction with its 95 % band, as a curve of one deceleration."""
     shares = [s.at(mu) for mu in s.levels]
     limits = 100.0 * np.array([share.interval for share in shares])
     values = [100.0 * (share.value or 0.0) for share in shares]

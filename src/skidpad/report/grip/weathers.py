@@ -55,10 +55,12 @@ def _ratios(campaign: GripCampaign) -> dict[str, float]:
 
 
 def _parameter(column: str, row: Row) -> float:
+    """Returns the value in a row's column as a float."""
     return float(row[column])
 
 
 def _ratio(row: Row) -> Quantity:
+    """Returns our friction ratio beside the published one."""
     return Quantity(value=row["ours"], published=row["friction_ratio_printed"])
 
 
@@ -105,6 +107,8 @@ def rain_tables(campaign: GripCampaign) -> list[Block]:
 
 
 def _columns(scale: float) -> list[Column[FourCells]]:
+    """Returns the columns of the four cells and their effects, all values multiplied by `scale`."""
+
     def mean(name: str, cell: FourCells) -> float:
         return scale * cell.means[name]
 
@@ -126,5 +130,6 @@ def _columns(scale: float) -> list[Column[FourCells]]:
 
 
 def _name(cell: FourCells) -> str:
+    """Returns the scenario's title, with the variant of the cut-in unless it is the fixed one."""
     variant = "" if cell.cutin == FIXED else f", {cell.cutin}"
     return scenario_title(cell.scenario) + variant

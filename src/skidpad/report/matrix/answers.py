@@ -132,6 +132,7 @@ def _too_few_seeds(seeds: int, least: int) -> str:
 
 
 def _rates(matrix: Matrix, group: WeatherGroup) -> dict[str, Rate]:
+    """Returns the event rate by configuration in a group of weathers; those without a rate are left out."""
     found = {c: rate_by_seed(matrix.within(c, group), EVENTS) for c in matrix.comparison_configs}
     return {c: rate for c, rate in found.items() if rate is not None}
 
@@ -174,6 +175,7 @@ def _sureness(
 
 
 def _at_most(p: float) -> str:
+    """Returns "p at most" with two digits, or the usual text of p where it is below 0.001."""
     return p_text(p) if p < 0.001 else f"p at most {p:.2g}"
 
 
@@ -184,6 +186,7 @@ def weather_series(group: WeatherGroup, k: int, **values: Sequence[float | None]
 
 
 def _rate_figure(matrix: Matrix, rates: dict[WeatherGroup, dict[str, Rate]]) -> Figure:
+    """Returns the figure of events per run by configuration, a series per group of weathers."""
     series = []
     for k, (group, by_config) in enumerate(rates.items()):
         found = [by_config.get(c) for c in matrix.comparison_configs]
@@ -299,6 +302,7 @@ def _change_figure(
     groups: Sequence[WeatherGroup],
     changes: dict[tuple[str, WeatherGroup], Contrast],
 ) -> Figure:
+    """Returns the figure of events per run that each weather adds to the first one, by configuration."""
     series = []
     for k, group in enumerate(groups, start=1):
         found = [changes.get((c, group)) for c in matrix.comparison_configs]

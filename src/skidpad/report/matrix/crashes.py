@@ -79,6 +79,7 @@ def worst_id(config: str) -> str:
 
 
 def _worst(crashes: dict[Cell, list[Found]]) -> dict[str, Found]:
+    """Returns the most severe crash per configuration, over its weathers; each list has its worst first."""
     worst: dict[str, Found] = {}
     for (config, _), found in crashes.items():
         if config not in worst or severity(found[0][0]) > severity(worst[config][0]):
@@ -136,6 +137,7 @@ def _hardest(matrix: Matrix, crashed: pl.DataFrame) -> list[Found]:
 
 
 def _crashes(matrix: Matrix, name: str) -> Iterator[Found]:
+    """Yields the crashes in a run's log with drive, map and folder; nothing if the log is missing."""
     run = matrix.folder.log(name)
     if run is not None:
         log = read_log(run)
@@ -147,6 +149,7 @@ def _crashes(matrix: Matrix, name: str) -> Iterator[Found]:
 def _cell_block(
     matrix: Matrix, cell: Cell, found: list[Found], crashed: pl.DataFrame, worst: Found
 ) -> Cards:
+    """Returns a cell's cards, the first few inline; writes a page of all where those do not suffice."""
     config, weather = cell
     title = f"{config_title(config)}, {weather_title(weather)}"
     others = [item for item in found if item is not worst]

@@ -178,6 +178,7 @@ class Matrix(CampaignView[MatrixEntry]):
 
     @cached_property
     def _equal_weathers(self) -> dict[str, dict[str, list[str]]]:
+        """Returns per configuration and weather the weathers with the same drives in all shared seeds."""
         drives: dict[tuple[str, str], dict[int, str]] = {}
         columns = ("config", "weather", "seed", self.drive_column)
         for config, weather, seed, drive in self.finished.select(columns).rows():
@@ -297,6 +298,7 @@ def load_matrix(folder: Path) -> Matrix:
 
 
 def _known_first(values: pl.Series, known: dict[str, str]) -> list[str]:
+    """Returns the different values, the known ones first in their order, then the others sorted."""
     there = values.unique().to_list()
     return [v for v in known if v in there] + sorted(v for v in there if v not in known)
 

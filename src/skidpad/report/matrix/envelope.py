@@ -43,10 +43,12 @@ def envelope_blocks(matrix: Matrix) -> list[Block]:
 
 
 def _quantity(column: str) -> str:
+    """Returns a column's name after its last dot."""
     return column.rpartition(".")[2]
 
 
 def _row(ticks: pl.DataFrame, names: dict[int, str]) -> list[Cell]:
+    """Returns cells: speed in km/h, % of time per limit, median grip, % of way of low confidence."""
     shares = [_number((ticks["binding"] == number).mean()) * 100.0 for number in names]
     speed = _number(ticks["speed_mps"].mean()) * 3.6
     way = _number(ticks["ego_mps"].sum())
@@ -58,4 +60,5 @@ def _row(ticks: pl.DataFrame, names: dict[int, str]) -> list[Cell]:
 
 
 def _number(value: object) -> float:
+    """Returns a number as a float, 0.0 for anything else."""
     return float(value) if isinstance(value, (int, float)) else 0.0

@@ -156,12 +156,14 @@ def short_title(config: str) -> str:
 
 
 def _rates(name: str, rates: Sequence[Rate | None]) -> Series:
+    """Returns a series of rates with their limits; None where a rate is unknown."""
     limits = [ends(r.interval if r else None) for r in rates]
     low, high = zip(*limits, strict=True) if limits else ((), ())
     return Series(name, [r.rate if r else None for r in rates], low, high)
 
 
 def _means(matrix: Matrix, config: str, column: str, name: str) -> Series:
+    """Returns a series of means of `column`, one per group of weathers; None without values."""
     means: list[float | None] = []
     for group in matrix.weather_groups:
         values = matrix.within(config, group)[column].drop_nulls()

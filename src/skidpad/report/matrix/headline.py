@@ -86,6 +86,7 @@ def headline_tables(matrix: Matrix) -> list[Table]:
 
 
 def _per_run(matrix: Matrix) -> Table:
+    """Returns the table of events per run and the median time to the first intervention, by configuration."""
     *crashes, put_back = [
         Column[str](f"{title} per run", partial(_rate_per_run, matrix, name), meaning, format=RATE)
         for name, title, meaning in _event_kinds(matrix)
@@ -107,6 +108,7 @@ def _per_run(matrix: Matrix) -> Table:
 
 
 def _per_100_km(matrix: Matrix) -> Table:
+    """Returns the folded table of events per 100 km and distance in km, by compared configuration."""
     columns = [
         Column[str]("configuration", config_title),
         Column[str]("distance", partial(_distance, matrix), "of all its drives", "km", DISTANCE),
@@ -129,15 +131,18 @@ def _event_kinds(matrix: Matrix) -> tuple[tuple[str, str, str], ...]:
 
 
 def _name(matrix: Matrix, config: str) -> Cell:
+    """Returns a cell with the configuration's title, noted where it counts its reset cycle."""
     cycles = config == BASELINE and config not in matrix.comparison_configs
     return Cell(config_title(config), note="counts its reset cycle, see above" if cycles else "")
 
 
 def _distance(matrix: Matrix, config: str) -> float:
+    """Returns the distance in km of all drives of a configuration."""
     return float(matrix.cell(config)["distance_km"].sum())
 
 
 def _rate_per_run(matrix: Matrix, column: str, config: str) -> Quantity:
+    """Returns the events of `column` per run with their interval; no value where the rate is unknown."""
     rate = matrix.rate(column, config)
     if rate is None:
         return Quantity(value=None)
@@ -146,6 +151,7 @@ def _rate_per_run(matrix: Matrix, column: str, config: str) -> Quantity:
 
 
 def _rate_per_100_km(matrix: Matrix, column: str, config: str) -> Quantity:
+    """Returns the events of `column` per 100 km with their interval; no value without rate or distance."""
     runs = matrix.cell(config).drop_nulls([column, "distance_km"])
     km = float(runs["distance_km"].sum())
     rate = rate_by_seed(runs, column)
@@ -181,6 +187,7 @@ def _first(matrix: Matrix, config: str) -> Cell:
 
 
 def _time(t: float, end: float) -> str:
+    """Returns a median time in s as text without its unit, "> END" where `t` is not finite."""
     return f"{t:.0f}" if np.isfinite(t) else f"> {end:.0f}"
 
 

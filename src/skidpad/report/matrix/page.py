@@ -119,6 +119,7 @@ def _processor_time(matrix: Matrix, parity: Parity | None) -> list[tuple[str, st
 
 
 def _alike(matrix: Matrix) -> list[Block]:
+    """Returns a note on the weathers in which drives moved alike, beside the known groups; empty if none."""
     groups = {tuple(g.weathers) for g in matrix.weather_groups}
     others = [(c, w) for c, w in matrix.same_weather if tuple(w) not in groups]
     if not others:
@@ -129,6 +130,7 @@ def _alike(matrix: Matrix) -> list[Block]:
 
 
 def _verdicts(matrix: Matrix, judged: Sequence[Judgement]) -> list[Block]:
+    """Returns the verdicts with their introduction; one sentence instead where there is a single seed."""
     if matrix.seeds == 1:
         return [Text(unjudged_text(judged))]
     intro = Text(

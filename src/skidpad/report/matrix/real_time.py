@@ -80,9 +80,11 @@ def _published_table() -> Block:
 
 
 def _rows(times: pl.DataFrame, group: WeatherGroup) -> pl.DataFrame:
+    """Returns the rows of a group's weathers."""
     return times.filter(pl.col("weather").is_in(group.weathers))
 
 
 def _of(times: pl.DataFrame, column: str, how: str, group: WeatherGroup) -> Quantity:
+    """Returns the statistic `how` ("mean", "min", ...) of a column in a group; no value if empty."""
     values = _rows(times, group)[column].drop_nulls().drop_nans()
     return Quantity(value=float(getattr(values, how)()) if len(values) else None)

@@ -287,6 +287,8 @@ def grades_table(matrix: Matrix) -> Table:
 def _counts(
     matrix: Matrix, kinds: Sequence[tuple[str, str, str]], caption: str, note: str = ""
 ) -> Table:
+    """Returns a table of total counts over all runs, a column per kind (field, title, meaning)."""
+
     def name(config: str) -> Cell:
         runs = matrix.cell(config)
         note = f"{count_text(len(runs), 'run')}, {runs['distance_km'].sum():,.0f} km"
@@ -336,6 +338,8 @@ def per_weather(matrix: Matrix) -> list[Block]:
 
 
 def _metrics_table(matrix: Matrix, config: str) -> Table:
+    """Returns the folded table of a configuration's metrics, a column per group of weathers."""
+
     def of(group: WeatherGroup, metric: Metric) -> Quantity:
         return replace(metric_quantity(matrix.within(config, group), metric.name), remark="")
 

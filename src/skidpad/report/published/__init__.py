@@ -62,6 +62,7 @@ def published_matrix() -> pl.DataFrame:
 
 
 def _cells(table: pl.DataFrame) -> pl.DataFrame:
+    """Returns a published table with configuration and weather named as ours."""
     kind = pl.col("weather").replace_strict(KINDS)
     time = pl.col("time_of_day").str.to_lowercase()
     return table.select(

@@ -171,6 +171,7 @@ def _deciding(evaluation: Row) -> tuple[list[Row], str]:
 
 
 def _numbers(evaluation: Row) -> Numbers:
+    """Returns the head numbers: hours, precision and recall per judged result, unseen hazards."""
     hours, unseen = evaluation["hours"], evaluation["unseen_by_all_channels"]
     judged, _ = _deciding(evaluation)
     return Numbers(
@@ -190,6 +191,7 @@ def _numbers(evaluation: Row) -> Numbers:
 
 
 def _read_judgements(evaluation: Row) -> list[Judgement]:
+    """Returns the judgements of FINDINGS on the evaluation's segment table."""
     results = pl.DataFrame(evaluation["segment_table"], infer_schema_length=None)
     return judge(FINDINGS, [results if len(results) else None] * len(FINDINGS))
 
@@ -219,6 +221,7 @@ def _curve(evaluation: Row) -> list[Block]:
 
 
 def _curve_figure(rows: Row, hours: float) -> str:
+    """Returns an SVG of recall and false alarms per hour by the factor on the threshold, per hazard."""
     factors = [float(f) for f in rows]
     recall, false = [], []
     for hazard in HAZARDS:

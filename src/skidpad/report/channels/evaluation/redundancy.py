@@ -54,11 +54,13 @@ def redundancy(folder: Path) -> list[Block]:
 
 
 def _rate(event: str, driver: DriverRow) -> Cell:
+    """Returns a cell with a driver's number of events and, as note, their rate per segment or hour."""
     rate = driver.rates[event]
     return Cell(str(rate.events), float(rate.events), note=rate_text(rate, "segment", "h"))
 
 
 def _sentence(d: Difference) -> str:
+    """Returns a sentence on the paired difference per segment: interval, p value, number of pairs."""
     c = d.pairs
     return (
         f"{d.drive_by} alone less the arbiter, {TITLES[d.event]} per segment: {c.mean:+.3g} "

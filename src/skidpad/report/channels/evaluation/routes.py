@@ -251,4 +251,5 @@ def _published_times(modules: list[str]) -> list[Row]:
 
 
 def _value(name: str, row: Row) -> float | None:
+    """Returns the named field of a row; None where it has none."""
     return row[name]  # type: ignore[no-any-return]

@@ -66,6 +66,7 @@ NOTHING = Format(absent="")
 
 
 def _counts(titles: Mapping[str, tuple[str, str]]) -> list[Column[Row]]:
+    """Returns a column of counts per name, from titles and definitions by field name."""
     return [
         Column(title, partial(count, name), definition, format=NOTHING)
         for name, (title, definition) in titles.items()
@@ -73,6 +74,7 @@ def _counts(titles: Mapping[str, tuple[str, str]]) -> list[Column[Row]]:
 
 
 def _ratio(name: str, title: str, definition: str = "") -> Column[Row]:
+    """Returns a column in % of the ratio in the field `name`."""
     return Column(title, partial(ratio, name), definition, "%")
 
 
@@ -98,6 +100,7 @@ def results(evaluation: Row, truth: str) -> Table:
 
 
 def _result_columns(truth: str) -> list[Column[Row]]:
+    """Returns the columns of the results table; the published ones are filled for the truth "world" alone."""
     counts = {
         "tp": ("found", "true positives"),
         "fp": ("false", "false positives"),
@@ -122,17 +125,20 @@ def _result_columns(truth: str) -> list[Column[Row]]:
 
 
 def _hazard(row: Row) -> Cell:
+    """Returns a cell with the hazard's name, and a note where there are fewer than FEW true events."""
     few = "tp" in row and row["tp"] + row["fn"] < FEW
     return Cell(words(row["hazard"]), note="too few events to say more" if few else "")
 
 
 def _elsewhere(row: Row) -> str:
+    """Returns precision and recall in % with the other tolerances as text, "" where there are none."""
     return ", ".join(
         f"{ratio_text(o['precision'])} / {ratio_text(o['recall'])}" for o in row.get("others", ())
     )
 
 
 def _published_hazards() -> dict[str, str]:
+    """Returns the published precision and recall in % as text, by our name of the hazard."""
     rows = published_rows(Source.HAZARDS, "hazard")
     return {
         ours: f"{r['precision_pct_computed']:.2f} / {r['recall_pct_computed']:.2f}"
@@ -168,6 +174,7 @@ def routes(evaluation: Row, truth: str) -> Table:
 
 
 def _published_towns() -> list[Row]:
+    """Returns the published counts as rows per town: [tp, fp, fn] by our name of the hazard."""
     towns: dict[str, dict[str, list[int]]] = {}
     ours = {theirs: ours for ours, theirs in HAZARDS.items()}
     for r in read_published(Source.HAZARDS_BY_TOWN).to_dicts():

@@ -59,6 +59,7 @@ def strata(evaluation: Row) -> list[Block]:
 
 
 def _columns() -> list[Column[Row]]:
+    """Returns the columns of the table of driver groups, identifiers and hazards."""
     return [
         Column("drivers", lambda r: STRATA[r["stratum"]]),
         Column("identifier", lambda r: words(r["identifier"])),
@@ -71,10 +72,12 @@ def _columns() -> list[Column[Row]]:
 
 
 def _recall(row: Row) -> Cell:
+    """Returns a cell with the weighted recall in %."""
     return ratio("recall_weighted", row)
 
 
 def _size(row: Row) -> Cell:
+    """Returns a cell with the effective number of true hazards, noted where it is below FEW."""
     few = row["effective_size"] < FEW
     return Cell(
         f"{row['effective_size']:.0f}", row["effective_size"], note="too few" if few else ""
@@ -130,6 +133,7 @@ def _line(points: list[list[float]]) -> tuple[list[float], list[float]]:
 
 
 def _at_truths_limits(part: Row, hazard: str) -> Iterator[tuple[float, float]]:
+    """Yields (weighted recall, precision) of the reference rules against "sim", if both are known."""
     for result in headline(part):
         if (result["rules"], result["truth"]) == (REFERENCE, "sim"):
             row: Any = result["hazards"][hazard]

@@ -55,6 +55,7 @@ def ways_figures(ways: Mapping[str, Sequence[Way]], folder: Path) -> list[str]:
 
 
 def _chart(name: str, ways: Sequence[Way], folder: Path) -> Chart:
+    """Returns a chart in m of the ways driven on a map, over its lanes where the map is known."""
     x, y = _join_lines(np.array(way, dtype=np.float64).reshape(-1, 2) for way in ways)
     drawn = [Curve("driven", x, y, colour=0, style=DRIVEN)]
     map = _known_map(name, folder)
@@ -87,6 +88,7 @@ def _known_map(name: str, folder: Path) -> RoadMap | None:
 
 
 def _map_name(plan: Mapping[str, Any]) -> str:
+    """Returns the name of the plan's map file without its ending, "unknown" where the plan names none."""
     course = plan.get("course")
     place = course.get("map", "") if isinstance(course, dict) else ""
     return Path(str(place)).stem or "unknown"

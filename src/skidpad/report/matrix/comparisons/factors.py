@@ -37,12 +37,14 @@ def _known_runs(matrix: Matrix) -> pl.DataFrame:
 
 
 def _runs(matrix: Matrix, level: Level) -> pl.DataFrame:
+    """Returns the known runs with this level's functions and cruise target in km/h."""
     return _known_runs(matrix).filter(
         (pl.col("functions") == level[0]) & (pl.col("cruise_kmh") == level[1])
     )
 
 
 def _table(matrix: Matrix, levels: list[Level]) -> Block:
+    """Returns the table of counts per run and of mean speed by functions and cruise target."""
     columns = [
         Column[Level]("functions", lambda level: level[0] or "none"),
         Column[Level]("cruise target, km/h", lambda level: f"{level[1]:g}"),
@@ -57,11 +59,13 @@ def _table(matrix: Matrix, levels: list[Level]) -> Block:
 
 
 def _count(matrix: Matrix, column: str, level: Level) -> Quantity:
+    """Returns the rate of events per run in `column` at a level; no value without runs."""
     counts = _runs(matrix, level)[column].drop_nulls()
     return rate_quantity(event_rate(counts.to_list()) if len(counts) else None)
 
 
 def _mean(matrix: Matrix, level: Level) -> Quantity:
+    """Returns the mean speed in km/h over the runs at a level."""
     return mean_quantity(_runs(matrix, level), "mean_speed_kmh")
 
 

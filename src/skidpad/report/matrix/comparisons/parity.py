@@ -133,10 +133,12 @@ def _by_objects(parity: Parity) -> list[list[Twin]]:
 
 
 def _is_same_drive(twin: Twin) -> bool:
+    """Returns True when both runs of a twin have the same known motion hash."""
     return twin.pixels["motion_hash"] == twin.objects["motion_hash"] is not None
 
 
 def _number(row: dict[str, object], column: str) -> float | None:
+    """Returns a row's value in the column as a float; None where it is null."""
     value = row[column]
     return None if value is None else float(value)  # type: ignore[arg-type]
 
@@ -149,6 +151,8 @@ def _both(column: str, twin: Twin) -> Quantity:
 
 
 def _table(parity: Parity) -> Block:
+    """Returns the table of twins, their quantities on pixels beside those on objects."""
+
     def name(twin: Twin) -> Cell:
         return Cell(
             config_title(str(twin.pixels["config"])),
@@ -165,6 +169,7 @@ def _table(parity: Parity) -> Block:
 
 
 def _figure(parity: Parity) -> Figure:
+    """Returns the figure of the first three compared quantities, on pixels over on objects."""
     charts = []
     for column, title, unit in COMPARED[:3]:
         pairs = [

@@ -59,6 +59,7 @@ def beside_published(matrix: Matrix) -> list[Block]:
 
 
 def _has_published(matrix: Matrix, config: str) -> bool:
+    """Returns True when some weather of the matrix has published interventions of the configuration."""
     return any(published_value(INTERVENTIONS, config, w) is not None for w in matrix.weathers)
 
 
@@ -76,6 +77,8 @@ def _words(matrix: Matrix) -> Text:
 
 
 def _table(matrix: Matrix, configs: Sequence[str], column: str, caption: str, note: str) -> Block:
+    """Returns the table of our means of `column` beside the published ones, by configuration and weather."""
+
     def of(weather: str, config: str) -> Quantity:
         runs = matrix.cell(config, weather).drop_nulls(column)
         return Quantity(
@@ -95,6 +98,7 @@ def _table(matrix: Matrix, configs: Sequence[str], column: str, caption: str, no
 
 
 def _figures(matrix: Matrix, configs: Sequence[str]) -> list[Block]:
+    """Returns figures of interventions, dropout, and the published preliminary against final means."""
     weathers = [w for w in matrix.weathers if w in WEATHERS]
     groups = [w.replace("-", "\n", 1) for w in weathers]
     figures: list[Block] = []
@@ -122,5 +126,6 @@ def _figures(matrix: Matrix, configs: Sequence[str]) -> list[Block]:
 
 
 def _mean(matrix: Matrix, column: str, config: str, weather: str) -> float | None:
+    """Returns the mean of `column` in a configuration's weather; None without values."""
     values = matrix.cell(config, weather)[column].drop_nulls()
     return float(values.mean()) if len(values) else None  # type: ignore[arg-type]

@@ -60,15 +60,18 @@ def _table(matrix: Matrix, first: str, second: str) -> Block:
 
 
 def _name(metric: Metric) -> Cell:
+    """Returns a cell with the metric's title and unit, its meaning as note."""
     title = NAMES.get(metric.name, metric.title)
     return Cell(f"{title}, {metric.unit}" if metric.unit else title, note=metric.meaning)
 
 
 def _mean(matrix: Matrix, config: str, metric: Metric) -> Quantity:
+    """Returns the metric's mean in all runs of a configuration, with its interval."""
     return metric_quantity(matrix.cell(config), metric.name)
 
 
 def _difference(matrix: Matrix, first: str, second: str, metric: Metric) -> Quantity:
+    """Returns the metric's paired mean difference, second less first; no value without pairs."""
     less, more = (pl.col("config") == config for config in (first, second))
     pairs, _ = paired_runs(matrix.finished, more, less, BY_RUN, metric.name)
     if not len(pairs):

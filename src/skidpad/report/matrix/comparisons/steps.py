@@ -73,6 +73,7 @@ Differences = dict[tuple[str, tuple[str, str]], Quantity]
 
 
 def _found_step(found: Differences, column: str, step: tuple[str, str]) -> Quantity:
+    """Returns the difference found for a column and a step; no value where there is none."""
     return found.get((column, step), Quantity(value=None))
 
 

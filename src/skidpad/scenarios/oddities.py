@@ -24,12 +24,14 @@ def oddities(root: Node) -> Iterator[Finding]:
 
 
 def _speed(node: Node) -> str:
+    """Returns a remark on a speed above `V_MAX` in m/s; empty where there is none."""
     name = "speed" if node.tag == "SpeedProfileEntry" else "value"
     v = node.number(name) if node.has(name) else 0.0
     return f"{name}: {v:g} m/s is faster than any road vehicle" if abs(v) > V_MAX else ""
 
 
 def _count(node: Node) -> str:
+    """Returns a remark on a maximumExecutionCount of 0 or less; empty where there is none."""
     if node.whole("maximumExecutionCount", 1) > 0:
         return ""
     how = "it never begins" if node.tag == "Event" else "it is carried out once all the same"
@@ -37,6 +39,7 @@ def _count(node: Node) -> str:
 
 
 def _dynamics(node: Node) -> str:
+    """Returns a remark on a negative time or distance of a transition; empty where there is none."""
     if not node.has("value") or node.text("dynamicsShape", "") == "step":
         return ""
     value, dimension = node.number("value"), node.text("dynamicsDimension", "")
@@ -46,6 +49,7 @@ def _dynamics(node: Node) -> str:
 
 
 def _front_axle(node: Node) -> str:
+    """Returns a remark on a maxSteering angle in rad out of range; empty where there is none."""
     angle = node.number("maxSteering", 0.0)
     if 0.0 <= angle < LOCK_MAX:
         return ""

@@ -64,6 +64,7 @@ class Acc:
 
 
 def _number(properties: Mapping[str, str], name: str, default: float) -> float:
+    """Returns a controller's property as a finite number; raises ConfigError where it is none."""
     try:
         value = float(properties.get(name, default))
     except ValueError:
@@ -91,6 +92,7 @@ class ScenarioName:
 
 
 def _own_names() -> tuple[ScenarioName, ...]:
+    """Returns the registry entries of the controllers that are built in."""
     title, units = "Controller: Intelligent Driver Model", "setSpeed in m/s, timeGap in s"
     return tuple(ScenarioName(name, title, made, units) for name, made in BUILT_IN.items())
 

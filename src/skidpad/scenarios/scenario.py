@@ -171,6 +171,7 @@ class _Wish:
 
 
 def _compile_scenario(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | None:
+    """Compiles the scenario of a parsed file; None, with findings, where a fault is not allowed."""
     values = root_values(root, wish.parameters)
     root = root.scoped(values)
     findings += oddities(root)

@@ -248,6 +248,7 @@ class Actor:
         return replace(command, **self.worked) if self.worked else command
 
     def _place_command(self, t: float, dt: float) -> ActorCommand:
+        """Returns the command that places the actor on its trajectory or road, and updates its pose."""
         if self.track is not None:
             pose, v, _ = self.track.at(t)
             v = v if self.track.timed or self.track.steered else self.guide.v

@@ -66,6 +66,7 @@ def compile_signals(road: Node | None) -> tuple[SignalController, ...]:
 
 
 def _phases(node: Node) -> list[Phase]:
+    """Returns the phases of a signal controller, with durations in s of at most 1e9."""
     found = []
     for phase in node.children("Phase"):
         duration = phase.limit("duration")
@@ -79,6 +80,7 @@ def _phases(node: Node) -> list[Phase]:
 
 
 def _delay(node: Node, nodes: Mapping[str, Node]) -> float:
+    """Returns the delay in s of a controller, summed along its chain of references."""
     total, seen = 0.0, set[str]()
     while True:
         total += node.number("delay", 0.0)

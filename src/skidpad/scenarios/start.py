@@ -95,6 +95,7 @@ def compile_start(init: Node, ctx: Context) -> Start:
 
 
 def _private(node: Node, ctx: Context, wishes: dict[str, _Wish]) -> None:
+    """Adds the positions, initial speed and other private actions of a node to the entities' wishes."""
     for name in ctx.actors([node]):
         wish = wishes.setdefault(name, _Wish(node))
         for one in node.children("PrivateAction"):
@@ -108,6 +109,7 @@ def _private(node: Node, ctx: Context, wishes: dict[str, _Wish]) -> None:
 
 
 def _handed_over(wishes: Mapping[str, _Wish]) -> Iterator[tuple[str, bool]]:
+    """Yields (entity name, active) for each controller that the Init phase switches."""
     for name, wish in wishes.items():
         flat: list[Any] = []
         for action in wish.actions:
@@ -137,6 +139,7 @@ class _Starting:
         self._so_far: Place | None = None  # where the teleports before the one at hand have put it
 
     def _once(self, key: str, make: Callable[[], Any]) -> Any:
+        """Returns the value of `key`, computed at most once; raises an error where it depends on itself."""
         if key not in self._known:
             self._known[key] = _ASKED
             self._known[key] = make()
@@ -152,6 +155,7 @@ class _Starting:
         return cast("Place", self._once("place", self._place))
 
     def _place(self) -> Place:
+        """Returns the entity's place after all its Init actions; the world origin where none gives one."""
         for position in self.wish.positions:
             self._so_far = position.place(self.scene)
         network = self.ctx.network
@@ -196,6 +200,7 @@ class _Starting:
         return cast("float", self._once("speed", self._speed))
 
     def _speed(self) -> float:
+        """Returns the initial speed in m/s: the leader's for a gap action, else as asked, limited, or 0."""
         gap = next((a for a in self.wish.actions if isinstance(a, KeepGap)), None)
         if gap is not None and gap.limits.none:
             return self.scene.actors[gap.other].v_told

@@ -152,11 +152,13 @@ def compile_storyboard(board: Node, ctx: Context) -> Storyboard:
 
 
 def _story(node: Node, ctx: Context) -> Story:
+    """Compiles a story with all its acts."""
     path = (node.label(),)
     return Story(path, tuple(_act(a, path, ctx) for a in node.children("Act")))
 
 
 def _act(node: Node, above: Path, ctx: Context) -> Act:
+    """Compiles an act with its groups and its start and stop triggers."""
     path = (*above, node.label())
     groups = [ctx.attempt(partial(_group, g, path, ctx)) for g in node.children("ManeuverGroup")]
     return Act(
@@ -168,6 +170,7 @@ def _act(node: Node, above: Path, ctx: Context) -> Act:
 
 
 def _group(node: Node, above: Path, ctx: Context) -> Group:
+    """Compiles a manoeuvre group: count, actors and manoeuvres; faulty manoeuvres become findings."""
     path = (*above, node.label())
     found = node.child("Actors")
     by_trigger = found.flag("selectTriggeringEntities", default=False)
@@ -179,6 +182,7 @@ def _group(node: Node, above: Path, ctx: Context) -> Group:
 
 
 def _manoeuvre(node: Node, above: Path, ctx: Context) -> Manoeuvre:
+    """Compiles a manoeuvre, resolved from a catalogue; faulty events become findings."""
     node = ctx.catalogs.resolved(node, "Maneuver")
     path = (*above, node.label())
     events = [ctx.attempt(partial(_event, e, path, ctx)) for e in node.children("Event")]
@@ -186,6 +190,7 @@ def _manoeuvre(node: Node, above: Path, ctx: Context) -> Manoeuvre:
 
 
 def _event(node: Node, above: Path, ctx: Context) -> Event:
+    """Compiles an event with priority, count, start trigger and actions; faulty actions become findings."""
     path = (*above, node.label())
     start = compile_trigger(node.find("StartTrigger"), ctx)
     actions = [ctx.attempt(partial(_action, a, path, ctx)) for a in node.children("Action")]
@@ -199,6 +204,7 @@ def _event(node: Node, above: Path, ctx: Context) -> Event:
 
 
 def _action(node: Node, above: Path, ctx: Context) -> NamedAction:
+    """Compiles a private, global or user-defined action; an empty one is over as it begins, with a note."""
     path = (*above, node.label())
     if next(node.children(), None) is None:
         ctx.findings.append(node.finding("holds no action: over as it begins", Kind.NOTE))

@@ -94,6 +94,7 @@ def _free(scene: Scene, spots: Spots, v: float, length: float) -> Mask:
 
 
 def _room(v_behind: float, v_ahead: float) -> float:
+    """Returns the gap in m that a vehicle at `v_behind` needs to one at `v_ahead` (m/s)."""
     closing = max(v_behind - v_ahead, 0.0)
     return ROOM_MIN + ROOM_TIME * v_behind + closing**2 / (2.0 * B_COMFORT)
 
@@ -196,6 +197,7 @@ class Filling:
         return self.later is None
 
     def _fill(self, scene: Scene, region: Region) -> None:
+        """Adds missing vehicles to the scene at free spots of the region, and sets the next such moment."""
         self.due = scene.t + AGAIN
         spots = self.pool.spots
         spots = spots.where(region.inside(scene, spots))
@@ -206,12 +208,14 @@ class Filling:
             self.pool.bring(scene, some)
 
     def _release(self, scene: Scene) -> None:
+        """Removes the vehicles that are on no road or have left the first region."""
         for actor in self.pool.there(scene):
             base = actor.guide.base
             if base is None or not self._stays(scene, spot_at(scene.network.map, base)):
                 vanish(scene, actor)
 
     def _stays(self, scene: Scene, spot: Spots) -> bool:
+        """Returns whether the spot lies in the first region."""
         return bool(self.first.inside(scene, spot)[0])
 
 
@@ -249,6 +253,7 @@ def lead_of(scene: Scene, actor: Actor) -> tuple[float, float]:
 
 
 def _near(scene: Scene, actor: Actor) -> Iterable[tuple[float, Actor]]:
+    """Yields (distance in m, actor) for solid actors in front of this one and within `LOOK` m in x and y."""
     for other in scene.actors.values():
         if other is actor or not other.present or other.entity.is_ghost:
             continue

@@ -45,6 +45,7 @@ class AnyEntity:
         return [n for n in names if self.condition.holds(scene, n)]
 
     def _holds(self, scene: Scene) -> bool:
+        """Returns whether the condition holds for any (or all) of the entities; absent ones count as no."""
         for name in self.names:
             if (
                 scene.actors[name].present and self.condition.holds(scene, name)
@@ -95,6 +96,7 @@ class Watched:
         return result
 
     def _result(self, scene: Scene) -> bool:
+        """Returns whether the condition, with its edge applied, held `delay` seconds ago."""
         now = self.probe(scene)
         before, self.before = self.before, now
         edge = self.timed.edge
@@ -151,6 +153,7 @@ def compile_trigger(node: Node | None, ctx: Context) -> Trigger:
 
 
 def _timed_condition(node: Node, ctx: Context) -> Timed:
+    """Compiles a condition with its edge and its delay in s."""
     edge = node.choice("conditionEdge", Edge, Edge.NONE)
     delay = node.number("delay", 0.0)
     if delay < 0.0:

@@ -76,6 +76,7 @@ class Several:
 
 
 def _flag(node: Node, name: str) -> bool | None:
+    """Returns the boolean attribute of that name; None where the node lacks the attribute."""
     return node.flag(name, default=False) if node.has(name) else None
 
 
@@ -138,10 +139,12 @@ def _read_pedal(node: Node) -> float:
 
 
 def _steer(node: Node) -> float:
+    """Returns the steering command in -1..1: the wheel angle `value` in rad over full lock, clipped."""
     return min(max(node.number("value") / FULL_LOCK, -1.0), 1.0)
 
 
 def _reverse(node: Node) -> bool:
+    """Returns whether the file puts the automatic or manual gear box into reverse."""
     automatic = node.find("AutomaticGear")
     if automatic is not None:
         return automatic.text("gear") == BACKWARDS
@@ -190,6 +193,7 @@ def compile_controller(node: Node, ctx: Context) -> PrivateAction:
 
 
 def _is_known(node: Node) -> bool:
+    """Returns True for a supported tag; raises the error "not supported" for any other."""
     if node.tag not in TABLE:
         raise node.unsupported()
     return True

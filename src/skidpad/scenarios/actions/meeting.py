@@ -218,6 +218,7 @@ def compile_synchronize(node: Node, ctx: Context) -> Synchronize:
 
 
 def _steady(speed: Node) -> Steady:
+    """Returns the last stretch at final speed, as length in m or duration in s; zeros where none is given."""
     for name in ("distance", "time"):
         found = speed.find(f"Target{name.title()}SteadyState")
         if found is not None:

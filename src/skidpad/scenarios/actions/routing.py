@@ -99,6 +99,7 @@ class AcquirePosition:
 
 
 def _way_there(network: Network, actor: Actor, goal: Position, scene: Scene) -> tuple[int, ...]:
+    """Returns the road indices from the actor to the goal; empty, with a notice, where one is on no road."""
     here, there = actor.place(network).lane, goal.place(scene).lane
     if here is None or there is None:
         scene.notice(f"{actor.name} acquires no position: it or the place is on no road")
@@ -168,6 +169,7 @@ class FollowTrajectory:
         return led
 
     def _steer(self, scene: Scene, actor: Actor, line: Line) -> Steered:
+        """Returns the running action that steers the actor along the line, timed if the action is."""
         entity, closed = actor.entity, self.trajectory.closed
         assert entity.axles is not None
         times = None

@@ -53,6 +53,7 @@ class StopTraffic:
 
 
 def _size(node: Node, name: str, default: float | None = None) -> float:
+    """Returns a number attribute that may be infinite; raises an error where it is below 0."""
     value = node.limit(name, default)
     if value < 0.0:
         raise node.error(f"{name} must be >= 0, got {value:g}")
@@ -60,6 +61,7 @@ def _size(node: Node, name: str, default: float | None = None) -> float:
 
 
 def _count(node: Node, name: str, ctx: Context) -> int:
+    """Returns a number of vehicles, cut to `MOST`; a cut is noted in the findings."""
     value = _size(node, name)
     if value > MOST:
         what = f"{name} = {value:g}: at most {MOST} are taken"
@@ -87,6 +89,7 @@ def _draw_vehicles(node: Node, count: int, ctx: Context) -> tuple[str, ...]:
 
 
 def _kinds(node: Node, ctx: Context) -> Iterator[tuple[float, Entity]]:
+    """Yields (weight, entity template) for each kind of vehicle; an ordinary car where none is given."""
     shares = node.find("TrafficDefinition", "VehicleCategoryDistribution")
     entries = node.find("TrafficDistribution")
     if entries is not None:
@@ -103,6 +106,7 @@ def _kinds(node: Node, ctx: Context) -> Iterator[tuple[float, Entity]]:
 
 
 def _speeds(node: Node) -> Speeds:
+    """Returns the range of initial speeds in m/s; both limits are None where the file gives none."""
     for name in ("speed", "velocity"):
         if node.has(name):
             v = _size(node, name)
@@ -117,21 +121,25 @@ def _speeds(node: Node) -> Speeds:
 
 
 def _disc(node: Node, ctx: Context) -> Disc:
+    """Returns the disc given by the position and the radius in m of the node."""
     return Disc(position(node.child("Position"), ctx), _size(node, "radius"))
 
 
 def _source(node: Node, ctx: Context) -> Callable[[str, Scene], Sourcing]:
+    """Returns a function of (action name, scene) that starts a traffic source at `rate` vehicles per s."""
     region, rate, speeds = _disc(node, ctx), _size(node, "rate"), _speeds(node)
     cars = _draw_vehicles(node, min(ceil(min(rate * OF_A_SOURCE, MOST)) + 1, MOST), ctx)
     return lambda name, scene: Sourcing(name, Pool(name, cars, speeds, scene), region, rate)
 
 
 def _sink(node: Node, ctx: Context) -> Callable[[str, Scene], Sinking]:
+    """Returns a function of (action name, scene) that starts a traffic sink; an absent rate is infinite."""
     region, rate = _disc(node, ctx), _size(node, "rate", inf)
     return lambda name, _: Sinking(name, region, rate)
 
 
 def _swarm(node: Node, ctx: Context) -> Callable[[str, Scene], Filling]:
+    """Returns a function of (action name, scene) that starts a swarm in an oval around its central entity."""
     centre = node.find("CentralObject") or node.child("CentralSwarmObject")
     entity = ctx.entity(centre)
     axes = [_size(node, name) for name in ("semiMajorAxis", "semiMinorAxis", "innerRadius")]
@@ -149,6 +157,7 @@ def _swarm(node: Node, ctx: Context) -> Callable[[str, Scene], Filling]:
 
 
 def _area(node: Node, ctx: Context) -> Callable[[str, Scene], Filling]:
+    """Returns a function of (action name, scene) that fills a traffic area, once or continuously."""
     region = _region(node.child("TrafficArea"), ctx)
     cars = _draw_vehicles(node, _count(node, "numberOfEntities", ctx), ctx)
     later = region if node.flag("continuous", default=False) else None
@@ -156,6 +165,7 @@ def _area(node: Node, ctx: Context) -> Callable[[str, Scene], Filling]:
 
 
 def _region(node: Node, ctx: Context) -> Region:
+    """Returns the region of a traffic area: its polygon of three or more corners, or else its road ranges."""
     polygon = node.find("Polygon")
     if polygon is None:
         ranges = node.children("RoadRange")

@@ -50,6 +50,7 @@ class DeleteEntity:
 
 
 def _entity(node: Node, ctx: Context) -> GlobalAction:
+    """Compiles the action that adds an entity at a position or deletes it."""
     name, what = ctx.entity(node), node.only()
     if what.tag == "AddEntityAction":
         return AddEntity(name, position(what.child("Position"), ctx))
@@ -78,6 +79,7 @@ class SetValue:
 
 
 def _value(node: Node, ctx: Context) -> GlobalAction:
+    """Compiles the action that sets, adds to or multiplies a declared variable or parameter."""
     variable = node.tag == "VariableAction"
     known = ctx.variables if variable else ctx.parameters
     name = node.plain("variableRef" if variable else "parameterRef")
@@ -116,6 +118,7 @@ class SetSignal:
 
 
 def _infrastructure(node: Node, ctx: Context) -> GlobalAction:
+    """Compiles the action that sets a traffic signal's state or a signal controller's phase."""
     del ctx
     what = node.child("TrafficSignalAction").only()
     if what.tag == "TrafficSignalStateAction":
@@ -139,6 +142,7 @@ class SetEnvironment:
 
 
 def _environment(node: Node, ctx: Context) -> GlobalAction:
+    """Compiles the action that sets the environment given in place or by a catalogue reference."""
     return SetEnvironment(compile_environment(ctx.catalogs.resolved(node.only(), "Environment")))
 
 

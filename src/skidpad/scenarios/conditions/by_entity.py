@@ -52,6 +52,7 @@ class Reaches:
 
 
 def _reaches(node: Node, ctx: Context) -> EntityCondition:
+    """Compiles a condition on the distance in m travelled, or on the duration in s of another quantity."""
     del ctx
     quantity = Quantity(node.tag)
     name = "value" if quantity is Quantity.TRAVELLED else "duration"
@@ -94,6 +95,7 @@ class Motion:
 
 
 def _motion(node: Node, ctx: Context) -> EntityCondition:
+    """Compiles a condition on acceleration in m/s^2, or on speed in m/s, perhaps relative to an entity."""
     component = node.choice("direction", Component, Component.TOTAL)
     other = ctx.entity(node) if node.tag == "RelativeSpeedCondition" else None
     return Motion(rule(node), component, node.tag == "AccelerationCondition", other)
@@ -113,6 +115,7 @@ class ReachPosition:
 
 
 def _reach_position(node: Node, ctx: Context) -> EntityCondition:
+    """Compiles the condition that an entity is within `tolerance` in m of a position."""
     return ReachPosition(node.number("tolerance"), position(node.child("Position"), ctx))
 
 
@@ -182,6 +185,7 @@ class Angle:
         return pitch if self.turn is Turn.PITCH else roll
 
     def _against(self, scene: Scene, pose: Pose, track: Track | None) -> float:
+        """Returns the angle in rad in the condition's axes: NaN without trajectory, 0 for pitch and roll."""
         if self.axes is Axes.WORLD:
             return self._of(scene, pose)
         if self.axes is Axes.TRAJECTORY and track is None:
@@ -198,6 +202,7 @@ class Angle:
 
 
 def _angle(node: Node, ctx: Context) -> EntityCondition:
+    """Compiles a condition on an entity's heading, pitch or roll in rad, perhaps relative to an entity."""
     return Angle(
         node.choice("angleType", Turn),
         node.number("angle"),
@@ -247,6 +252,7 @@ class Clearance:
         return any(i == base.lane_id or scene.network.beside(base, i) for i in wanted)
 
     def _inside(self, scene: Scene, here: Actor, base: LanePoint, along: bool, other: str) -> bool:
+        """Returns whether the other entity is in the stretch and lanes that must be clear around this one."""
         it = scene.actors[other]
         there = scene.network.place_of(it.pose).lane
         way = along_road(scene.network, here.pose, it.pose)
@@ -267,6 +273,7 @@ class Clearance:
 
 
 def _clearance(node: Node, ctx: Context) -> EntityCondition:
+    """Compiles the condition that lanes around an entity are clear; no lane range stands for all lanes."""
     lanes = tuple(
         (r.limit("from", -inf), r.limit("to", inf)) for r in node.children("RelativeLaneRange")
     )

@@ -30,6 +30,7 @@ class SimulationTime:
 
 
 def _time(node: Node, ctx: Context) -> Condition:
+    """Compiles a condition on the simulation time in s."""
     del ctx
     return SimulationTime(rule(node))
 
@@ -48,6 +49,7 @@ class Value:
         return self._holds
 
     def _holds(self, scene: Scene) -> bool:
+        """Returns whether the variable or parameter now meets the comparison."""
         return self.holds_among(scene.variables if self.variable else scene.parameters)
 
     def holds_among(self, values: Mapping[str, str]) -> bool:
@@ -56,6 +58,7 @@ class Value:
 
 
 def _value(node: Node, ctx: Context) -> Condition:
+    """Compiles a condition on a declared variable or parameter; an undeclared criterion never holds."""
     variable = node.tag == "VariableCondition"
     known = ctx.variables if variable else ctx.parameters
     name = node.plain("variableRef" if variable else "parameterRef")
@@ -115,6 +118,7 @@ class ElementMove:
 
 
 def _element(node: Node, ctx: Context) -> Condition:
+    """Compiles the condition that a storyboard element is in a state or makes a transition."""
     path, text = ctx.element(node), node.text("state")
     for kind in State:
         if kind.value == text:
@@ -156,6 +160,7 @@ class TimeOfDay:
 
 
 def _time_of_day(node: Node, ctx: Context) -> Condition:
+    """Compiles a condition on the date and time of day of the scene."""
     del ctx
     moment = moment_of(node)
     if moment is None:
@@ -177,6 +182,7 @@ class UserValue:
 
 
 def _of_user(node: Node, ctx: Context) -> Condition:
+    """Compiles a condition on a user-defined value; without a hook it never holds, with a finding."""
     name = node.text("name")
     read = ctx.names.hook(name, "value")
     if read is None:
@@ -186,6 +192,7 @@ def _of_user(node: Node, ctx: Context) -> Condition:
 
 
 def _signal(node: Node, ctx: Context) -> Condition:
+    """Compiles the condition that a traffic signal is in a state or its controller in a phase."""
     del ctx
     if node.tag == "TrafficSignalCondition":
         return Signal(node.text("name"), node.text("state"))

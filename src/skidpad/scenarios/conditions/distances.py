@@ -105,10 +105,12 @@ def target(scene: Scene, other: str | None, goal: Position | None) -> tuple[Pose
 
 
 def _relative_distance(node: Node, ctx: Context) -> EntityCondition:
+    """Compiles a condition on the distance in m from an entity to another entity."""
     return Distance(rule(node), measure(node), ctx.entity(node), None)
 
 
 def _distance(node: Node, ctx: Context) -> EntityCondition:
+    """Compiles a condition on the distance in m from an entity to a position."""
     return Distance(rule(node), measure(node), None, position(node.child("Position"), ctx))
 
 
@@ -134,6 +136,7 @@ class TimeHeadway:
 
 
 def _headway(node: Node, ctx: Context) -> EntityCondition:
+    """Compiles a condition on the time headway in s from an entity to another entity."""
     return TimeHeadway(rule(node), measure(node), ctx.entity(node))
 
 
@@ -168,6 +171,7 @@ class TimeToCollision:
 
 
 def _collision_time(node: Node, ctx: Context) -> EntityCondition:
+    """Compiles a condition on the time to collision in s with an entity or a position."""
     goal = node.child("TimeToCollisionConditionTarget").only()
     how = measure(node)
     if goal.tag == "EntityRef":

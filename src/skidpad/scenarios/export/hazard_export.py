@@ -72,6 +72,7 @@ def _paint(entities: Sequence[Track], record: HazardRecord) -> None:
 
 
 def _channels(record: HazardRecord, version: OscVersion, world: str | None) -> tuple[str, ...]:
+    """Returns the channels to write: all, or only `world`; version 1.0 takes one, by default the driving."""
     if world is not None and world not in record.channels:
         raise ConfigError(
             f"unknown channel {world!r} in hazard {record.id}; choose one of: "

@@ -88,6 +88,7 @@ class _Road:
         yield from ((first + a, first + b) for a, b in pairwise(ends))
 
     def _write(self, left: bool, a: int, b: int) -> int:
+        """Writes the lane boundary on one side of map samples a..b (both included) and returns its OSI id."""
         samples, boundary = self.map.samples, self.truth.lane_boundary.add()
         boundary.id.value = FIRST_BOUNDARY + len(self.truth.lane_boundary) - 1
         side = 0.5 if left else -0.5
@@ -106,6 +107,7 @@ class _Road:
 
 
 def _pick_samples(first: int, last: int) -> list[int]:
+    """Returns the sample indices first, first + STEP, ... and always the last one."""
     return [*range(first, last, STEP), last]
 
 
@@ -123,6 +125,7 @@ def road_truth(map: RoadMap) -> GroundTruth:
 
 
 def _write_lane(road: _Road, lane: int) -> None:
+    """Writes a lane: kind, centreline, neighbours, boundaries and pairs of predecessor and successor."""
     map, lanes, samples = road.map, road.map.lanes, road.map.samples
     message = road.truth.lane.add()
     message.id.value = FIRST_LANE + lane

@@ -74,4 +74,5 @@ def _even(rows: np.ndarray) -> bool:
 
 
 def _distance(a: Vertex, b: Vertex) -> float:
+    """Returns the horizontal distance in m between two vertices."""
     return hypot(b.x - a.x, b.y - a.y)

@@ -95,6 +95,7 @@ def log_tracks(log: RunLog) -> list[Track]:
 
 
 def _track(log: RunLog, i: int, name: str, there: np.ndarray) -> Track:
+    """Returns the track of actor i of a log, at the moments where the mask `there` is true."""
     a, table = log.actors, log.table
     x, y, z, yaw = (v[there, i].astype(np.float64) for v in (a.x, a.y, a.z, a.yaw))
     vx, vy = (v[there, i].astype(np.float64) for v in (a.vx, a.vy))

@@ -49,6 +49,7 @@ _OKTAS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight"
 
 
 def _clouds(share: float, *, old: bool) -> Any:
+    """Returns the enumeration value for a cloud cover of 0..1: oktas, or a cloud state for old versions."""
     if not old:
         return getattr(xosc.FractionalCloudCover, f"{_OKTAS[round(8.0 * share)]}Oktas")
     words = xosc.CloudState
@@ -56,10 +57,12 @@ def _clouds(share: float, *, old: bool) -> Any:
 
 
 def _temperature(environment: Environment, *, old: bool) -> dict[str, float]:
+    """Returns {"temperature": kelvin}; empty for old versions or where the temperature is unknown."""
     if old or environment.temperature_c is None:
         return {}
     return {"temperature": round(environment.temperature_c + CELSIUS, 2)}
 
 
 def _wetness(environment: Environment) -> Wetness:
+    """Returns the wetness of the road; dry where the environment gives none."""
     return environment.wetness or Wetness.DRY

@@ -114,6 +114,7 @@ def _extend(mine: list[Track], channel: str, t: float, frame: ChannelFrame) -> N
 
 
 def _find(free: list[Track], identity: int, t: float, state: list[float]) -> Track | None:
+    """Returns the free track with that id or, for -1, the nearest one without id in reach; else None."""
     if identity >= 0:
         return next((track for track in free if track.id == identity), None)
     near = [(track.distance(t, state[0], state[1]), k) for k, track in enumerate(free)]

@@ -97,6 +97,7 @@ def write_element(path: Path, element: ElementTree.Element) -> None:
 
 
 def _scenario(entities: Sequence[Track], sheet: Sheet) -> ElementTree.Element:
+    """Returns the XML root of the OpenSCENARIO file with one manoeuvre group for each track."""
     xosc.VersionBase().setVersion(minor=sheet.version.minor)  # of the whole library
     objects, init = xosc.Entities(), xosc.Init()
     act = xosc.Act("Act", _after(0.0, sheet))
@@ -126,6 +127,7 @@ def _scenario(entities: Sequence[Track], sheet: Sheet) -> ElementTree.Element:
 
 
 def _entity(track: Track, sheet: Sheet) -> Any:
+    """Returns the scenariogeneration object of a track: pedestrian, obstacle or vehicle, by its label."""
     length, width, cx, cy = track.box
     label = class_of(track.label)
     height = track.height or HEIGHTS.get(label, 1.5)
@@ -176,6 +178,7 @@ def _initial(init: Any, track: Track, sheet: Sheet, k: int) -> None:
 
 
 def _vertices(track: Track) -> list[Vertex]:
+    """Returns the track's vertices in s, m and rad, rounded; absent heights count as 0."""
     heights = track.z or [0.0] * len(track.t)
     rows = zip(track.t, track.x, track.y, heights, track.heading, strict=True)
     return [
@@ -185,6 +188,7 @@ def _vertices(track: Track) -> list[Vertex]:
 
 
 def _waiting(t: float, sheet: Sheet, k: int, further: float = 0.0) -> Vertex:
+    """Returns a vertex at time t in s on the parking place of entity k, `further` m along its heading."""
     x, y, h = sheet.parked(k)
     x, y = x + further * cos(h), y + further * sin(h)
     return Vertex(round(t, 3), round(x, 3), round(y, 3), 0.0, round(h, 4))
@@ -246,6 +250,7 @@ def _lead(manoeuvre: Any, name: str, rows: Sequence[Vertex], sheet: Sheet, word:
 
 
 def _event(name: str, action: Any, t: float, sheet: Sheet, *, takes_over: bool = False) -> Any:
+    """Returns an event that starts its one action at time t in s; with `takes_over` it overrides others."""
     priority = xosc.Priority.override if takes_over else xosc.Priority.parallel
     event = xosc.Event(name, xosc.Priority.overwrite if sheet.old else priority)
     event.add_action(f"{name}_action", action)
@@ -254,6 +259,7 @@ def _event(name: str, action: Any, t: float, sheet: Sheet, *, takes_over: bool =
 
 
 def _position(v: Vertex) -> Any:
+    """Returns the world position of a vertex, with pitch and roll 0."""
     return xosc.WorldPosition(v.x, v.y, v.z, v.h, 0, 0)
 
 

@@ -106,6 +106,7 @@ class Line:
         return self._nearest[x, y]
 
     def _find_nearest(self, x: float, y: float) -> float:
+        """Returns the arc length in m of the line's point nearest to (x, y); of equals the first."""
         best, found = float("inf"), 0.0
         for k in range(len(self.x) - 1):
             ex, ey = self.x[k + 1] - self.x[k], self.y[k + 1] - self.y[k]
@@ -135,6 +136,7 @@ class Line:
         return k, (value - values[k]) / (values[k + 1] - values[k])
 
     def _between(self, k: int, u: float) -> Pose:
+        """Returns the pose at the share u (0..1) of the segment that begins at point k."""
         j = min(k + 1, len(self.x) - 1)
         return Pose(
             self.x[k] + u * (self.x[j] - self.x[k]),
@@ -144,6 +146,7 @@ class Line:
         )
 
     def _heading(self, k: int, j: int, u: float) -> float:
+        """Returns the yaw in rad at share u from point k to j: as named, else tangential, corners rounded."""
         a, b = self.named[k], self.named[j]
         if a is not None and b is not None:
             return wrap_angle(a + u * ((b - a + pi) % (2.0 * pi) - pi))
@@ -161,6 +164,7 @@ class Line:
 
     @staticmethod
     def _mix_headings(a: float, b: float, u: float) -> float:
+        """Returns the yaw in rad at the share u of the shorter turn from a to b."""
         return wrap_angle(a + u * wrap_angle(b - a))
 
     def _course(self, k: int) -> float:

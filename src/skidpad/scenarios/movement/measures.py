@@ -77,6 +77,7 @@ def clearance(a: Sequence[Point], b: Sequence[Point]) -> float:
 
 
 def _to_edges(p: Point, shape: Sequence[Point]) -> float:
+    """Returns the least distance in m from a point to the edges of a closed polygon."""
     best = inf
     for k, (x0, y0) in enumerate(shape):
         x1, y1 = shape[(k + 1) % len(shape)]

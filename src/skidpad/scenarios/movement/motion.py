@@ -170,6 +170,7 @@ class Guide:
         return self._current_pose()
 
     def _move(self, distance: float) -> None:
+        """Moves the base point by a distance in m along the roads; at the end of the road it stops."""
         assert self.base is not None
         if self.at_end and distance == 0.0:
             return
@@ -200,6 +201,7 @@ class Guide:
         return found
 
     def _current_pose(self) -> Pose:
+        """Returns the pose in the world at the lateral offset, with the yaw turned for a change of offset."""
         assert self.base is not None
         pose = self.base.pose.moved(left=self.offset)
         turn = self.turn

@@ -92,6 +92,7 @@ class Network:
         return min(nearest, key=lambda at: abs(at - s), default=s)
 
     def _ends(self, lane: int) -> tuple[float, float]:
+        """Returns the least and the greatest road coordinate s in m of a lane's samples."""
         first = int(self.map.lanes.first[lane])
         last = first + int(self.map.lanes.size[lane]) - 1
         a, b = float(self.map.samples.s_road[first]), float(self.map.samples.s_road[last])

@@ -88,6 +88,7 @@ class PacedTrack:
         self.moved, self.sense = False, self._sense_at(s, v)
 
     def _sense_at(self, s: float, v: float) -> float:
+        """Returns -1 for motion against the line (by named headings, else by the sign of v), else 1."""
         if self.line.names_heading(s):
             against = cos(self.line.at_length(s).yaw - self.line.tangent(s)) <= -SQUARE
             return -1.0 if against else 1.0

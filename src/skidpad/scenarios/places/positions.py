@@ -72,6 +72,7 @@ class Fixed:
 
 
 def _world(node: Node, ctx: Context) -> Position:
+    """Compiles a position in world coordinates in m, with its heading in rad."""
     pose = Pose(
         node.number("x"), node.number("y"), node.number("z", 0.0),
         yaw=wrap_angle(node.number("h", 0.0)),
@@ -80,6 +81,7 @@ def _world(node: Node, ctx: Context) -> Position:
 
 
 def _lane(node: Node, ctx: Context) -> Position:
+    """Compiles a position in lane coordinates (s, offset in m); an s beyond the lane is cut, with a note."""
     road, lane = ctx.road(node), node.whole("laneId")
     s, offset = node.number("s"), node.number("offset", 0.0)
     try:
@@ -96,6 +98,7 @@ def _lane(node: Node, ctx: Context) -> Position:
 
 
 def _road(node: Node, ctx: Context) -> Position:
+    """Compiles a position in road coordinates (s and t in m)."""
     try:
         place = ctx.network.on_road(ctx.road(node), node.number("s"), node.number("t"))
     except ConfigError as error:
@@ -116,6 +119,7 @@ def _geo(node: Node, ctx: Context) -> Position:
 
 
 def _facing(place: Place, facing: Orientation) -> Place:
+    """Returns the place with its yaw turned to the given orientation."""
     return replace(place, pose=replace(place.pose, yaw=facing.turned(place.pose.yaw)))
 
 
@@ -195,6 +199,7 @@ class RelativeObject:
 
 
 def _relative_lane(node: Node, ctx: Context) -> Position:
+    """Compiles a position some lanes beside and some m along from an entity (`ds` or `dsLane`)."""
     along_lane = node.has("dsLane")
     return RelativeLane(
         ctx.entity(node),
@@ -207,10 +212,12 @@ def _relative_lane(node: Node, ctx: Context) -> Position:
 
 
 def _relative_road(node: Node, ctx: Context) -> Position:
+    """Compiles a position at (ds, dt) in m in road coordinates from an entity."""
     return RelativeRoad(ctx.entity(node), node.number("ds"), node.number("dt"), orientation(node))
 
 
 def _relative_object(node: Node, ctx: Context) -> Position:
+    """Compiles a position at (dx, dy) in m from an entity, in its axes or in those of the world."""
     own = node.tag == "RelativeObjectPosition"
     dx, dy = node.number("dx"), node.number("dy")
     return RelativeObject(ctx.entity(node), dx, dy, own, orientation(node))

@@ -77,6 +77,7 @@ def _check_times(shape: Node, times: Sequence[float | None]) -> None:
 
 
 def _polyline(shape: Node) -> tuple[list[Node], Shape]:
+    """Returns the position nodes of a polyline and the function that makes its vertices from their poses."""
     nodes = list(shape.children("Vertex"))
     if not nodes:
         raise shape.error("needs at least one <Vertex>")
@@ -118,6 +119,7 @@ def _plain_vertex(element: etree._Element) -> Vertex | None:
 
 
 def _clothoid(shape: Node) -> tuple[list[Node], Shape]:
+    """Returns the position node of a clothoid and the function that makes its vertices from that pose."""
     rate = shape.number("curvatureDot", 0.0)  # the name before 1.1
     times = None
     if shape.has("startTime") and shape.has("stopTime"):
@@ -139,6 +141,7 @@ class Segment:
 
 
 def _spline(shape: Node) -> tuple[list[Node], Shape]:
+    """Returns a clothoid spline's position nodes and the function that makes vertices of their poses."""
     nodes = list(shape.children("ClothoidSplineSegment", "Segment"))
     if not nodes:
         raise shape.error("needs a <ClothoidSplineSegment>")
@@ -161,6 +164,7 @@ def _begins(segment: Node) -> bool:
 
 
 def _join_segments(segments: Sequence[Segment], poses: Sequence[Pose]) -> Iterator[Vertex]:
+    """Yields the vertices of all segments; one without a position of its own begins at the last one's end."""
     own = iter(poses)
     pose = poses[0]
     for segment in segments:
@@ -176,6 +180,7 @@ def _join_segments(segments: Sequence[Segment], poses: Sequence[Pose]) -> Iterat
 
 
 def _nurbs(shape: Node) -> tuple[list[Node], Shape]:
+    """Returns a NURBS curve's position nodes and the function that makes vertices of their poses."""
     order = shape.whole("order")
     nodes = list(shape.children("ControlPoint"))
     times = [n.number("time") if n.has("time") else None for n in nodes]

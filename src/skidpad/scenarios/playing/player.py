@@ -157,6 +157,7 @@ class Player:
         return actor.command(t, self.scene.dt)
 
     def _cast(self, truth: WorldTruth) -> None:
+        """Makes the scenario actor of every entity, at its first place and speed."""
         names, network = truth.table.names, self.scenario.network
         for entity in self.scenario.entities.values():
             begin = self.scenario.start.entities[entity.name]
@@ -178,6 +179,7 @@ class Player:
         self.actors[self.scenario.ego].handed = not self.scenario.ego_is_handed_later
 
     def _begin(self) -> None:
+        """Begins the actions of the Init phase: time of day, global actions, then those of each entity."""
         if self.scenario.start.environment is not None:
             self.scene.tell_time(self.scenario.start.environment)
         for worldwide in self.scenario.start.actions:
@@ -188,4 +190,5 @@ class Player:
 
 
 def _motion(pose: Pose, v: float) -> Motion:
+    """Returns the planar motion of a body at a pose that moves along its yaw at v in m/s."""
     return Motion(pose.x, pose.y, pose.yaw, v * cos(pose.yaw), v * sin(pose.yaw))

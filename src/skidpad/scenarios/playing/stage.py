@@ -100,6 +100,7 @@ class IdealWorld:
             self.states.present[self.index[actor.name]] = actor.present
 
     def _apply_command(self, word: ActorCommand) -> None:
+        """Sets presence, pose and velocity of the commanded actor, exactly as commanded."""
         i, s = self.index[word.actor], self.states
         if word.present is not None:
             s.present[i] = word.present
@@ -139,6 +140,7 @@ def play_ideal(
 
 
 def _rows(player: Player, stage: IdealWorld) -> list[Row]:
+    """Returns one row (position of the reference point, yaw, signed speed) for each actor that is present."""
     found = []
     s, t = stage.states, player.scene.t
     for i, (name, actor) in enumerate(player.actors.items()):

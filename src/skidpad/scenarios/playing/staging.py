@@ -109,5 +109,6 @@ def _others(event: Event, group: Group, ego: str) -> tuple[str, ...]:
 
 
 def _waits_for_contact(event: Event) -> bool:
+    """Returns whether a start condition of the event is a collision of an entity."""
     conditions = (timed.condition for group in event.start.groups for timed in group)
     return any(isinstance(c, AnyEntity) and isinstance(c.condition, Collision) for c in conditions)

@@ -113,11 +113,13 @@ class ToldEvent(StatefulElement):
 
 
 def _let_go(action: Running, scene: Scene) -> None:
+    """Makes every actor of the scene let go of the action."""
     for actor in scene.actors.values():
         actor.let_go(action, scene.network)
 
 
 def _begin_action(action: NamedAction, actors: Iterable[str], scene: Scene) -> Iterable[Running]:
+    """Begins a global action once or a private action for each actor, and yields what is then running."""
     if action.worldwide is not None:
         yield action.worldwide.happen(scene)
     if action.private is not None:

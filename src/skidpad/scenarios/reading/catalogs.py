@@ -110,4 +110,5 @@ def _catalog(folder: Path, name: str) -> Node | None:
 
 @lru_cache(maxsize=256)
 def _parse_catalog(file: Path, changed: int) -> Node:  # noqa: ARG001  part of the key
+    """Parses a catalogue file; the cache distinguishes its versions by the time of change."""
     return parse(file)

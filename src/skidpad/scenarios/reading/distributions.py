@@ -52,6 +52,7 @@ def scenario_of_choices(file: Path, node: Node) -> Path:
 
 
 def _combine_parameters(node: Node) -> list[dict[str, str]]:
+    """Returns every combination of the deterministic distributions, each as {parameter: value text}."""
     factors: list[list[dict[str, str]]] = []
     for one in node.children("DeterministicSingleParameterDistribution"):
         name = one.plain("parameterName")
@@ -65,6 +66,7 @@ def _combine_parameters(node: Node) -> list[dict[str, str]]:
 
 
 def _read_parameter_set(node: Node) -> dict[str, str]:
+    """Returns the assignments of one value set as {parameter: value text}."""
     direct = {
         one.plain("parameterRef"): one.text("value") for one in node.children("ParameterAssignment")
     }
@@ -72,6 +74,7 @@ def _read_parameter_set(node: Node) -> dict[str, str]:
 
 
 def _values(node: Node) -> list[str]:
+    """Returns the value texts of a distribution set, or of a range with its step width."""
     if node.tag == "DistributionSet":
         return [e.text("value") for e in node.children("Element")]
     if node.tag != "DistributionRange":
@@ -84,6 +87,7 @@ def _values(node: Node) -> list[str]:
 
 
 def _range(node: Node) -> tuple[float, float]:
+    """Returns the lower and upper limit; -inf and inf where the node has no range."""
     found = node.find("Range")
     if found is None:
         return -inf, inf
@@ -94,6 +98,7 @@ Draw = Callable[[np.random.Generator], float | str]
 
 
 def _draws(node: Node) -> Iterator[dict[str, str]]:
+    """Yields `numberOfTestRuns` random parameter sets as {parameter: value text}, from the file's seed."""
     count = node.whole("numberOfTestRuns")
     if not 0 < count <= CHOICES_MAX:
         raise node.error(f"numberOfTestRuns must be 1 to {CHOICES_MAX}, got {count}")
@@ -108,6 +113,7 @@ def _draws(node: Node) -> Iterator[dict[str, str]]:
 
 
 def _draw(node: Node) -> Draw:
+    """Returns the function of a random generator that draws one value of the distribution."""
     if node.tag == "ProbabilityDistributionSet":
         elements = list(node.children("Element"))
         return _draw_weighted(
@@ -137,6 +143,7 @@ def _draw(node: Node) -> Draw:
 
 
 def _draw_weighted(values: Sequence[str] | Sequence[int], weights: Sequence[float]) -> Draw:
+    """Returns the function of a random generator that draws one of the values by weight."""
     shares = np.array(weights) / sum(weights)
     return lambda rng: values[int(rng.choice(len(values), p=shares))]
 
@@ -144,6 +151,8 @@ def _draw_weighted(values: Sequence[str] | Sequence[int], weights: Sequence[floa
 def _within(
     node: Node, low: float, high: float, draw: Callable[[np.random.Generator], float]
 ) -> Draw:
+    """Returns a draw repeated until it lies in low..high; it raises an error after `TRIES_MAX` attempts."""
+
     def drawn(rng: np.random.Generator) -> float:
         for _ in range(TRIES_MAX):
             value = float(draw(rng))

@@ -184,6 +184,7 @@ UNKNOWN = Entity("", Body.PROP, "box", False, Box())
 
 
 def _members(node: Node, known: Mapping[str, Entity]) -> Iterator[str]:
+    """Yields the names of a selection's entities: those referenced, then those of the listed kinds."""
     members = node.child("Members")
     for one in members.children("EntityRef"):
         if one.text("entityRef") not in known:
@@ -234,6 +235,7 @@ def _sizes(node: Node, catalogs: Catalogs) -> Iterator[Finding]:
 
 
 def _vehicle(name: str, node: Node, properties: Mapping[str, str]) -> Entity:
+    """Compiles a vehicle: its type is the nearest known one by category and size in m."""
     category = node.text("vehicleCategory")
     box, limits = _box(node, Box()), _performance(node)
     if category in TWO_WHEELED:
@@ -278,6 +280,7 @@ def of_category(node: Node, name: str, category: str) -> Entity:
 
 
 def _box(node: Node, default: Box) -> Box:
+    """Returns the bounding box in m; a size that is missing or not positive is the default's."""
     box = node.find("BoundingBox")
     if box is None:
         return default
@@ -295,6 +298,7 @@ def _box(node: Node, default: Box) -> Box:
 
 
 def _performance(node: Node) -> Performance:
+    """Returns the limits of speed and acceleration; inf where one is missing or not positive."""
     found = node.find("Performance")
     if found is None:
         return Performance()
@@ -308,6 +312,7 @@ LIMITS = (
 
 
 def _properties(node: Node) -> dict[str, str]:
+    """Returns the properties as {name: value}; empty where the node has none."""
     found = node.find("Properties")
     if found is None:
         return {}

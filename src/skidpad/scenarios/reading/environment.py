@@ -109,6 +109,7 @@ def moment_of(node: Node) -> float | None:
 
 
 def _weather(node: Node) -> dict[str, Any]:
+    """Returns the fields of the environment that the weather gives; None for what the file omits."""
     clouds = node.text("fractionalCloudCover", node.text("cloudState", ""))
     if clouds and clouds not in CLOUDS:
         raise node.unsupported(f"clouds {clouds!r} are not known")

@@ -27,6 +27,7 @@ class ExpressionError(ValueError):
 
 
 def _sign(x: float) -> float:
+    """Returns the sign of x: -1, 0 or 1 as float."""
     return float((x > 0.0) - (x < 0.0))
 
 
@@ -71,6 +72,7 @@ PIECE = re.compile(rf"\$[A-Za-z_]\w*|[\d.]+|{BARE.pattern}")
 
 @lru_cache(maxsize=4096)
 def _tokens(text: str) -> tuple[tuple[str, str], ...]:
+    """Splits an expression into (kind, text) tokens; raises an error at the first unknown character."""
     found, at = [], 0
     while text[at:].strip():
         match = TOKENS.match(text, at)
@@ -214,6 +216,7 @@ class _Reader:
 
 
 def _number(value: Value) -> float:
+    """Returns the value as a float; raises an error where it is text."""
     if isinstance(value, str):
         raise ExpressionError(f"{value!r} is not a number")
     return float(value)

@@ -138,6 +138,7 @@ def renew(root: Element) -> None:
 
 
 def _rename(element: Element, old: str) -> None:
+    """Renames an element's attributes and values of old versions in place to those of the newest one."""
     names = ATTRIBUTES.get(str(element.tag), {})
     for name, value in list(element.attrib.items()):
         key = str(name)
@@ -164,6 +165,7 @@ def _lift(element: Element) -> None:
 
 
 def _dynamics(element: Element) -> None:
+    """Replaces the attribute rate, time or distance in place by dynamicsDimension and value."""
     found = [d for d in DIMENSIONS if element.get(d) is not None]
     if not found or element.get("value") is not None:
         return
@@ -175,6 +177,7 @@ def _dynamics(element: Element) -> None:
 
 
 def _performance(element: Element) -> None:
+    """Adds the missing maxAcceleration of version 0.9.1 in place, as ASAM's migration does."""
     if element.get("maxAcceleration") is None:
         element.set("maxAcceleration", A_MAX)
 
@@ -189,6 +192,7 @@ def _private(element: Element) -> None:
 
 
 def _actors(element: Element) -> None:
+    """Replaces the element ByCondition in place by the attribute selectTriggeringEntities."""
     chosen = element.find("ByCondition")
     if chosen is not None:
         element.set("selectTriggeringEntities", "true")
@@ -196,6 +200,7 @@ def _actors(element: Element) -> None:
 
 
 def _time(element: Element) -> None:
+    """Joins the elements Date and Time in place into the attribute dateTime, where both are there."""
     clock, date = element.find("Time"), element.find("Date")
     if clock is not None and date is not None:
         day = "-".join(str(date.get(k, "1")).zfill(2) for k in ("year", "month", "day"))

@@ -92,10 +92,12 @@ def variables(root: Node) -> dict[str, str]:
 
 
 def _text(value: float | str) -> str:
+    """Returns the value as the text that a file would hold."""
     return value if isinstance(value, str) else as_text(float(value))
 
 
 def _require_type(node: Node, text: str) -> None:
+    """Raises an error where the text is no value of the declared number or boolean type."""
     kind = node.text("parameterType" if node.has("parameterType") else "variableType", "string")
     if kind in NUMBERS:
         try:
@@ -107,6 +109,7 @@ def _require_type(node: Node, text: str) -> None:
 
 
 def _require_constraints(node: Node, name: str, text: str) -> None:
+    """Raises an error where the value meets none of the parameter's constraint groups."""
     groups = [list(g.children("ValueConstraint")) for g in node.children("ConstraintGroup")]
     if not groups:
         return

@@ -94,6 +94,7 @@ class Crowd:
         return words + [self._ride(r, truth) for r in self.riders]
 
     def _walk(self, w: _Walker, t: float, truth: WorldTruth) -> ActorCommand:
+        """Moves a walker for one period along its way, or lets it wait, and returns its command."""
         target = w.way[w.next]
         dx, dy = float(target[0]) - w.x, float(target[1]) - w.y
         left = hypot(dx, dy)
@@ -115,6 +116,7 @@ class Crowd:
         return ActorCommand(w.name, place=Pose(w.x, w.y, yaw=atan2(dy, dx)), speed=w.speed)
 
     def _may_cross(self, w: _Walker, here: int, ahead: int, t: float, truth: WorldTruth) -> bool:
+        """Returns whether the cars' light is freshly red, where there is one, and no vehicle comes near."""
         if w.signal is not None:
             since = self._red_since.get(w.signal)
             if since is None or t - since > CROSS_WITHIN:
@@ -129,6 +131,7 @@ class Crowd:
         return not bool(danger.any())
 
     def _ride(self, r: _Rider, truth: WorldTruth) -> ActorCommand:
+        """Moves a cyclist for one period, braking for obstacles and stop lines, and returns its command."""
         gap = min(self._gap_ahead(r, truth), self._line_ahead(r, truth))
         allowed = np.sqrt(max(2.0 * RIDE_BRAKE * (gap - RIDE_STOP), 0.0)) if gap < 60.0 else r.speed
         target = min(r.speed, float(allowed))
@@ -144,6 +147,7 @@ class Crowd:
         return ActorCommand(r.name, place=self._pose(r), speed=r.v)
 
     def _pose(self, r: _Rider) -> Pose:
+        """Returns the pose of a cyclist, RIDE_RIGHT in m to the right of its lane's centre."""
         pose = self.map.at(r.lanes[0], r.s).pose
         return pose.moved(left=-RIDE_RIGHT)
 

@@ -168,10 +168,12 @@ class Supervisor:
         return Action(command)
 
     def _begin(self, phase: Supervision, duration: float, reason: RelocationReason) -> None:
+        """Begins a phase that lasts `duration` in s and clears the counters."""
         self.phase, self.left = phase, round(duration / self.dt)
         self.reason, self.standing, self.off = reason, 0, 0
 
     def _next_phase(self) -> None:
+        """Begins the phase that follows the current one when its time is over."""
         if self.phase is Supervision.BRAKE:
             self._begin(Supervision.REVERSE, REVERSE_TIME, self.reason)
         elif self.phase is Supervision.REVERSE:
@@ -220,6 +222,7 @@ class Supervisor:
         return Action(HELD, Relocate(new, 0.0, moved), notice)
 
     def _warm_up(self, states: ActorStates) -> Action:
+        """Returns the action while the ego is held, and then its release along its lane."""
         if self.left > 0:
             return Action(HELD)
         place = self._find_lane(states)
@@ -239,6 +242,7 @@ class Supervisor:
         return place, shift, False
 
     def _candidates(self, nearest: LanePoint) -> Iterator[tuple[LanePoint, float]]:
+        """Yields (lane point, shift back in m) from the nearest point on, while the lane goes back."""
         yield nearest, 0.0
         place = nearest
         for k in range(1, SHIFTS + 1):
@@ -325,6 +329,7 @@ class Supervisor:
         return not self._is_clear_of_others(here) or self._light_ahead(ego, truth)
 
     def _is_clear_of_others(self, here: LanePoint) -> bool:
+        """Returns whether no actor stands at or ahead of the lane point."""
         assert self.truth is not None
         states = self.truth.states
         if states is not self._states:
@@ -332,6 +337,7 @@ class Supervisor:
         return not has_actor_ahead(self._held, here.x, here.y, here.z, here.heading)
 
     def _light_ahead(self, ego: LanePoint, truth: WorldTruth) -> bool:
+        """Returns whether a red or yellow light is within LIGHT_REACH ahead on the ego's lane."""
         signals = self.map.signals
         distance = signals.s - ego.s
         near = (signals.kind == SignalKind.LIGHT) & (signals.lane == ego.lane)

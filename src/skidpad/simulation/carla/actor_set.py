@@ -93,6 +93,7 @@ class ActorSet:
         return replace(place, z=place.z - GROUND_GAP)
 
     def _release(self, player: ActorRow) -> None:
+        """Takes an actor out of the Traffic Manager's hands, where there is traffic."""
         if self.traffic is not None:
             self.traffic.release(player)
 

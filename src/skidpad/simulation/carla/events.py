@@ -75,6 +75,7 @@ class EgoEvents:
         return tuple(found.values())
 
     def _closing(self, frame: int, row: int, push: tuple[float, float, float]) -> float:
+        """Returns the closing speed in m/s with actor `row` before a frame; 0.0 without earlier states."""
         before = [f for f in self._past if f < frame] or list(self._past)
         if not before:
             return 0.0
@@ -115,6 +116,7 @@ def thing(other: Any) -> str:
 
 
 def _components(v: Any) -> tuple[float, float, float]:
+    """Returns the x, y and z of a CARLA vector."""
     return (v.x, v.y, v.z)
 
 

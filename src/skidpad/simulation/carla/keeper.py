@@ -41,6 +41,7 @@ class ServerKeeper:
         self._runs = 1
 
     def _start(self) -> None:
+        """Starts the server process and waits until it answers; raises BackendError where it does not."""
         try:
             self._process = subprocess.Popen(
                 self.command,

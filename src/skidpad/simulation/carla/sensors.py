@@ -88,14 +88,17 @@ class Sensors:
         self._read(self._attach("sensor.other.imu", LAST, {}), LAST)
 
     def _read(self, actor: Any, spec: SensorSpec) -> None:
+        """Starts to collect what the actor sends in a mailbox of its sensor id."""
         box = self.boxes[spec.id] = Mailbox(spec)
         self._listen(actor, box.hear)
 
     def _listen(self, actor: Any, hear: Callable[[Any], None]) -> None:
+        """Calls `hear` with each message of the actor from now on."""
         actor.listen(hear)
         self.listening.append(actor)
 
     def _attach(self, id: str, spec: SensorSpec, attributes: dict[str, str]) -> Any:
+        """Spawns a CARLA sensor with the attributes it has, at its mount on the ego, and returns it."""
         carla = self._connection.carla
         blueprint = self._world.get_blueprint_library().find(id)
         for name, value in attributes.items():

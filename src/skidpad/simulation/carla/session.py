@@ -89,6 +89,7 @@ class Session:
         self._read()
 
     def _spawn(self) -> None:
+        """Spawns the ego, the scenario's actors and the traffic, and notes the lane of the ego."""
         setup, world = self.setup, self.world
         for actor in (setup.ego, *setup.actors):
             self.players.append(spawn_setup(self.carla, world, self.map, actor))
@@ -109,6 +110,7 @@ class Session:
         self.players += players
 
     def _lane_under(self, pose: Pose) -> LanePoint | None:
+        """Returns the centreline point of the lane under a pose; None off the road."""
         point = self.map.project(pose.x, pose.y, pose.z)
         return None if point is None else replace(point, offset=0.0)
 
@@ -182,6 +184,7 @@ class Session:
         return self.server_frame
 
     def _top_up(self, traffic: Traffic) -> None:
+        """Spawns waiting vehicles and gives each that enters its grip and its size in the actor table."""
         for player in traffic.top_up(self.world, self.tick, self.states.pose(EGO)):
             self.actor_set.grip_on(player)
             i = self.actor_set.index[player.name]

@@ -36,6 +36,7 @@ class Watchdog:
             self._timer = None
 
     def _bite(self) -> None:
+        """Ends the whole process with the exit code HANGS after a message on standard error."""
         print(f"CARLA's client did not return within {self.patience:g} s", file=sys.stderr)
         sys.stderr.flush()
         os._exit(HANGS)

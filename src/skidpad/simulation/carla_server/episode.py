@@ -190,11 +190,13 @@ class Episode:
             self._hush(actor)
 
     def _hush(self, actor: Actor) -> None:
+        """Closes the streams of an actor and of its sensor textures."""
         for stream in (actor.stream, *self.sensors.forget(actor.id)):
             if stream is not None:
                 self.stock.hub.close(stream)
 
     def _make_actor(self, wanted: Wanted, pose: Pose) -> Actor:
+        """Returns a new actor of the wanted blueprint and attributes at the pose, with its box."""
         blueprint = self.stock.blueprint(wanted.blueprint)
         attributes = choose_attributes(blueprint, wanted.attributes)
         self.stock.remarks.remark(blueprint, wanted.attributes)
@@ -245,6 +247,7 @@ class Episode:
             self._mark_zones()
 
     def _enter(self, actor: Actor) -> None:
+        """Adds an actor to the registry and gives it a row of the snapshot."""
         self.actors.add(actor)
         actor.row = self.rows.add(actor.id)
 

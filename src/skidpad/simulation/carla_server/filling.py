@@ -83,6 +83,7 @@ def fill_vehicles(
 
 
 def _fill_controls(rows: Rows, at: NDArray[np.int64], vehicles: Vehicles) -> None:
+    """Writes controls, gears and speed limits in km/h of the vehicles into the snapshot rows `at`."""
     told = [vehicle.control for vehicle in vehicles]
     switches = np.array([(c.hand_brake, c.reverse, c.manual) for c in told])
     s = vehicles.moving.fleet.states

@@ -33,6 +33,7 @@ class ServerProcess:
         threading.Thread(target=self._drain, daemon=True).start()
 
     def _wait_for_port(self) -> int:
+        """Returns the port from the server's ready line; raises BackendError where it ends before."""
         said = []
         assert self._process.stdout is not None
         for line in self._process.stdout:

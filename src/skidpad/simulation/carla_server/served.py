@@ -88,6 +88,7 @@ class Served:
         return clock.frame
 
     def _publish_snapshot(self) -> None:
+        """Makes the snapshot of the tick and publishes it where the episode stream has listeners."""
         lights = self.episode.moving.lights.by_id
         bits = snapshot.MAP_CHANGED if self._map_changed else 0
         if lights != self._lights_told:

@@ -74,11 +74,13 @@ class RpcConnection(asyncio.Protocol):
             self._answer(transport, self._queue.popleft())
 
     def _go_on(self) -> None:
+        """Answers the queued requests and resumes writing when none is left."""
         self._work()
         if not self._queue:
             self.resume_writing()
 
     def _answer(self, transport: asyncio.Transport, request: Request) -> None:
+        """Answers a request, delayed where a rest is due; closes a client that leaves too much unread."""
         known = len(self._server.served.managers.by_port)
         self._server.served.follows_batch = self._last == "apply_batch"
         self._last = request.method
@@ -150,6 +152,7 @@ class CarlaServer:
         self._servers: list[asyncio.Server] = []
 
     def _own_step(self) -> float | None:
+        """Returns the server's own time step in s; None in synchronous mode."""
         settings = self.served.clock.settings
         return None if settings.synchronous else settings.step
 
@@ -218,6 +221,7 @@ class CarlaServer:
 
 
 def _bind_socket(host: str, port: int) -> socket.socket:
+    """Returns a TCP socket bound to host and port; raises OSError where that fails."""
     # Named as TCP: only then does asyncio switch Nagle's algorithm off, which would cost 40 ms a tick.
     made = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -79,6 +79,7 @@ ROW_BYTES = 119
 
 
 def _layout(fields: list[Any]) -> np.dtype[Any]:
+    """Returns the structured dtype of a row from (name, format, byte offset[, shape])."""
     layout: np.dtype[Any] = np.dtype(
         {
             "names": [f[0] for f in fields],
@@ -108,6 +109,7 @@ class Rows:
         self._views()
 
     def _views(self) -> None:
+        """Makes the views of the buffer as rows of vehicles, lights and walkers."""
         self.vehicles: NDArray[Any] = self._buffer.view(VEHICLE_ROW)
         self.lights: NDArray[Any] = self._buffer.view(LIGHT_ROW)
         self.walkers: NDArray[Any] = self._buffer.view(WALKER_ROW)

@@ -74,6 +74,7 @@ class Waker:
             self._timer = None
 
     def _silent(self) -> None:
+        """Wakes every Traffic Manager after a missed wake-up, and waits again while tries are left."""
         log.warning("a Traffic Manager has missed its wake-up; it is woken")
         for port in sorted(self.ports):
             self.wake(port)
@@ -82,6 +83,7 @@ class Waker:
 
 
 def _port(method: str, arguments: list[Any]) -> int | None:
+    """Returns the port that a Traffic Manager's call names; None where it names none."""
     if not arguments:
         return None
     port = arguments[0]

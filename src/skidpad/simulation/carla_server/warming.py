@@ -115,6 +115,7 @@ class Helper:
 
 
 def _help(pipe: Connection, options: ServerOptions) -> None:
+    """Compiles the parts of a tick in a helper process, reports that, and then runs one tick on demand."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the server's
     compile_parts()
     pipe.send(None)

@@ -58,6 +58,7 @@ class Sky:
         self._derive()
 
     def _derive(self) -> None:
+        """Derives the weather, clamped to its ranges, and its grip from the values and the ice in force."""
         clamped = {
             name: min(max(value, RANGES[name][0]), RANGES[name][1])
             for name, value in self.values.items()

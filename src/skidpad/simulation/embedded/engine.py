@@ -120,6 +120,7 @@ class EmbeddedBackend:
             self._asked = self._make_asked()
 
     def _make_asked(self) -> AskedSensors:
+        """Returns the additional sensors that the set-up asks for."""
         return AskedSensors(self.map, self.world.table, self._setup, seed=self._seed)
 
     def close(self) -> None:
@@ -127,6 +128,7 @@ class EmbeddedBackend:
         self._world = None
 
     def _frame(self) -> SensorFrame:
+        """Reads all sensors at the current tick and returns their frame."""
         w, asked = self.world, self._asked
         states = w.states
         if self._unseen is not None:
@@ -149,6 +151,7 @@ class EmbeddedBackend:
         )
 
     def _estimate(self) -> EgoEstimate:
+        """Returns the ego's estimated state: true but for Gaussian noise on x and y."""
         w, sigma = self.world, self._noise
         x, y, z, roll, pitch, yaw, speed, yaw_rate, ax, ay, *wheels = feel_motion(w.arena, EGO)
         pose = Pose(x, y, z, roll, pitch, yaw)

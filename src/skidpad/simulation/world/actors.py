@@ -114,6 +114,7 @@ def cast_of(map: RoadMap, setup: Setup, seed: int) -> list[Role]:
 
 
 def _traffic(map: RoadMap, setup: Setup, seed: int) -> list[Role]:
+    """Returns the roles of the traffic's vehicles and of its reserve; empty where there is none."""
     traffic = setup.traffic
     if traffic is None or traffic.vehicles + traffic.reserve == 0:
         return []
@@ -155,6 +156,7 @@ def _reserve(traffic: TrafficSetup, types: Sequence[str], first: int, seed: int)
 
 
 def _ego_point(map: RoadMap, setup: Setup) -> LanePoint:
+    """Returns the centreline point of the ego's lane; raises ConfigError off the driving lanes."""
     pose = place_of(map, setup.ego.place)
     point = map.project(pose.x, pose.y, pose.z)
     if point is None:

@@ -117,6 +117,7 @@ class RoadSigns(NamedTuple):
 
 @kernel
 def _read_signs(map: Held[LaneArrays], placed: Places, limit: Floats, signal: Ints) -> None:
+    """Writes each actor's speed limit in m/s (or NaN) and the row of the light ahead (or -1)."""
     lanes = map.value
     for i in range(len(placed)):
         place = placed[i]

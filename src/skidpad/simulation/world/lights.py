@@ -87,6 +87,7 @@ class Group:
 
 
 def _show_all(phase: list[Light], state: LightState) -> bool:
+    """Shows the state on all lights of a phase and returns True."""
     for light in phase:
         light.show(state)
     return True
@@ -180,6 +181,7 @@ class Lights:
         self._show()
 
     def _show(self) -> None:
+        """Copies the states of all lights into the tables by row and by id."""
         for light in self.lights:
             self.by_row[list(light.rows)] = light.state
         self.by_id = {light.signal: light.state for light in self.lights}

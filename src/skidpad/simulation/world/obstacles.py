@@ -56,6 +56,7 @@ def obstacles(map: RoadMap) -> Obstacles:
 
 
 def _of_barrier(barrier: Barrier) -> Iterator[_Segment]:
+    """Yields a wall segment for each piece of a barrier, with its heights in m."""
     for a, b in pairwise(barrier.points):
         yield _Segment(
             (float(a[0]), float(a[1]), float(b[0]), float(b[1])),
@@ -67,6 +68,7 @@ def _of_barrier(barrier: Barrier) -> Iterator[_Segment]:
 
 
 def _of_box(box: Box) -> Iterator[_Segment]:
+    """Yields the four wall segments around the footprint of a box."""
     label = SemanticClass(box.label)
     corners = footprint(box.x, box.y, box.yaw, box.length, box.width).tolist()
     for (x0, y0), (x1, y1) in zip(corners, [*corners[1:], corners[0]], strict=True):

@@ -109,6 +109,7 @@ def fill_patches(
 
 @inner_kernel
 def _is_in(bounds: Floats, x: float, y: float) -> bool:
+    """Returns whether (x, y) lies within (x_min, y_min, x_max, y_max)."""
     return bool(bounds[0] <= x <= bounds[2] and bounds[1] <= y <= bounds[3])
 
 
@@ -117,6 +118,7 @@ def _is_on_stretch(
     road: int, lane: int, side: int, low: float, high: float, on_road: int, on_lane: int,
     offset: float, s_road: float,
 ) -> bool:  # fmt: skip
+    """Returns whether a place on the road lies on the stretch: its road, lane, side and low..high in m."""
     if on_road != road or (lane != ANY and lane != on_lane):
         return False
     if side != BOTH and (offset > 0.0) != (side == LEFT):

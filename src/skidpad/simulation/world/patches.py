@@ -118,6 +118,7 @@ def _arrays(
     road: Road,
     kinds: Sequence[str],
 ) -> PatchArrays:
+    """Returns the patches as arrays for the kernels, with the grip of each kind of tyre on them."""
     corners = [np.array(p.polygon, dtype=np.float64).reshape(-1, 2) for p in patches]
     materials = [lanes.get(key, []) for key in _lane_names(map)]
     return PatchArrays(
@@ -138,6 +139,7 @@ def _arrays(
 
 
 def _lane_names(map: RoadMap) -> list[tuple[int, int]]:
+    """Returns (road id, lane id) of every lane of the map."""
     return list(zip(map.lanes.road.tolist(), map.lanes.lane_id.tolist(), strict=True))
 
 
@@ -147,6 +149,7 @@ def _starts(parts: Sequence[Sized]) -> NDArray[np.int64]:
 
 
 def _stretch_key(patch: SurfacePatch) -> tuple[int, int, int]:
+    """Returns (road, lane, side) as codes; ANY and BOTH where the patch does not restrict them."""
     if patch.road is None:
         return ANY, ANY, BOTH
     side = {"both": BOTH, "left": LEFT, "right": RIGHT}[patch.side]
@@ -219,6 +222,7 @@ def in_zone(zone: FrictionZone, s: ActorStates) -> NDArray[np.bool_]:
 
 
 def _check(k: int, patch: SurfacePatch, map: RoadMap) -> None:
+    """Raises ConfigError where the patch's road is unknown or its stretch covers nothing of the lane."""
     where = f"patches[{k}]{f' ({patch.name})' if patch.name else ''}"
     if patch.road is None:
         return

@@ -130,6 +130,7 @@ def bodies_of(members: Sequence[Member]) -> Bodies:
 
 
 def _yaw_inertia(body: VehicleType | Shape) -> float:
+    """Returns the yaw inertia in kg m^2; that of a uniform cuboid where the body has no vehicle type."""
     if isinstance(body, VehicleType):
         return body.yaw_inertia
     return body.mass * (body.length**2 + body.width**2) / 12.0

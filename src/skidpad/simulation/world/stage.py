@@ -78,6 +78,7 @@ def lane_frictions(setup: Setup) -> LaneFrictions:
 
 
 def _engage(world: World, traffic: Traffic, id: int, role: Role) -> None:
+    """Gives a vehicle to the traffic's autopilot; raises ConfigError off the driving lanes."""
     i, actor = world.row(id), role.actor
     if i >= world.wheeled:
         raise ConfigError(f"{actor.name}: a {actor.type} has no autopilot")

@@ -130,6 +130,7 @@ class World:
         self._arrange([*self.members[:i], Member(id, new), *self.members[i + 1 :]])
 
     def _begin(self, members: list[Member]) -> None:
+        """Builds the tables, arrays, fleet and bodies of these members anew."""
         self.members = members
         self._rows_by_id = {m.id: i for i, m in enumerate(members)}
         self.index = {m.actor.name: i for i, m in enumerate(members)}
@@ -229,6 +230,7 @@ class World:
 
     @grip.setter
     def grip(self, grip: GripParams) -> None:
+        """Sets one grip for all vehicles in place of that of the road."""
         if grip is not self._grip:
             self._grip, self._road = grip, None
             self._fill_grips()
@@ -246,6 +248,7 @@ class World:
             self.gusts.wind = replace(self.gusts.wind, speed=speed, towards=towards)
 
     def _fill_grips(self) -> None:
+        """Gives each vehicle the grip of its own tyres on the road, or else the common grip."""
         road = self._road
         for i, body in enumerate(self.fleet.types):
             own = None if road is None or not body.tyres else road.params(body.tyres)
@@ -379,6 +382,7 @@ class World:
         self.lights.advance(self.dt)
 
     def _advance(self, stages: int) -> None:
+        """Runs the given stages of a step and stores their contacts and lane invasions."""
         step = advance_undriven if self.traffic is None else advance
         touches, crossed = step(self.arena, stages, self.tick, self.dt, self.fleet.steps, *self.air)
         if stages & MOVE:
@@ -428,6 +432,7 @@ class World:
         return read_signs(self.map, self.placed)
 
     def _drive(self, i: int, c: VehicleCommand) -> None:
+        """Writes the command of a vehicle into its row."""
         self.commands[i] = (c.throttle, c.brake, c.steer, c.handbrake, c.reverse)
 
     def _obey(self, word: ActorCommand) -> None:
@@ -459,6 +464,7 @@ class World:
         self.states.ax[i] = (speed - v_before) / self.dt
 
     def _release(self, i: int) -> None:
+        """Takes a vehicle out of the traffic's hands, where there is traffic."""
         if self.traffic is not None:
             self.traffic.release(i)
 

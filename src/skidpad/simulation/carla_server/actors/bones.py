@@ -99,6 +99,7 @@ class Skeleton:
         return rows
 
     def _blend_poses(self, name: str, rest: Pose) -> Pose:
+        """Returns the pose of a bone between rest and the client's pose, by the share `blend` in 0..1."""
         told = self.pose.get(name)
         if told is None or self.blend == 0.0:
             return rest
@@ -108,10 +109,12 @@ class Skeleton:
 
 
 def _numbers(pose: Pose) -> tuple[float, ...]:
+    """Returns x, y, z in m and roll, pitch, yaw in rad of a pose."""
     return pose.x, pose.y, pose.z, pose.roll, pose.pitch, pose.yaw
 
 
 def _row(name: str, world: Pose, component: Pose, relative: Pose) -> list[Any]:
+    """Returns a bone's row on the wire: name and its poses in world, component and parent frame."""
     return [name, wire.transform(world), wire.transform(component), wire.transform(relative)]
 
 

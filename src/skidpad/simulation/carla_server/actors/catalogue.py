@@ -95,6 +95,7 @@ CLASS_OF_KIND = LABEL_OF_KIND | {ActorKind.VAN: SemanticClass.TRUCK}  # as CARLA
 
 
 def _attributes(entry: dict[str, Any]) -> dict[str, Attribute]:
+    """Returns a catalogue entry's attributes by name; a third field restricts one to its listed values."""
     made = {}
     for name, spec in entry.items():
         values = spec[1] if isinstance(spec[1], list) else [spec[1]]
@@ -105,16 +106,19 @@ def _attributes(entry: dict[str, Any]) -> dict[str, Attribute]:
 
 
 def _fixed_attribute(name: str, kind: AttributeType, value: object) -> Attribute:
+    """Returns an attribute that clients cannot modify, with its value as CARLA writes it."""
     written = str(value).lower() if isinstance(value, bool) else str(value)
     return Attribute(name, kind, (written,), modifiable=False)
 
 
 def _roles(actor: dict[str, Attribute], *names: str) -> dict[str, Attribute]:
+    """Returns the actor's attributes together with `role_name` and its recommended values."""
     role = Attribute("role_name", AttributeType.STRING, names)
     return {**actor, "role_name": role}
 
 
 def _vehicle(id: str, row: list[Any], actor: dict[str, Attribute], colours: list[str]) -> Blueprint:
+    """Returns the blueprint of a vehicle from its catalogue row (size in m, base type, lights, doors)."""
     length, width, height, base, special, generation, lights, doors = row
     wheels = 2 if base in ("motorcycle", "bicycle") else 4
     attributes = _roles(actor, "autopilot", "scenario", "ego_vehicle", "hero")
@@ -139,6 +143,7 @@ def _vehicle(id: str, row: list[Any], actor: dict[str, Attribute], colours: list
 
 
 def _walker(id: str, row: list[Any], actor: dict[str, Attribute]) -> Blueprint:
+    """Returns the blueprint of a pedestrian from its catalogue row (size in m, age, gender, generation)."""
     length, width, height, age, gender, generation = row
     attributes = _roles(actor, "pedestrian")
     for attribute in (
@@ -157,12 +162,14 @@ def _walker(id: str, row: list[Any], actor: dict[str, Attribute]) -> Blueprint:
 
 
 def _size_word(length: float, width: float, height: float) -> str:
+    """Returns CARLA's word for the longest edge in m: tiny below 0.3, small, medium, big, huge from 5.0."""
     longest = max(length, width, height)
     words = ((0.3, "tiny"), (1.0, "small"), (2.5, "medium"), (5.0, "big"))
     return next((word for limit, word in words if longest < limit), "huge")
 
 
 def _prop(id: str, size: list[float], actor: dict[str, Attribute]) -> Blueprint:
+    """Returns the blueprint of a static prop whose length, width and height are given in m."""
     attributes = _roles(actor, "prop")
     attributes["size"] = _fixed_attribute("size", AttributeType.STRING, _size_word(*size))
     if id == "static.prop.mesh":
@@ -179,6 +186,7 @@ def _prop(id: str, size: list[float], actor: dict[str, Attribute]) -> Blueprint:
 
 
 def _grip(actor: dict[str, Attribute]) -> Blueprint:
+    """Returns the blueprint of the actor that reports grip and sets the ice thickness."""
     ice = Attribute("ice_thickness", AttributeType.FLOAT, ("0.0",))
     blueprint = Blueprint(GRIP_BLUEPRINT, Family.GRIP, {**actor, ice.id: ice})
     return grip_in_force(blueprint, GripModel.PHYSICAL, MU_REF)

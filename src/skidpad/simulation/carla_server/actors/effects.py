@@ -68,6 +68,7 @@ class Remarks:
             self._once(blueprint.id, "the sensor, which sends nothing,")
 
     def _once(self, id: str, what: str) -> None:
+        """Logs once for each blueprint that a setting is accepted without effect."""
         if (id, what) not in self.made:
             self.made.add((id, what))
             log.info("%s: %s is accepted without effect", id, what)

@@ -90,6 +90,7 @@ Found = tuple[SemanticClass, Pose, Vector, Source]
 
 
 def _boxes(side: Roadside) -> Iterator[Found]:
+    """Yields (label, centre pose, half sizes in m, source) for each box beside the road."""
     for row, b in enumerate(side.boxes):
         centre = Pose(b.x, b.y, b.z + b.height / 2.0, yaw=b.yaw)
         half = (b.length / 2.0, b.width / 2.0, b.height / 2.0)
@@ -97,6 +98,7 @@ def _boxes(side: Roadside) -> Iterator[Found]:
 
 
 def _heads(side: Roadside) -> Iterator[Found]:
+    """Yields (label, centre pose, half sizes in m, source) for each signal head."""
     for row, h in enumerate(side.heads):
         scale = h.lamp_diameter / 0.3 / 2.0
         half = (HEAD[0] * scale, HEAD[1] * scale, HEAD[2] * scale)
@@ -105,6 +107,7 @@ def _heads(side: Roadside) -> Iterator[Found]:
 
 
 def _barriers(side: Roadside) -> Iterator[Found]:
+    """Yields (label, centre pose, half sizes in m, source) for each straight piece of a barrier; no kerbs."""
     for row, barrier in enumerate(side.barriers):
         if barrier.kind not in BARRIERS:
             continue  # kerbs are part of the ground
@@ -135,6 +138,7 @@ def pieces(points: NDArray[np.float64]) -> Iterator[tuple[int, int]]:
 
 
 def _is_straight(part: NDArray[np.float64]) -> bool:
+    """Returns whether points (n, 2) in m deviate little from their chord and the chord is not too long."""
     along = part[-1] - part[0]
     length = float(np.hypot(*along))
     if not 0.0 < length <= LONGEST_PIECE:

@@ -73,6 +73,7 @@ class ServedMap:
 
 
 def _navigation(name: str, roads: RoadMap) -> tuple[str, bytes] | None:
+    """Returns (file name, Recast bytes) of a map's walk mesh; None, with a log line, where it has none."""
     try:
         mesh = walk_mesh(roads)
     except ShapelyError as error:
@@ -99,6 +100,7 @@ class MapStore:
         return [*plain, *(n + LAYERED for n in plain if n + LAYERED not in plain)]
 
     def _plain_names(self) -> list[str]:
+        """Returns the names of the bundled maps and of the folder's own, without layered variants."""
         own = sorted(p.stem for p in self.folder.glob("*.xodr")) if self.folder else []
         return [*bundled_maps(), *(n for n in own if n not in bundled_maps())]
 
@@ -123,6 +125,7 @@ class MapStore:
         return _make_served_map(short, roads, path.read_text(encoding="utf-8", errors="replace"))
 
     def _path(self, name: str) -> Path | None:
+        """Returns the file of a map, the folder's own before a bundled one; None for an unknown name."""
         names = self._plain_names()
         if name not in names:
             name = name.removesuffix(LAYERED)
@@ -144,6 +147,7 @@ def roads_from_text(xodr: str, name: str) -> RoadMap:
 
 
 def _make_served_map(name: str, roads: RoadMap, xodr: str) -> ServedMap:
+    """Returns the served map with its spawn points; raises ConfigError where it has none."""
     points = tuple(spawn_points(roads))
     if not points:
         raise ConfigError(f"map {name}: no lane is long enough for a spawn point")

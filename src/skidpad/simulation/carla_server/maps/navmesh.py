@@ -63,6 +63,7 @@ def pack_mesh(mesh: WalkMesh) -> bytes | None:
 
 
 def _tile(mesh: WalkMesh, points: NDArray[np.float32], lower: object, upper: object) -> bytes:
+    """Returns the bytes of a Detour mesh tile that holds the whole mesh within the two corners."""
     low, high = np.asarray(lower, dtype=VERTEX), np.asarray(upper, dtype=VERTEX)
     n, sizes = len(mesh.polygons), [len(ring) for ring in mesh.polygons]
     cell = max(CELL, float((high - low).max()) / 65000.0)
@@ -77,6 +78,7 @@ def _tile(mesh: WalkMesh, points: NDArray[np.float32], lower: object, upper: obj
 
 
 def _polygons(mesh: WalkMesh) -> NDArray[np.void]:
+    """Returns the table of polygons (n,): corners, neighbours + 1, flags, size and area."""
     table = np.zeros(len(mesh.polygons), dtype=POLYGON)
     table["link"] = NO_LINK
     rows = zip(mesh.polygons, mesh.neighbours(), mesh.areas, strict=True)

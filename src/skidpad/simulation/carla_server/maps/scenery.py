@@ -48,6 +48,7 @@ def trace_ray(
 
 
 def _hit(start: Vector, unit: Vector, distance: float, label: int) -> Hit:
+    """Returns the hit at a distance in m from `start` along the unit vector."""
     place = tuple(s + distance * u for s, u in zip(start, unit, strict=True))
     return Hit(distance, (place[0], place[1], place[2]), label)
 

@@ -102,6 +102,7 @@ def get_actor_component_names(served: Served, id: Any) -> list[str]:
 
 
 def _require_component(name: Any) -> None:
+    """Raises CallError where the name is not that of the one component of an actor."""
     if wire.text(name, "component") != COMPONENT:
         raise CallError(
             f"Component could not be found in this actor: {name!r}; there is {COMPONENT!r}"

@@ -18,6 +18,7 @@ Command = Callable[..., Any]
 
 
 def _destroy(served: Served, id: Any) -> None:
+    """Destroys the actor of that id; raises CallError where there is none."""
     served.episode.destroy(served.episode.actors.get(id).id)
 
 
@@ -62,6 +63,7 @@ def apply_batch(served: Served, commands: Any, do_tick: Any) -> list[Any]:
 
 
 def _outcome(served: Served, command: Any) -> list[Any]:
+    """Carries out one command of a batch and returns its result, or its error text, as on the wire."""
     try:
         (variant,) = wire.items(command, "command", 1)
         return [[1, run(served, variant)]]
@@ -90,6 +92,7 @@ def _attachment(kind: Any) -> Attachment:
 
 
 def _spawn(served: Served, members: list[Any], depth: int) -> int:
+    """Spawns or attaches an actor, runs the commands for it that follow, and returns its id."""
     if len(members) != 6 or depth > MAX_DEPTH:
         raise wire.WireError("a spawn command has six members and is nested at most four deep")
     description, transform, parent, kind, socket, after = members

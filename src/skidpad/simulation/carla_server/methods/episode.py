@@ -44,6 +44,7 @@ def get_sensor_token(served: Served, stream: Any) -> list[bytes]:
 
 
 def _colour_camera(served: Served, id: Any) -> Sensor:
+    """Returns the RGB camera of that id; raises CallError for any other actor."""
     actor = served.episode.actors.get(id, Family.SENSOR)
     sensor = served.episode.sensors.of(actor.id)
     if sensor is None or not isinstance(sensor.equipment, ColourCamera):

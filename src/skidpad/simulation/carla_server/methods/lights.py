@@ -22,10 +22,12 @@ def light_of(served: Served, id: Any) -> Light:
 
 
 def _lights(served: Served) -> Lights:
+    """Returns the traffic lights of the running episode."""
     return served.episode.moving.lights
 
 
 def _group(served: Served, id: Any) -> Group:
+    """Returns the group to which the traffic light of that id belongs."""
     return _lights(served).groups[light_of(served, id).group]
 
 
@@ -35,6 +37,7 @@ def parse_state(value: Any) -> LightState:
 
 
 def _seconds(value: Any) -> float:
+    """Returns a duration in s read from the wire, cut to 0..LONGEST."""
     return min(max(wire.number(value, "time"), 0.0), LONGEST)
 
 

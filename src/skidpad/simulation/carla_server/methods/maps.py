@@ -96,5 +96,6 @@ def unload_map_layer(served: Served, layers: Any) -> None:
 
 
 def _layer(served: Served, layers: Any, on: bool) -> None:
+    """Loads or unloads the map layers of a bit mask and rebuilds the landscape."""
     served.episode.landscape.load(wire.integer(layers, "map layers", 0, ALL_LAYERS), on)
     served.episode.relandscape()

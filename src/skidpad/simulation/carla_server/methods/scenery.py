@@ -35,6 +35,7 @@ def clear_debug_string(served: Served) -> None:
 
 
 def _objects_with_tag(served: Served, tag: Any) -> list[EnvironmentObject]:
+    """Returns the environment objects with that semantic tag; the tag ANY takes all."""
     label = wire.integer(tag, "tag", 0, ANY)
     return [o for o in objects(served.episode.map.roads) if label in (ANY, o.label)]
 
@@ -66,6 +67,7 @@ def get_names_of_all_objects(served: Served) -> list[str]:
 
 
 def _trace_ray(served: Served, start: Vector, way: Vector, reach: float) -> list[scenery.Hit]:
+    """Returns the hits of a ray with the landscape and the actors within `reach` in m."""
     return scenery.trace_ray(served.episode.landscape, served.episode.actors, start, way, reach)
 
 

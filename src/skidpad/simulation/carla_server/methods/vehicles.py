@@ -173,6 +173,8 @@ def get_wheel_pitch_angle(served: Served, id: Any, wheel: Any) -> float:
 
 
 def _accept_without_effect(name: str, reason: str) -> None:
+    """Registers a call that checks its actor and has no effect, for the given reason."""
+
     @TABLE.method(name, Shape.VOID, without_effect=reason)
     def accepted(served: Served, id: Any, a: Any = None, b: Any = None, c: Any = None, d: Any = None,
                  e: Any = None, f: Any = None) -> None:  # fmt: skip

@@ -36,6 +36,7 @@ def apply_control_to_walker(served: Served, id: Any, control: Any) -> None:
 
 
 def _skeleton(served: Served, id: Any) -> tuple[Actor, Skeleton]:
+    """Returns the pedestrian of that id and its skeleton, made on first use."""
     actor = served.episode.actors.get(id, Family.WALKER)
     return actor, served.episode.skeletons.setdefault(actor.id, Skeleton())
 

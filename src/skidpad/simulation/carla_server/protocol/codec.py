@@ -76,6 +76,7 @@ class Decoder:
             raise ProtocolError(f"not a msgpack-rpc request: {on_a_line(error)}") from error
 
     def _next(self) -> bytes | None:
+        """Removes and returns the first complete message; None while the bytes held are not a whole one."""
         try:
             self._scanner.skip()
         except msgpack.exceptions.OutOfData:

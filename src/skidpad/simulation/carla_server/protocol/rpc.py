@@ -103,6 +103,7 @@ class Dispatcher:
             )
 
     def _answer_unknown(self, request: Request) -> bytes:
+        """Counts a call that is not served, logs it once and returns the error answer."""
         name = request.method[:80]
         if name not in self.unknown and len(self.unknown) < 1000:
             log.warning("unknown call %s", name)
@@ -112,10 +113,12 @@ class Dispatcher:
 
 
 def _wrap_result(shape: Shape, result: Any) -> Any:
+    """Returns a result as on the wire: [[False]] for VOID, unchanged for PLAIN, else [[1, result]]."""
     if shape is Shape.VOID:
         return [[False]]
     return result if shape is Shape.PLAIN else [[1, result]]
 
 
 def _wrap_error(shape: Shape, message: str) -> Any:
+    """Returns an error as on the wire: [[True, [message]]] for VOID, else [[0, [message]]]."""
     return [[True, [message]]] if shape is Shape.VOID else [[0, [message]]]

@@ -132,6 +132,7 @@ class StreamHub:
             asyncio.get_running_loop().call_later(HOLD, self._resume, waiting)
 
     def _resume(self, waiting: list[asyncio.Transport]) -> None:
+        """Sends the messages held back for the transports that are still open."""
         for transport in waiting:
             message = self._held.pop(transport, None)
             if message is not None and not transport.is_closing():

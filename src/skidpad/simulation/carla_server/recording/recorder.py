@@ -101,6 +101,7 @@ class Recorder:
         self._write(json.dumps([clock.frame, clock.elapsed, poses, contacts, born, controls]))
 
     def _write(self, line: str) -> None:
+        """Writes a line to the recording; stops the recording where the size limit is passed."""
         assert self._file is not None
         self._left -= len(line) + 1
         if self._left < 0:
@@ -129,12 +130,14 @@ class Recorder:
             return recording(name, *self._read(name))
 
     def _read_with_start(self, name: str) -> tuple[dict[str, Any], list[list[Any]], float]:
+        """Returns head, ticks and start time in s of a recording; 0.0 where it has no tick."""
         head, ticks = self._read(name)
         written = datetime.fromtimestamp(safe_path(self.folder, name).stat().st_mtime, timezone.utc)
         head["date"] = written.strftime("%x %X")
         return head, ticks, _start(head, ticks) if ticks else 0.0
 
     def _read(self, name: str) -> tuple[dict[str, Any], list[list[Any]]]:
+        """Returns head and ticks of a recording; raises CallError for a missing, too large or damaged one."""
         path = safe_path(self.folder, name)
         if self._file is not None:
             self._file.flush()
@@ -167,6 +170,7 @@ def _start(head: dict[str, Any], ticks: list[list[Any]]) -> float:
 
 
 def _control_row(vehicle: Vehicle, vehicles: Vehicles) -> list[float]:
+    """Returns [actor id, steer, throttle, brake, handbrake, gear] of a vehicle."""
     c, row = vehicle.control, vehicles.row(vehicle.actor)
     pedals = [round(v, 4) for v in (c.steer, c.throttle, c.brake)]
     return [

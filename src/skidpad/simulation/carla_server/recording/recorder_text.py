@@ -84,11 +84,13 @@ def list_blocked(head: Head, ticks: list[Tick], start: float, seconds: float, cm
 
 
 def _head_lines(head: Head) -> list[str]:
+    """Returns the lines with version, map and date of a recording, and an empty one."""
     date = str(head.get("date", "unknown"))
     return [f"Version: {VERSION}", f"Map: {head.get('map')!s:.80}", f"Date: {date:.40}", ""]
 
 
 def _tail(ticks: list[Tick], start: float) -> str:
+    """Returns the last lines: the number of frames and the duration in s since `start`."""
     duration = ticks[-1][1] - start if ticks else 0.0
     return f"\nFrames: {len(ticks)}\nDuration: {duration:g} seconds\n"
 
@@ -110,10 +112,12 @@ def _event_lines(tick: Tick, known: dict[int, dict[str, Any]]) -> Iterator[str]:
 
 
 def _hero_mark(attributes: dict[str, Any] | None) -> str:
+    """Returns " (hero) " for attributes with the hero's role name, else empty text."""
     return " (hero) " if attributes and attributes.get("role_name") == HERO else ""
 
 
 def _state_lines(tick: Tick) -> Iterator[str]:
+    """Yields the lines of a tick's positions in cm, rotations in deg and vehicle controls."""
     yield f" Positions: {len(tick[2])}"
     for id, xyz, (pitch, yaw, roll) in tick[2]:
         yield f"  Id: {id} Location: ({_vector(xyz, CM)}) Rotation ({_vector((roll, pitch, yaw))})"
@@ -127,20 +131,24 @@ def _state_lines(tick: Tick) -> Iterator[str]:
 
 
 def _vector(values: Any, scale: float = 1.0) -> str:
+    """Returns the scaled numbers as text, joined by commas."""
     return ", ".join(f"{scale * v:g}" for v in values)
 
 
 def _kind(id: int, born: dict[int, tuple[str, dict[str, str]]]) -> tuple[int, str]:
+    """Returns CARLA's number and letter for the kind of an actor; (0, OTHER) for an unknown one."""
     blueprint = born[id][0] if id in born else ""
     found = ((n, letter) for start, n, letter in KINDS if blueprint.startswith(start))
     return next(found, (0, OTHER))
 
 
 def _is_of(id: int, wanted: str, born: dict[int, tuple[str, dict[str, str]]]) -> bool:
+    """Returns whether an actor is of the wanted kind: a letter, the hero or any."""
     if wanted == OF_HERO:
         return id in born and born[id][1].get("role_name") == HERO
     return wanted in (ANY, _kind(id, born)[1])
 
 
 def _row(time: str, types: str, id_1: str, name_1: str, id_2: str, name_2: str) -> str:
+    """Returns a row of the collision table with its columns aligned."""
     return f"{time:>8} {types:>6} {id_1:>6} {name_1:<35} {id_2:>6} {name_2:<35}"

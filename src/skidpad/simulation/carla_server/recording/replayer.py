@@ -57,6 +57,7 @@ class CarlaRecording:
 
 
 def _between(a: Pose, b: Pose, share: float, span: float) -> tuple[Pose, Vector]:
+    """Returns the pose at the share 0..1 from a to b, and the velocity in m/s over the span in s."""
     dx, dy, dz = b.x - a.x, b.y - a.y, b.z - a.z
     pose = replace(
         a,
@@ -133,6 +134,7 @@ class Replayer:
         self._run = None
 
     def _place(self, run: _Run) -> None:
+        """Sets every recorded actor at its pose of the moment, removes the others and moves the spectator."""
         places = run.source.at(run.now)
         run.drop(keep=places.keys())
         for recorded, (pose, velocity) in places.items():
@@ -207,6 +209,7 @@ class _Run:
 
 
 def _move(episode: Episode, actor: Actor, pose: Pose, velocity: Vector) -> None:
+    """Sets pose and velocity in m/s of an actor; the velocity only of vehicles and bodies."""
     episode.place(actor, pose)
     if actor.id in episode.vehicles:
         episode.vehicles.set_velocity(actor.id, velocity)

@@ -33,11 +33,13 @@ LONG = "<i8"
 
 
 def _record(*fields: Any) -> np.dtype[Any]:
+    """Returns the structured dtype of the fields, aligned as by a C compiler."""
     made: np.dtype[Any] = np.dtype(list(fields), align=True)
     return made
 
 
 def _longs(*names: str) -> np.dtype[Any]:
+    """Returns the structured dtype of long integers with these names."""
     return _record(*((name, LONG) for name in names))
 
 
@@ -140,6 +142,7 @@ class Rhythm:
         return going
 
     def _has_changed(self, pose: Pose, speed: float) -> bool:
+        """Returns whether heading, position or speed changed beyond the limits since the last message."""
         turned = abs(degrees(wrap_angle(pose.yaw - self.pose.yaw)))
         gone = np.hypot(np.hypot(pose.x - self.pose.x, pose.y - self.pose.y), pose.z - self.pose.z)
         return bool(turned > TURN_DEG or gone > DISTANCE or abs(speed - self.speed) > CHANGE)
@@ -183,6 +186,7 @@ def awareness(
 
 
 def _tell(part: NDArray[np.void], motion: Motion) -> None:
+    """Writes heading, speed, size, acceleration and yaw rate into a message, in its units and codes."""
     part["heading"] = (round(10.0 * (motion.heading % 360.0)), 10)
     part["speed"] = (min(round(100.0 * max(motion.speed, 0.0)), MOST_SPEED), 3)
     part["direction"] = int(motion.speed < 0.0)

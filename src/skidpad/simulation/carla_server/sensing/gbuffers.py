@@ -158,6 +158,7 @@ def _velocity(flow: Floats, camera: Camera, out: Bytes) -> None:
 
 
 def _occlusion(_: Pictured, view: View, camera: Camera, out: Bytes) -> None:
+    """Writes the ambient occlusion of the view into the picture `out` as shades of grey."""
     inverse = camera.drawn.inverse
     grey = np.empty(inverse.shape, dtype=np.uint8)
     ambient_occlusion(view, inverse, camera_normals(view, inverse), grey)

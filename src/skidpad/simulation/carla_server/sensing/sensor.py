@@ -47,7 +47,7 @@ class Sensor:
 
 
 def _no_equipment(_: Actor, __: int) -> None:
-    return None
+    """Does nothing: it serves the sensors that need no equipment."""
 
 
 @dataclass(frozen=True, slots=True)

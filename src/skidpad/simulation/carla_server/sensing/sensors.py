@@ -65,6 +65,7 @@ class SensorSet:
                 self._read(sensor, around, clock, hub)
 
     def _read(self, sensor: Sensor, around: Surroundings, clock: Clock, hub: StreamHub) -> None:
+        """Produces and publishes a sensor's messages and textures, only for streams that have listeners."""
         producer = self._producers[sensor.actor.blueprint.id]
         place, number = around.actors.pose(sensor.actor), sensor.actor.stream
         if number is not None and hub.has_listeners(number):

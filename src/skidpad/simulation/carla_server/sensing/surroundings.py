@@ -123,6 +123,7 @@ class Surroundings:
         return self._vehicles.of(vehicle.id).lights
 
     def _brakes(self, actor: Actor) -> bool:
+        """Returns whether the actor is a vehicle with its brake pedal pressed."""
         return actor.id in self._vehicles and self._vehicles.of(actor.id).control.brake > 0.0
 
     def _states(self, members: list[Actor]) -> ActorStates:
@@ -142,6 +143,7 @@ class Surroundings:
 
 
 def _bodies(members: list[Actor]) -> Bodies:
+    """Returns names, types, kinds, sizes in m and colours of the actors, as arrays in their order."""
     size = 2.0 * np.array([a.half for a in members]).reshape(-1, 3)
     return Bodies(
         names=tuple(str(a.id) for a in members),
@@ -155,6 +157,7 @@ def _bodies(members: list[Actor]) -> Bodies:
 
 
 def _paint(actor: Actor) -> tuple[int, int, int]:
+    """Returns the actor's colour as RGB of 0..255; `PAINT` where it has none."""
     text = actor.attributes.get("color")
     if text is None:
         return PAINT

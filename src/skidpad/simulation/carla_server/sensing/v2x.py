@@ -124,17 +124,20 @@ def _arriving(around: Surroundings, sensor: Sensor, own: Call, call: Call) -> fl
 
 
 def _forward(around: Surroundings, carrier: Actor) -> float:
+    """Returns the speed in m/s of the carrier along its heading, negative in reverse."""
     x, y, _ = around.actors.velocity(carrier)
     yaw = around.actors.pose(carrier).yaw
     return x * cos(yaw) + y * sin(yaw)
 
 
 def _type(carrier: Actor) -> int:
+    """Returns the code of the carrier's station type; emergency vehicles have a code of their own."""
     a = carrier.attributes
     return cam.EMERGENCY if a["special_type"] == "emergency" else cam.STATIONS[a["base_type"]]
 
 
 def _place(around: Surroundings, sensor: Sensor, pose: Pose) -> cam.Motion:
+    """Returns the noisy geographic position (deg, deg, m) of a pose in CARLA's frame."""
     x, y, _ = vector_from_carla(pose.x, pose.y, pose.z)
     noise, n = sensor.rng.standard_normal(3), sensor.number
     latitude, longitude = around.map.geolocation(x, y)

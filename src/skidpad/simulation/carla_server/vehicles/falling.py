@@ -52,6 +52,7 @@ class Falling:
         self._weightless: set[int] = set()
 
     def _floats(self, actor: Actor) -> bool:
+        """Returns whether the actor has no weight or moves upwards."""
         return actor.id in self._weightless or actor.id in self._actors.rising
 
     def _above(self, actor: Actor) -> float | None:
@@ -135,6 +136,7 @@ class Falling:
                 self._hold(actor)
 
     def _is_simulated(self, actor: Actor) -> bool:
+        """Returns whether the physics of the actor's body is switched on."""
         return bool(self._moving.rows.simulated[self._moving.row(actor.body or 0)])
 
     def _hold(self, actor: Actor) -> None:

@@ -108,9 +108,11 @@ def _watched_lanes(roads: RoadMap, lane: int) -> dict[int, Span]:
 
 
 def _before(roads: RoadMap, lane: int) -> list[int]:
+    """Returns the indices of the lanes that lead into a lane."""
     first, after = roads.lanes.prev_start[lane], roads.lanes.prev_start[lane + 1]
     return [int(p) for p in roads.lanes.prev_lane[first:after]]
 
 
 def _width(roads: RoadMap, lane: int) -> float:
+    """Returns the width in m of a lane at its end."""
     return float(roads.at(lane, float(roads.lanes.length[lane])).width)

@@ -200,6 +200,8 @@ class Traffic:
             yield from self._let_in(states, claimed, Area(UNSEEN, BUBBLE))
 
     def _keep_pack(self, states: ActorStates, claimed: Claimed, pack: Pack) -> Iterator[Move]:
+        """Yields the moves that bring waiting and lost vehicles to entrances around the ego's pack."""
+
         def area(*sides: bool) -> Area:
             found = [pack.entrances(self.places.candidates, ahead) for ahead in sides]
             return Area(UNSEEN, RADIUS, np.concatenate(found))
@@ -210,6 +212,7 @@ class Traffic:
             yield from self._put(i, states, claimed, area(ahead), Reason.FAR)
 
     def _let_in(self, states: ActorStates, claimed: Claimed, area: Area) -> Iterator[Move]:
+        """Yields the moves by which waiting vehicles enter the area where there is room."""
         for id in list(self.waiting):
             for move in self._put(self.row[id], states, claimed, area, Reason.ENTERS):
                 self.waiting.remove(id)
@@ -217,6 +220,7 @@ class Traffic:
                 yield move
 
     def _keep_bubble(self, states: ActorStates, claimed: Claimed) -> Iterator[Move]:
+        """Yields the moves that bring waiting and distant vehicles into the bubble around the ego."""
         area = Area(UNSEEN, BUBBLE)
         yield from self._let_in(states, claimed, area)
         x, y = float(states.x[0]), float(states.y[0])
@@ -230,6 +234,7 @@ class Traffic:
     def _put(
         self, i: int, states: ActorStates, claimed: Claimed, area: Area, reason: Reason
     ) -> Iterator[Move]:
+        """Yields the move of vehicle i to a free place in the area, and claims it; none if none is free."""
         at = self.places.draw(
             states,
             area.nearest,

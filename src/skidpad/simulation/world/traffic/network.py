@@ -97,11 +97,13 @@ def network(samples: LaneSamples, lanes: LaneTable, signals: SignalTable) -> Net
 
 
 def _sample_at(samples: LaneSamples, lanes: LaneTable, lane: int, s: float) -> int:
+    """Returns the row of a lane's first sample at or after s in m, at most its last."""
     first, size = int(lanes.first[lane]), int(lanes.size[lane])
     return first + min(int(np.searchsorted(samples.s[first : first + size], s)), size - 1)
 
 
 def _signs(samples: LaneSamples, lanes: LaneTable, signals: SignalTable) -> NDArray[np.bool_]:
+    """Returns the mask (samples,) of the samples at which a speed limit sign stands."""
     sign = np.zeros(len(samples.x), dtype=np.bool_)
     for row in np.flatnonzero(signals.kind == SignalKind.SPEED_LIMIT):
         sign[_sample_at(samples, lanes, int(signals.lane[row]), float(signals.s[row]))] = True
@@ -134,6 +136,7 @@ def _straightest(
 
 
 def _stops(lanes: LaneTable, signals: SignalTable) -> tuple[Ints, NDArray[np.void]]:
+    """Returns the first stop of each lane (lanes + 1,) and the stops at lights, sorted by lane and s."""
     rows = np.flatnonzero(signals.kind == SignalKind.LIGHT)
     rows = rows[np.lexsort((signals.s[rows], signals.lane[rows]))]
     first = np.searchsorted(signals.lane[rows], np.arange(len(lanes.first) + 1)).astype(np.int32)

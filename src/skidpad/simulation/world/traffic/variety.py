@@ -120,4 +120,5 @@ def vary(
 
 
 def _normal(u: float) -> float:
+    """Returns the standard normal quantile of u in 0..1, finite at both ends."""
     return NormalDist().inv_cdf(min(max(u, 1e-9), 1.0 - 1e-9))

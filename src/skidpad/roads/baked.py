@@ -112,10 +112,12 @@ def load_baked(path: Path) -> BakedMap:
 
 
 def _start(road: int, lane: int, s: float) -> LanePosition:
+    """Returns the lane position of a road id, a lane id and an s in m."""
     return LanePosition(int(road), int(lane), float(s))
 
 
 def _roadside_arrays(roadside: Roadside) -> dict[str, NDArray[Any]]:
+    """Returns the roadside as named arrays, one row for each thing; `_roadside` reads them back."""
     barriers, boxes = roadside.barriers, roadside.boxes
     lines = [b.points for b in barriers]
     areas = list(roadside.crosswalks)
@@ -143,6 +145,7 @@ def _roadside_arrays(roadside: Roadside) -> dict[str, NDArray[Any]]:
 
 
 def _split_arrays(arrays: dict[str, NDArray[Any]], name: str) -> list[NDArray[np.float64]]:
+    """Returns the point arrays (n, 3) that `name.points` holds one after the other, split by `name.sizes`."""
     points, sizes = _rows(arrays, f"{name}.points", 3), arrays[f"{name}.sizes"]
     if sizes.dtype.kind not in "iu" or sizes.ndim != 1 or (sizes < 0).any():
         raise ValueError(f"{name}.sizes must hold numbers of points")
@@ -152,6 +155,7 @@ def _split_arrays(arrays: dict[str, NDArray[Any]], name: str) -> list[NDArray[np
 
 
 def _rows(arrays: dict[str, NDArray[Any]], name: str, width: int) -> NDArray[np.float64]:
+    """Returns a table (n, width) as float64; raises ValueError for another shape or numbers out of range."""
     table = arrays[name]
     if table.dtype.kind not in "iuf" or table.ndim != 2 or table.shape[1] != width:
         raise ValueError(f"{name} must hold rows of {width} numbers")
@@ -161,6 +165,7 @@ def _rows(arrays: dict[str, NDArray[Any]], name: str, width: int) -> NDArray[np.
 
 
 def _roadside(arrays: dict[str, NDArray[Any]]) -> Roadside:
+    """Returns the roadside that the named arrays of `_roadside_arrays` describe."""
     return Roadside(
         barriers=tuple(
             Barrier(BarrierKind(int(kind)), points, float(height))
@@ -179,6 +184,7 @@ def _roadside(arrays: dict[str, NDArray[Any]]) -> Roadside:
 
 
 def _box(label: float, x: float, y: float, z: float, yaw: float, *rest: float) -> Box:
+    """Returns the box of a row of 12 numbers, positions and sizes in m and yaw in rad."""
     length, width, height, solid, r, g, b = rest
     rgb = (int(r), int(g), int(b))
     return Box(int(label), x, y, z, yaw, length, width, height, bool(solid), rgb)

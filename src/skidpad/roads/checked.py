@@ -53,6 +53,7 @@ def check_arrays(samples: LaneSamples, lanes: LaneTable, signals: SignalTable, w
 
 
 def _columns(table: Any, n: int, name: str) -> None:
+    """Raises ValueError where a column of a table has a wrong type, length or value."""
     for column, kind in KINDS[type(table)].items():
         values, title = getattr(table, column), f"{name}.{column}"
         _require(values.dtype == kind, f"{title} holds {values.dtype}, not {kind}")
@@ -80,6 +81,7 @@ def element_type(hint: Any) -> type[np.generic]:
 
 
 def _types_in(hint: Any) -> Iterator[type[np.generic]]:
+    """Yields every numpy scalar type that a type hint names, at any depth."""
     if get_origin(hint) is None and isinstance(hint, type) and issubclass(hint, np.generic):
         yield hint
     for part in get_args(hint):
@@ -90,10 +92,12 @@ KINDS = {table: kinds(table) for table in (LaneSamples, LaneTable, SignalTable)}
 
 
 def _within(values: NDArray[Any], low: int, high: int, title: str) -> None:
+    """Raises ValueError where a value is not between low and high, both included."""
     if values.size and not (low <= int(values.min()) and int(values.max()) <= high):
         raise ValueError(f"{title} must be between {low} and {high}")
 
 
 def _require(holds: bool, text: str) -> None:
+    """Raises ValueError with the text where the condition is false."""
     if not holds:
         raise ValueError(text)

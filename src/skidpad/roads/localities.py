@@ -44,6 +44,7 @@ class Localities:
         )
 
     def _nearest_junction(self, away: np.ndarray) -> tuple[int | None, float | None]:
+        """Returns id and distance in m of the nearest junction; (None, None) on a map without one."""
         inside = np.flatnonzero(self._junction >= 0)
         if not inside.size:
             return None, None

@@ -37,11 +37,13 @@ class MapSource:
 
 
 def _read_own(file: Path, setting: str) -> str:
+    """Returns the OpenDRIVE text of a bundled file; the setting has no effect."""
     del setting  # there is none
     return file.read_text("utf-8")
 
 
 def _own_maps() -> tuple[MapSource, ...]:
+    """Returns the sources of the bundled maps, sorted by name."""
     return tuple(
         MapSource(file.stem, "Comes with Skidpad", partial(_read_own, file))
         for file in sorted(FOLDER.glob("*.xodr"))

@@ -57,6 +57,7 @@ def lane_arrays(baked: BakedMap) -> LaneArrays:
 
 
 def _grid(x: Floats, y: Floats) -> tuple[float, Floats, Ints, Ints]:
+    """Returns cell size in m, origin, cell starts (rows + 1, columns) and the points' order by cell."""
     origin = np.array([x.min(), y.min()])
     size = max(CELL, float(np.sqrt(np.ptp(x) / CELLS_MAX * np.ptp(y))))
     size = max(size, float(np.ptp(x) + np.ptp(y)) / CELLS_MAX)  # a thin map

@@ -54,6 +54,7 @@ def draw(map: RoadMap, path: Path, kind: str) -> None:
 
 
 def _lane(axes: Any, map: RoadMap, lane: int) -> None:
+    """Draws a lane's area, and its centreline where it is drivable."""
     first = int(map.lanes.first[lane])
     rows = slice(first, first + int(map.lanes.size[lane]))
     x, y, heading = map.samples.x[rows], map.samples.y[rows], map.samples.heading[rows]
@@ -66,6 +67,7 @@ def _lane(axes: Any, map: RoadMap, lane: int) -> None:
 
 
 def _signals(axes: Any, map: RoadMap) -> None:
+    """Draws a line across its lane for every signal of a drawn kind."""
     for kind, colour in SIGNALS.items():
         for row in np.flatnonzero(map.signals.kind == kind).tolist():
             line = map.at(int(map.signals.lane[row]), float(map.signals.s[row]))

@@ -87,6 +87,7 @@ class RoadMap:
 
     @cached_property
     def _lengths(self) -> list[float]:
+        """Returns the length in m of every lane, as a list of Python floats."""
         lengths: list[float] = self._arrays.length.tolist()
         return lengths
 
@@ -202,6 +203,7 @@ class RoadMap:
         return self._beside(point, int(self.lanes.right[point.lane]))
 
     def _beside(self, point: LanePoint, lane: int) -> LanePoint | None:
+        """Returns the point beside a point on the neighbour lane; None for a lane of -1."""
         if lane < 0:
             return None
         return self.at(lane, kernels.neighbour_s(self._arrays, point.lane, lane, point.s))
@@ -276,6 +278,7 @@ def lock_table(table: Table) -> Table:
 
 
 def _lock_array(array: NDArray[Any]) -> NDArray[Any]:
+    """Returns a view of the array that cannot be written to."""
     view: NDArray[Any] = array.view()
     view.flags.writeable = False
     return view

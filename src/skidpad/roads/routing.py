@@ -64,6 +64,7 @@ def _entered_at(map: RoadMap, start: LanePoint, node: _Node) -> float:
 
 
 def _steps(map: RoadMap, node: _Node, done: float) -> Iterator[tuple[_Node, float]]:
+    """Yields (next node, cost in m) for each drivable successor and each lane change from a node."""
     rest = float(map.lanes.length[node.lane]) - done
     for lane in map.successors(node.lane):
         if map.arrays.drivable[lane]:
@@ -76,6 +77,7 @@ def _steps(map: RoadMap, node: _Node, done: float) -> Iterator[tuple[_Node, floa
 def _route(
     map: RoadMap, start: LanePoint, goal: LanePoint, last: _Node, parents: dict[_Node, _Node]
 ) -> LaneRoute:
+    """Returns the route that the search tree holds from start to goal, with its length in m."""
     nodes = [last]
     while parents[nodes[-1]] != nodes[-1]:
         nodes.append(parents[nodes[-1]])

@@ -69,6 +69,7 @@ def summarise(map: RoadMap) -> MapSummary:
 
 
 def _dead_ends(map: RoadMap) -> Iterator[tuple[int, int]]:
+    """Yields (road id, lane id) of each drivable lane without a drivable successor."""
     for lane in np.flatnonzero(map.arrays.drivable).tolist():
         if not any(map.arrays.drivable[following] for following in map.successors(lane)):
             yield int(map.lanes.road[lane]), int(map.lanes.lane_id[lane])

@@ -44,6 +44,7 @@ def outline_patches(map: RoadMap, surface: Sequence[SurfacePatch]) -> list[Patch
 
 
 def _pieces(map: RoadMap, patch: SurfacePatch) -> Iterator[Floats]:
+    """Yields the outlines (n, 3) in m of a patch: its circle, its polygon or its stretches of lanes."""
     if patch.circle is not None:
         x, y, radius = patch.circle
         turn = np.linspace(0.0, 2.0 * np.pi, CORNERS, endpoint=False)
@@ -62,6 +63,7 @@ def _on_road(map: RoadMap, corners: Floats) -> Floats:
 
 
 def _stretches(map: RoadMap, patch: SurfacePatch) -> Iterator[Floats]:
+    """Yields the outline (n, 3) in m of a patch on each drivable lane of its road."""
     s, lanes = map.samples, map.lanes
     low, high = (0.0, np.inf) if patch.s is None else patch.s
     left, right = (0.5 if patch.side != "right" else 0.0), (-0.5 if patch.side != "left" else 0.0)

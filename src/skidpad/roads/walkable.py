@@ -78,6 +78,7 @@ def walk_mesh(map: RoadMap) -> WalkMesh | None:
 
 
 def _edges(ring: Ring) -> Iterable[tuple[int, int]]:
+    """Returns the edges of a ring as pairs of indices, the closing one last."""
     return zip(ring, (*ring[1:], ring[0]), strict=True)
 
 
@@ -95,6 +96,7 @@ def _borders(map: RoadMap, lane: int) -> tuple[Floats, Floats]:
 
 
 def _strips(map: RoadMap, lanes: list[int]) -> WalkMesh:
+    """Returns a mesh of quadrilaterals along the lanes, all of the area kind SIDEWALK."""
     points: list[Floats] = []
     rings: list[Ring] = []
     for lane in lanes:
@@ -141,6 +143,7 @@ def _storeys(map: RoadMap) -> bool:
 
 
 def _town(map: RoadMap) -> WalkMesh:
+    """Returns the mesh of sidewalks, crossings and roads as convex polygons without overlap."""
     surfaces = _surfaces(map)
     lines = shapely.unary_union([g.boundary for g in surfaces.values()], grid_size=GRID)
     faces = [f for f in shapely.get_parts(shapely.polygonize([lines])) if f.area > SLIVER]
@@ -189,11 +192,13 @@ def _areas_of(geometry: shapely.Geometry) -> shapely.Geometry:
 
 
 def _outline(map: RoadMap, lane: int) -> shapely.Geometry:
+    """Returns the outline of a lane seen from above, widened by GRID in m."""
     left, right = _borders(map, lane)
     return shapely.Polygon(np.concatenate((left[:, :2], right[::-1, :2]))).buffer(GRID)
 
 
 def _kind(surfaces: dict[WalkArea, shapely.Geometry], face: shapely.Geometry) -> WalkArea | None:
+    """Returns the kind of area in which a face lies; None where it lies in none."""
     point = face.representative_point()
     return next((area for area, g in surfaces.items() if g.contains(point)), None)
 
@@ -240,6 +245,7 @@ def _join_polygons(one: Ring, two: Ring, a: int, b: int) -> Ring:
 
 
 def _convex(ring: Ring, points: list[tuple[float, float]]) -> bool:
+    """Returns whether a ring of point indices is convex, counter-clockwise and without repetitions."""
     if len(set(ring)) != len(ring):
         return False
     p = np.array([points[i] for i in ring])
@@ -249,5 +255,6 @@ def _convex(ring: Ring, points: list[tuple[float, float]]) -> bool:
 
 
 def _length(points: list[tuple[float, float]], edge: tuple[int, int]) -> float:
+    """Returns the length in m of the edge between two points."""
     (xa, ya), (xb, yb) = points[edge[0]], points[edge[1]]
     return float(np.hypot(xb - xa, yb - ya))

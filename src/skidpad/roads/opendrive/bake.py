@@ -59,6 +59,8 @@ def bake(text: bytes, name: str, file: str = "") -> BakedMap:
 
 
 def _samples(shapes: Sequence[LaneShape]) -> LaneSamples:
+    """Returns the samples of all lanes one after the other, rounded, with headings in (-pi, pi]."""
+
     def column(name: str) -> NDArray[Any]:
         values = np.concatenate([getattr(shape, name) for shape in shapes])
         if name == "heading":
@@ -71,6 +73,7 @@ def _samples(shapes: Sequence[LaneShape]) -> LaneSamples:
 
 
 def _table(document: Document, shapes: Sequence[LaneShape]) -> LaneTable:
+    """Returns the table of lanes with their neighbours, successors and predecessors as indices."""
     index = {shape.key: i for i, shape in enumerate(shapes)}
     pairs = successions(document, shapes, index)
     next_start, next_lane = compress_pairs(pairs, len(shapes))
@@ -99,6 +102,7 @@ def _table(document: Document, shapes: Sequence[LaneShape]) -> LaneTable:
 
 
 def _ego_start(document: Document) -> LanePosition | None:
+    """Returns the ego's start that the file's userData names; None where it names none."""
     text = document.user_data.get(EGO_START)
     if text is None:
         return None

@@ -243,6 +243,7 @@ def parse(text: bytes, file: str) -> Document:
 
 
 def _shift(read: Reader, node: Node | None) -> Shift:
+    """Returns the offset (m) and turn (rad) of the map; zeros where the node is None."""
     if node is None:
         return Shift()
     x, y, z, heading = (read.number(node, name, 0.0) for name in ("x", "y", "z", "hdg"))
@@ -250,6 +251,7 @@ def _shift(read: Reader, node: Node | None) -> Shift:
 
 
 def _road(read: Reader, node: Node) -> RoadRecord:
+    """Returns the record of a road; raises an error without length, geometry or lane section."""
     length = _length(read, node)
     if length <= 0.0:
         raise read.fail(node, f"needs a positive length, got {length}")
@@ -284,11 +286,13 @@ def _road(read: Reader, node: Node) -> RoadRecord:
 
 
 def _raise_elevation(read: Reader, elevation: Cubics) -> Cubics:
+    """Returns the elevation lifted by the z of the map's offset in m."""
     lift = np.array([read.shift.z, 0.0, 0.0, 0.0])
     return Cubics(elevation.start, elevation.coefficients + lift)
 
 
 def _length(read: Reader, node: Node) -> float:
+    """Returns a length in m; raises an error for one above LONGEST."""
     length = read.number(node, "length")
     if length > LONGEST:
         raise read.fail(node, f"is {length:g} m long; at most {LONGEST:g} m")
@@ -296,6 +300,7 @@ def _length(read: Reader, node: Node) -> float:
 
 
 def _element(read: Reader, node: Node) -> Element:
+    """Returns a piece of the reference line in the shifted frame; raises an error for an unknown shape."""
     length = _length(read, node)
     shape: Clothoid | Parametric
     child = next((c for c in node if isinstance(c.tag, str) and c.tag != "userData"), None)
@@ -324,6 +329,7 @@ def _element(read: Reader, node: Node) -> Element:
 
 
 def _sections(read: Reader, road: Node, length: float) -> tuple[SectionRecord, ...]:
+    """Returns the lane sections of a road by s, each up to the next one's begin or the road's end."""
     nodes = sorted(road.findall("lanes/laneSection"), key=lambda n: read.number(n, "s"))
     if not nodes:
         raise read.fail(road, "has no lane section")
@@ -335,6 +341,7 @@ def _sections(read: Reader, road: Node, length: float) -> tuple[SectionRecord, .
 
 
 def _lanes(read: Reader, section: Node) -> tuple[LaneRecord, ...]:
+    """Returns all lanes of a section from left to right, the centre lane included."""
     lanes = [
         _lane(read, node)
         for side in ("left", "center", "right")
@@ -344,6 +351,7 @@ def _lanes(read: Reader, section: Node) -> tuple[LaneRecord, ...]:
 
 
 def _lane(read: Reader, node: Node) -> LaneRecord:
+    """Returns the record of a lane; width, border and links are None where the file lacks them."""
     widths, borders = node.findall("width"), node.findall("border")
     ends = [node.find(f"link/{end}") for end in ("predecessor", "successor")]
     speeds = [
@@ -369,6 +377,7 @@ def _lane(read: Reader, node: Node) -> LaneRecord:
 
 
 def _link(read: Reader, node: Node | None) -> Link | None:
+    """Returns a road's link to a road or a junction; None where the node is None."""
     if node is None:
         return None
     return Link(
@@ -379,6 +388,7 @@ def _link(read: Reader, node: Node | None) -> Link | None:
 
 
 def _connections(read: Reader, junction: Node) -> tuple[ConnectionRecord, ...]:
+    """Returns the connections of a junction that name both an incoming and a connecting road."""
     return tuple(
         ConnectionRecord(
             incoming=read.id(node, "incomingRoad"),

@@ -117,11 +117,13 @@ def lane_shapes(document: Document) -> Iterator[LaneShape]:
 
 
 def _require_sample_limit(document: Document, samples: float) -> None:
+    """Raises FileError where a map would have more than SAMPLES_MAX lane samples."""
     if samples > SAMPLES_MAX:
         raise FileError(f"{document.file}: more than {SAMPLES_MAX} lane samples")
 
 
 def _require_sane(document: Document, shape: LaneShape) -> None:
+    """Raises FileError where a value of a lane's shape is NaN or beyond FARTHEST."""
     for name in ("x", "y", "z", "s", "width", "curvature", "grade", "bank"):
         values = getattr(shape, name)
         if not np.all(np.abs(values) <= FARTHEST):  # also catches NaN
@@ -132,6 +134,7 @@ def _require_sane(document: Document, shape: LaneShape) -> None:
 
 
 def _section_shapes(road: RoadRecord, index: int, section: SectionRecord) -> list[LaneShape]:
+    """Returns the shapes of a section's lanes, sampled finely enough for the outer lane of a bend."""
     shapes = _sample_lanes(road, index, section, _grid(road, section, STEP))
     stretch = max(
         (float(np.max(np.diff(shape.s) / abs(np.diff(shape.s_road)))) for shape in shapes),
@@ -167,6 +170,7 @@ def _grid(road: RoadRecord, section: SectionRecord, step: float) -> Floats:
 def _sample_lanes(
     road: RoadRecord, index: int, section: SectionRecord, s: Floats
 ) -> list[LaneShape]:
+    """Returns the shapes of a section's lanes, sampled at the road coordinates s in m."""
     select = np.clip(s, section.s_start + JOINT, section.s_end - JOINT)
     line = road.line.at(s)
     z_line, grade_line, _ = road.elevation.at(s, select)
@@ -258,6 +262,7 @@ def _outer_border(
     offset: Floats,
     cubic: Callable[[Cubics], Floats],
 ) -> Floats:
+    """Returns the lateral position in m of a lane's outer border; the inner one where it has no width."""
     if lane.width is not None:
         return inner + side * cubic(lane.width)
     if lane.border is not None:

@@ -87,6 +87,7 @@ def _beyond(document: Document, shape: LaneShape, at_exit: bool) -> Iterator[tup
 def _through_junction(
     document: Document, road: RoadRecord, link: Link, lane: int
 ) -> Iterator[tuple[LaneKey, bool]]:
+    """Yields (lane key, enters at its start) for each lane that continues this one in the junction."""
     for connection in document.junctions.get(link.target, ()):
         connecting = document.roads.get(connection.connecting)
         if connection.incoming != road.id or connecting is None:
@@ -112,6 +113,7 @@ def _next_section(road: RoadRecord, section: int, up: bool) -> int | None:
 
 
 def _at_end(road: RoadRecord, at_start: bool, lane: int) -> LaneKey:
+    """Returns the key of a lane at the start or at the end of its road."""
     section = (
         _next_section(road, -1, True)
         if at_start

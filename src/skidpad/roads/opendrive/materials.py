@@ -37,6 +37,7 @@ def read_materials(map: str | Path) -> tuple[LaneMaterial, ...]:
 
 
 def _of_road(read: Reader, road: Node) -> Iterator[LaneMaterial]:
+    """Yields the stretch (s in m) and friction of each lane material of a road that names a friction."""
     sections = sorted(road.findall("lanes/laneSection"), key=lambda n: read.number(n, "s"))
     for section, after in pairwise([*sections, None]):
         start = read.number(section, "s")
@@ -53,6 +54,7 @@ def _of_road(read: Reader, road: Node) -> Iterator[LaneMaterial]:
 
 
 def _friction(read: Reader, material: Node) -> float:
+    """Returns the friction of a material; raises an error outside of (0, FRICTION_MOST]."""
     friction = read.number(material, "friction")
     if not 0.0 < friction <= FRICTION_MOST:
         raise read.fail(

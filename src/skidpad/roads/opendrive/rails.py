@@ -102,6 +102,7 @@ def _objects(road: Node) -> Node:
 
 
 def _write_rail(number: int, corners: Corners) -> Node:
+    """Returns the OpenDRIVE object of a guard rail along the given corners."""
     rail = _element(
         "object",
         id=number,
@@ -126,4 +127,5 @@ def _write_rail(number: int, corners: Corners) -> Node:
 
 
 def _element(tag: str, **attributes: object) -> Node:
+    """Returns an XML element with its attributes as text."""
     return etree.Element(tag, {name: str(value) for name, value in attributes.items()})

@@ -104,6 +104,7 @@ class ReferenceLine:
 
 
 def _evaluate(e: Element, ds: Floats) -> LinePoints:
+    """Returns the points of an element at the arc lengths ds in m from its begin."""
     if isinstance(e.shape, Clothoid):
         return _clothoid(e, e.shape, ds)
     return _parametric(e, e.shape, ds)

@@ -115,6 +115,7 @@ def _barrier_kind(node: Node) -> BarrierKind | None:
 
 
 def _barriers(read: Reader, road: RoadRecord, node: Node, kind: BarrierKind) -> list[Barrier]:
+    """Returns the barriers of an object: along its repeats, else its outlines, else a straight line."""
     height = read.number(node, "height", 0.0) or BARRIER_HEIGHTS[kind]
     lines = [_repeated_line(read, road, node, r) for r in node.findall("repeat")]
     if not lines:
@@ -141,6 +142,7 @@ def _repeated_line(read: Reader, road: RoadRecord, node: Node, repeat: Node) -> 
 
 
 def _points(road: RoadRecord, s: Floats, t: Floats, up: Floats) -> Floats:
+    """Returns world points (n, 3) in m for road coordinates s, t and heights above the road."""
     line = road.line.at(s)
     roll = road.superelevation.at(s)[0]
     across = t * np.cos(roll)  # seen from above
@@ -195,16 +197,19 @@ def _outlines(read: Reader, road: RoadRecord, node: Node) -> Iterator[Floats]:
 
 
 def _outline_nodes(node: Node) -> list[Node]:
+    """Returns the outline nodes of an object, in the old and the new place."""
     return [*node.findall("outline"), *node.findall("outlines/outline")]
 
 
 def _turn_points(points: Floats, origin: tuple[float, ...], yaw: float) -> Floats:
+    """Returns the points (n, 3) turned about z by yaw in rad and then moved by the origin."""
     c, s = cos(yaw), sin(yaw)
     out: Floats = points @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) + np.array(origin)
     return out
 
 
 def _boxes(read: Reader, road: RoadRecord, node: Node, type_: str) -> list[Box]:
+    """Returns the boxes of an object: one around each outline, or one at each of its places."""
     label, rgb = LABELS[type_]
     if "sign" in (node.get("subtype"), node.get("name")):
         label, rgb = LABELS["sign"]
@@ -257,6 +262,7 @@ def _around(corners: Floats, height: float, label: int, rgb: tuple[int, int, int
 
 
 def _parking(read: Reader, road: RoadRecord, node: Node) -> ParkingSpace:
+    """Returns the parking space of an object; 5 m by 2 m where the file gives no size."""
     place = road_place(
         road, read.number(node, "s"), read.number(node, "t"), read.number(node, "zOffset", 0.0)
     )

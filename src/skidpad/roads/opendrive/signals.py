@@ -149,10 +149,12 @@ def _is_on_lane(shapes: Sequence[LaneShape], x: float, y: float, z: float) -> bo
 
 
 def _order(row: _Row) -> tuple[int, float, int]:
+    """Returns the sort key of a row: lane, s, then id."""
     return (row.lane, row.s, row.id)
 
 
 def _signals(document: Document) -> Iterator[tuple[RoadRecord, Node]]:
+    """Yields each signal node of the document with its road."""
     for road in document.roads.values():
         for node in road.signals:
             yield road, node
@@ -164,6 +166,7 @@ def _rows(
     shapes: Sequence[LaneShape],
     index: Mapping[LaneKey, int],
 ) -> Iterator[_Row]:
+    """Yields one row for each lane that a signal, or a reference to it, governs; stop lines are left out."""
     signals = {read.id(node): (road, node) for road, node in _signals(document)}
     places = [(id, road, node) for id, (road, node) in signals.items()]
     for road in document.roads.values():
@@ -229,11 +232,13 @@ def _limit(read: Reader, signal: Node) -> float:
 
 
 def _along(shape: LaneShape, s_road: float) -> float:
+    """Returns the s in m along the lane that belongs to a road coordinate in m."""
     order = slice(None) if shape.along else slice(None, None, -1)
     return float(np.interp(s_road, shape.s_road[order], shape.s[order]))
 
 
 def _heading(shape: LaneShape, s: float) -> float:
+    """Returns the heading in rad of a lane at s in m, interpolated."""
     return wrap_angle(float(np.interp(s, shape.s, shape.heading)))
 
 
@@ -251,6 +256,7 @@ def _stop_lines(
 
 
 def _nearest_line(row: _Row, lines: list[tuple[int, float]]) -> float:
+    """Returns the s in m of the nearest stop line in reach for a light or stop sign, else the row's own s."""
     if row.kind not in (SignalKind.LIGHT, SignalKind.STOP):
         return row.s
     near = [s for lane, s in lines if lane == row.lane and abs(s - row.s) <= STOP_LINE_REACH]

@@ -24,6 +24,7 @@ from skidpad.search.bound import (
     first_known_row,
     is_in_sight,
     predict_motion,
+    replace_places,
 )
 
 BEFORE = 10.0  # s before a failure in which its beginning is looked for
@@ -50,14 +51,14 @@ def find_run_avoidance(
         return ""
     rows = np.arange(first, last + 1)
     tracks = [track_of(log, i) for i in range(len(log.table.names))]
-    seen = _foreseen(log, road, tracks, actor, rows)
+    standing = [_standing(log, tick)] if actor == -1 else []
+    seen = _foreseen(log, road, tracks, actor, rows, standing)
     begin = first + first_known_row(seen)
     mu = float(log.mu[begin : last + 1, 0].mean(axis=1).min())
     n = last + 1 - begin + round(AFTER / dt)
     start, path = _start(log, road, begin, reaction)
     others = _others(log, road, tracks, actor, begin, last)
-    if actor is not None and actor < 0:
-        others.append(_standing(log, tick, begin, last))
+    others += [replace_places(s, *(np.full(n, c) for c in s[:3])) for s in standing]
     return find_avoidance(start, path, others, road.edge.beyond, mu, dt, n, reaction)
 
 
@@ -79,14 +80,18 @@ def motion_of(log: RunLog, actor: int) -> Motion:
 
 
 def _foreseen(
-    log: RunLog, road: RoadMap, tracks: list[Track], actor: int | None, rows: np.ndarray
-) -> Mask:
+    log: RunLog, road: RoadMap, tracks: list[Track], actor: int | None, rows: np.ndarray,
+    standing: list[Track],
+) -> Mask:  # fmt: skip
     """(rows,) whether constant motion leads to the failure, and what is touched can be seen."""
     ego = predict_motion(tracks[0], motion_of(log, 0), rows)
     if actor is None or actor < 0:
         z = np.repeat(log.actors.z[rows, 0], ego.x.shape[1])
         flat = (ego.x.ravel(), ego.y.ravel(), z)
-        return np.asarray((road.edge.beyond(*flat) > 0.0).reshape(ego.x.shape).any(axis=1))
+        leads_off = (road.edge.beyond(*flat) > 0.0).reshape(ego.x.shape).any(axis=1)
+        for thing in standing:
+            leads_off |= boxes_overlap(ego, thing).any(axis=1)
+        return np.asarray(leads_off)
     other = predict_motion(tracks[actor], motion_of(log, actor), rows)
     foreseen = boxes_overlap(ego, other).any(axis=1) & log.present[rows, actor]
     third = [t for i, t in enumerate(tracks) if i not in (0, actor)]
@@ -168,9 +173,8 @@ def _take_rows(track: Track, begin: int, end: int) -> Track:
     return Track(x[part], y[part], yaw[part], present[part], track.length, track.width)
 
 
-def _standing(log: RunLog, tick: int, begin: int, last: int) -> Track:
+def _standing(log: RunLog, tick: int) -> Track:
     """Return a small box at the place of a contact with what is no road user."""
     contact = next(c for c in log.contacts if c.tick == tick and c.actor < 0)
-    n = last + 1 - begin + round(AFTER / log.header.dt)
-    still = np.full(n, contact.x), np.full(n, contact.y), np.zeros(n), np.ones(n, dtype=bool)
-    return Track(*still, STATIC, STATIC)
+    place = np.array(contact.x), np.array(contact.y), np.zeros(())
+    return Track(*place, np.ones((), dtype=bool), STATIC, STATIC)

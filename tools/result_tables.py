@@ -35,6 +35,7 @@ RESULTS = ROOT / "docs" / "results"
 PLAN = RESULTS / "preregistration.yaml"
 CLAIMS = RESULTS / "claims.md"
 REFERENCE = "matrix-figure8"  # what others on the same seeds are held against
+REMEDIES = "remedy-none"  # what remedies of the same commit are held against
 MATRICES = (REFERENCE, "matrix-motorway", "matrix-foreign", "matrix-pixels-two")
 PAGES = ("docs/matrix.md", "docs/grip.md", "docs/envelope-proof.md")
 BLOCK = re.compile(r"(<!-- results: (\S+) (\S+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
@@ -103,7 +104,9 @@ def block(name: str, which: str, folder: Path) -> str:
         "adas verdicts": lambda path: result_matrix.verdicts(
             [path.with_name(name) for name in MATRICES]
         ),
-        "adas against": lambda path: result_matrix.against(path.with_name(REFERENCE), path),
+        "adas against": lambda path: result_matrix.against(
+            path.with_name(reference_of(path)), path
+        ),
         "adas envelope": result_envelope.rivals,
         "adas pareto": result_envelope.pareto,
         "grip completion": result_grip.completion,
@@ -114,6 +117,15 @@ def block(name: str, which: str, folder: Path) -> str:
         "study claims": lambda path: study_claims(path, words[1]),
     }
     return driven(folder) + tables[f"{words[0]} {which}"](folder)
+
+
+def reference_of(folder: Path) -> str:
+    """What a campaign on the same seeds is held against; a remedy, where it can be, at its commit."""
+    own, base = folder / "driven.json", folder.with_name(REMEDIES) / "driven.json"
+    if not folder.name.startswith("remedy-") or not base.is_file():
+        return REFERENCE
+    commits = {json.loads(path.read_text(encoding="utf-8"))["commit"] for path in (own, base)}
+    return REMEDIES if len(commits) == 1 else REFERENCE
 
 
 def driven(folder: Path) -> str:

@@ -139,6 +139,27 @@ def test_levels_are_paired_by_seed_and_few_seeds_have_no_bound(tmp_path):
     assert "| all | crashes with vehicles | 8 | +0.00 | no limits |" in rows
 
 
+def test_a_remedy_is_held_against_the_cells_of_its_own_commit(tmp_path):
+    base, matrix, remedy = (
+        tmp_path / name for name in ("remedy-none", "matrix-figure8", "remedy-esc")
+    )
+    results(tmp_path).rename(base)
+    for folder, more in ((matrix, 1), (remedy, 3)):
+        folder.mkdir()
+        rows = pl.read_parquet(base / "results.parquet")
+        rows = rows.with_columns(pl.col("fatal_collisions") + more)
+        rows.write_parquet(folder / "results.parquet")
+        (folder / "driven.json").write_bytes((base / "driven.json").read_bytes())
+    text = tables.block("remedy-esc", "against", remedy)
+    assert "| minus remedy-none |" in text
+    assert "| all | interventions | 8 | +3.00 |" in text
+    told = json.loads((base / "driven.json").read_text())
+    (base / "driven.json").write_text(json.dumps(told | {"commit": "another"}))
+    text = tables.block("remedy-esc", "against", remedy)
+    assert "| minus matrix-figure8 |" in text
+    assert "| all | interventions | 8 | +2.00 |" in text
+
+
 def test_claims_are_judged_on_the_results(tmp_path):
     text = tables.block("matrix-figure8", "claims", results(tmp_path))
     rows = {line.split("|")[1].strip(): line for line in text.splitlines() if line.startswith("| ")}

@@ -1,4 +1,4 @@
-"""Surfaces from YAML files: what lies on parts of the road."""
+"""Surfaces from YAML and OpenCRG files: what lies on parts of the road."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 import msgspec
 
+from skidpad.campaign.driving.crg import read_crg
 from skidpad.core.errors import ConfigError
 from skidpad.core.reading import decode_yaml, read_bytes
 from skidpad.core.surface import SurfacePatch
@@ -14,7 +15,7 @@ from skidpad.core.told import describe_value, on_a_line
 
 
 def read_surface(path: Path) -> tuple[SurfacePatch, ...]:
-    """Return the patches of a file.
+    """Return the patches of a file; of an OpenCRG one (.crg), the puddles in its hollows.
 
         patches:
           - {name: puddle, water_mm: 2, circle: [12.0, -3.5, 4.0]}             # x, y, radius
@@ -24,6 +25,8 @@ def read_surface(path: Path) -> tuple[SurfacePatch, ...]:
         ConfigError: an unknown field, a value out of its range, or an area that is said twice or not.
         FileError: the file is missing or no YAML.
     """
+    if path.suffix.lower() == ".crg":
+        return read_crg(path)
     plain = decode_yaml(read_bytes(path, str(path)), str(path))
     if not isinstance(plain, dict) or set(plain) != {"patches"}:
         raise ConfigError(

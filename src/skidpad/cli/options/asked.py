@@ -167,7 +167,10 @@ class Tuned(Struct, frozen=True):
     ] = ()
     surface: Annotated[
         Path | None,
-        Meta(description="YAML with puddles, ice, snow or friction of parts of the road."),
+        Meta(
+            description="YAML with puddles, ice, snow or friction of parts of the road, or an OpenCRG "
+            "file whose hollows hold water (extra `crg`)."
+        ),
     ] = None
 
     def resolve(self, run: RunSpec, **more: str | None) -> RunSpec:

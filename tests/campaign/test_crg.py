@@ -1,0 +1,94 @@
+"""OpenCRG surfaces: hollows of a cross section by hand, and puddles of a file where its package is there."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from skidpad.campaign.driving.crg import LEVELS_MM, hollow_depths, puddles, read_crg
+from skidpad.campaign.driving.surfaces import read_surface
+from skidpad.core.errors import ConfigError, FileError, MissingExtra
+
+V = np.linspace(-1.5, 1.5, 61)
+
+
+def rut(depth, at=0.5, half=0.3, fall=0.0):
+    """Heights of a cross section with a trough of a cosine's form and a cross fall."""
+    inside = np.abs(V - at) < half
+    return fall * V - np.where(inside, depth * 0.5 * (1 + np.cos(np.pi * (V - at) / half)), 0.0)
+
+
+def test_a_level_road_with_a_rut_holds_as_much_as_it_is_deep():
+    depth = hollow_depths(rut(0.008))
+    assert depth.max() == pytest.approx(0.008, rel=1e-6)
+    assert V[depth.argmax()] == pytest.approx(0.5)
+    assert not depth[V < 0.19].any()
+
+
+def test_cross_fall_empties_a_rut_to_its_lower_rim():
+    """The flank falls by 0.5 pi 8 mm / 0.3 m = 4.2 % at most: 2 % leave some water, 6 % none.
+
+    On 2 % the rim is 4 mm high and the lowest point 1.2 mm, by hand.
+    """
+    assert hollow_depths(rut(0.008, fall=0.02)).max() == pytest.approx(0.0029, abs=2e-4)
+    assert not hollow_depths(rut(0.008, fall=0.06)).any()
+
+
+def test_a_crown_and_an_even_slope_hold_nothing_and_unknown_heights_neither():
+    assert not hollow_depths(-0.01 * V**2).any()
+    assert not hollow_depths(0.03 * V).any()
+    assert not hollow_depths(np.full(len(V), np.nan)).any()
+    some = rut(0.008)
+    some[V < 0.0] = np.nan
+    assert hollow_depths(some).max() == pytest.approx(0.008, rel=1e-6)
+
+
+class Road:
+    """What is asked of a road of the package: straight on from (10, 20) to the left of the map's x axis."""
+
+    u_start, u_end, v_min, v_max = 0.0, 10.0, -1.5, 1.5
+
+    def uv_to_z(self, u, v):
+        deep = np.where((u > 4.0) & (u < 6.0), 0.0045, 0.0)
+        return -np.where(np.abs(v - 0.5) < 0.3, deep, 0.0)
+
+    def uv_to_xy(self, u, v):
+        return 10.0 - v, 20.0 + u
+
+
+def test_puddles_lie_where_the_hollows_are():
+    (patch,) = puddles(Road(), "rut")
+    assert patch.water_mm == 4.0
+    assert patch.water_mm in LEVELS_MM
+    x, y = np.transpose(patch.polygon)
+    assert (x.min(), x.max()) == pytest.approx((10.0 - 0.8, 10.0 - 0.2), abs=0.06)
+    assert (y.min(), y.max()) == pytest.approx((24.0, 26.0))
+
+
+def test_without_the_package_one_sentence_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyopencrg", None)
+    with pytest.raises(MissingExtra, match="crg"):
+        read_surface(tmp_path / "road.crg")
+
+
+def test_a_file_gives_its_puddles_and_a_bad_one_a_sentence(tmp_path):
+    crg = pytest.importorskip("pyopencrg")
+    u, v = np.arange(0.0, 20.01, 0.1), np.arange(-1.5, 1.51, 0.05)
+    z = np.zeros((len(u), len(v)))
+    z[:, np.abs(v + 0.5) < 0.3] = -0.003
+    road = crg.CrgRoad(z, u_inc=0.1, v=v, heading=np.pi / 2, x_start=100.0, y_start=50.0)
+    road.save(tmp_path / "road.crg")
+    patches = read_surface(tmp_path / "road.crg")
+    assert len(patches) == 10
+    assert {p.water_mm for p in patches} == {2.0}
+    corners = np.concatenate([p.polygon for p in patches])
+    assert corners[:, 0].mean() == pytest.approx(100.5, abs=0.05)
+    assert (corners[:, 1].min(), corners[:, 1].max()) == pytest.approx((50.0, 70.0), abs=0.01)
+    crg.CrgRoad(0.0 * z, u_inc=0.1, v=v).save(tmp_path / "flat.crg")
+    with pytest.raises(ConfigError, match="no hollow"):
+        read_crg(tmp_path / "flat.crg")
+    (tmp_path / "bad.crg").write_text("nothing")
+    with pytest.raises(FileError, match="cannot be read as OpenCRG"):
+        read_crg(tmp_path / "bad.crg")
+    with pytest.raises(FileError):
+        read_crg(tmp_path / "none.crg")

@@ -68,6 +68,7 @@ def convoy(map: RoadMap, travelled: float = 0.0) -> tuple[ActorTable, ActorState
 
 
 def _place(map: RoadMap, ego: LanePoint, distance: float, lanes_right: int) -> LanePoint:
+    """Returns the point `distance` in m ahead, one lane right (1) or left (-1); stays where none is."""
     point = map.ahead(ego, distance) if distance >= 0 else map.behind(ego, -distance)
     point = point or ego
     side = map.right if lanes_right > 0 else map.left
@@ -101,6 +102,7 @@ def run(ticks: int = TICKS, weather: str = "rain-night") -> dict[str, float]:
 def _medians(
     suite: PixelSuite, frames: list[ActorStates], ids: Sequence[str], ticks: int
 ) -> dict[str, float]:
+    """Returns the median processor time in ms of observing and of rendering each camera, by name."""
     lights = dict.fromkeys(suite.scene.static.lamps.signal.tolist(), LightState.RED)
     times: dict[str, list[float]] = {"observe_and_radar": [], **{id: [] for id in ids}}
     for k in range(-2, ticks):
@@ -115,6 +117,7 @@ def _medians(
 
 
 def _cpu_ms(work: Callable[[], object]) -> float:
+    """Returns the processor time in ms that a call takes."""
     begin = process_time_ns()
     work()
     return (process_time_ns() - begin) / 1e6

@@ -78,6 +78,7 @@ def twelve_sensors(
 
 
 def _camera(m: Mounting, bumper_depth_fov_deg: float, display: CaptureSize) -> CameraSpec:
+    """Returns the spec of a published camera mounting, in ISO 8855 axes, for the given capture size."""
     width, height = m.tile if display is CaptureSize.TILE else m.listing
     return CameraSpec(
         id=m.id,

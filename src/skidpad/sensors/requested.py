@@ -136,6 +136,7 @@ class AskedSensors:
         return self._scene
 
     def _reader(self, spec: SensorSpec) -> Measure:
+        """Returns the function that measures with the asked sensor; raises ConfigError where none can."""
         kind = find_sensor_type(spec)
         if kind is None:
             raise ConfigError(f"no sensor like {spec} can be asked for")

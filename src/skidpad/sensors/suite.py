@@ -211,6 +211,7 @@ class PixelSuite:
         }
 
     def _measure(self, tick: int) -> RadarPoints:
+        """Returns the points of the first radar in this tick; empty where there is no radar."""
         if not self.radars:
             return RadarPoints.none()
         return self.radars[0].measure(tick, self._ego, self.scene, EGO)
@@ -239,6 +240,7 @@ class LazyImages(PartialImages):
         return self._suite.render(id, range(first, end))
 
     def _check(self, id: str) -> None:
+        """Raises KeyError for an unknown camera and BackendError for an image of an older tick."""
         if id not in self._suite.cameras:
             raise KeyError(id)
         if self._suite.tick != self._tick:

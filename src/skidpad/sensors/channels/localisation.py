@@ -61,6 +61,7 @@ class Localisation:
         self.jump: Floats = np.zeros(2)
 
     def _sigmas(self) -> Floats:
+        """Returns the standard deviations (3,) of the error in x, y (m) and heading (rad)."""
         e = self.error
         return np.array([e.sigma, e.sigma, e.heading_sigma])
 

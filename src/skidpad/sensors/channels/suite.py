@@ -174,6 +174,7 @@ class ChannelSuite:
         return mask
 
     def _look(self, s: ActorStates) -> None:
+        """Computes from the ego's eye which actors are in sight, around occluders and within range."""
         t = self.table
         self._eye = np.array([s.x[0], s.y[0], s.z[0], s.yaw[0]])
         look(
@@ -257,6 +258,7 @@ def _reach(cfg: ChannelSensing, table: ActorTable, weather: Weather) -> Floats:
 
 
 def _occluders(roadside: Roadside) -> Boxes:
+    """Returns the roadside boxes that are large and tall enough to hide a vehicle."""
     posts = posts_of(roadside)
     keep = (posts.length * posts.width > OCCLUDER_AREA) & (posts.height > EYE_HEIGHT)
     return Boxes(*(a[keep] for a in posts))

@@ -47,6 +47,7 @@ class Sources(NamedTuple):
 
 
 def _stack(parts: Sequence[Sources]) -> Sources:
+    """Returns all light sources of the parts as one table."""
     return Sources(*(np.concatenate(field) for field in zip(*parts, strict=True)))
 
 
@@ -104,6 +105,7 @@ class Lamps:
         )
 
     def _of_signals(self, lights: Mapping[int, LightState], power: float) -> Sources:
+        """Returns the lit lamps of the signal heads as light sources of the given power."""
         lit = [h for h in self._heads if lights.get(h.signal) in SIGNAL]
         place = [int(lights[h.signal]) for h in lit]
         d = np.array([h.lamp_diameter for h in lit], dtype=np.float64)

@@ -44,6 +44,7 @@ def project_corners(view: View, corners: Floats, out: Floats) -> int:
 
 @inner_kernel
 def _turns_left(p: Floats, a: int, b: int, c: int) -> bool:
+    """Returns whether points a, b and c of p (n, 2) make a left turn."""
     return bool(
         (p[b, 0] - p[a, 0]) * (p[c, 1] - p[a, 1]) - (p[b, 1] - p[a, 1]) * (p[c, 0] - p[a, 0]) > 0.0
     )

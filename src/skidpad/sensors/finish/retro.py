@@ -80,6 +80,7 @@ def _send_back(
     key: NDArray[np.int32],
     out: NDArray[np.uint32],
 ) -> None:
+    """Adds to the picture `out` what retroreflective surfaces send back of the ego's own beam."""
     beam, slope, reach = beam_of(light)
     per, beta = np.float32(1.0 / view.focal), np.float32(light.extinction)
     nearest = np.float32(1.0 / FAR)

@@ -112,6 +112,7 @@ class _Cast(NamedTuple):
 
 @inner_kernel
 def _cast_of(bodies: Bodies, i: int, shade: Shade) -> _Cast:
+    """Returns the shadow of body i: its rectangle, the throw along its axes in m and its darkness."""
     c, s = np.cos(bodies.yaw[i]), np.sin(bodies.yaw[i])
     throw = np.hypot(shade.sun_x, shade.sun_y)
     tall = bodies.height[i] * min(1.0, LONGEST / max(bodies.height[i] * throw, 1e-6))
@@ -186,6 +187,7 @@ def _light_at(cast: _Cast, lx: float, ly: float) -> float:
 
 @inner_kernel
 def _dim_pixel(p: np.uint32, light: float) -> np.uint32:
+    """Returns the packed pixel with its light multiplied by `light`."""
     gain = np.float32(np.sqrt(light))  # the picture's bytes are square roots of light
     red, green, blue = unpack(p)
     return pack(red * gain, green * gain, blue * gain)

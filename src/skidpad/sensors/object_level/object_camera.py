@@ -124,6 +124,7 @@ def see_boxes(
 
 @inner_kernel
 def _camera(seat: Mount, focal: float, width: int, height: int) -> Camera:
+    """Returns the camera at its mount in the world, of width by height pixels and focal length in pixels."""
     o, r = seat.origin, seat.rotation
     forward, left = Axis(r[0, 0], r[1, 0], r[2, 0]), Axis(r[0, 1], r[1, 1], r[2, 1])
     up = Axis(r[0, 2], r[1, 2], r[2, 2])

@@ -97,6 +97,7 @@ class RadarScratch(NamedTuple):
 
 
 def _make_near(n: int) -> NearBoxes:
+    """Returns uninitialised arrays for n boxes near the radar."""
     x, y, z, cos, sin = np.empty((5, n))
     return NearBoxes(np.empty(n, np.int64), x, y, z, cos, sin, np.empty((n, 3)), np.empty(n))
 

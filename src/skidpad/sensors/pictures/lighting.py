@@ -91,9 +91,11 @@ NIGHT_ZENITH, NIGHT_HORIZON = np.array([0.002, 0.003, 0.008]), np.array([0.010, 
 
 
 def _mix(a: NDArray[np.float64], b: NDArray[np.float64], share: float) -> NDArray[np.float64]:
+    """Returns the colour at the share 0..1 from a to b."""
     return a + share * (b - a)
 
 
 def _smooth(t: float) -> float:
+    """Returns the smoothstep of t, 0 below 0 and 1 above 1."""
     t = min(max(t, 0.0), 1.0)
     return t * t * (3.0 - 2.0 * t)

@@ -189,6 +189,7 @@ def _meet_block(
     rays: Rays,
     hits: Hits,
 ) -> None:
+    """Intersects the rays with `count` triangles of a block, clipped at the near plane, and updates hits."""
     screen, code = scratch.screen, scratch.code
     corners = np.empty((3, 3))
     for t in range(first, first + count):

@@ -100,6 +100,7 @@ def _cabin(
 
 
 def _wheels(label: int, axles: Sequence[float], half: float, radius: float, breadth: float) -> Mesh:
+    """Returns the mesh of a pair of wheels and their rims at each axle's x in m."""
     parts = []
     for x in axles:
         for s in (-1.0, 1.0):
@@ -135,6 +136,7 @@ def _lamps(label: int, length: float, width: float, z: float, size: tuple[float,
 
 
 def _car(label: int, length: float, width: float, height: float) -> Mesh:
+    """Returns the mesh of a car within its box in m, with cabin, wheels, lamps and a rear plate."""
     h, half = length / 2, width / 2
     e = 0.004  # the lamps stand this far out of the hull, and fill the box
     low, waist = 0.13 * height, 0.58 * height
@@ -176,6 +178,7 @@ def _car(label: int, length: float, width: float, height: float) -> Mesh:
 
 
 def _van(label: int, length: float, width: float, height: float) -> Mesh:
+    """Returns the mesh of a van within its box in m."""
     h, half = length / 2, width / 2
     e = 0.004
     hull = _hull(
@@ -234,6 +237,7 @@ def _side_windows(
 
 
 def _truck(label: int, length: float, width: float, height: float) -> Mesh:
+    """Returns the mesh of a truck with cab and cargo box, within its box in m."""
     h, half = length / 2, width / 2
     cab = h - min(2.2, 0.35 * length)
     floor, wheel = 0.30 * height, min(0.5, 0.14 * height)
@@ -268,6 +272,7 @@ def _truck(label: int, length: float, width: float, height: float) -> Mesh:
 
 
 def _bus(label: int, length: float, width: float, height: float) -> Mesh:
+    """Returns the mesh of a bus within its box in m."""
     h, half = length / 2, width / 2
     parts = [
         box(
@@ -299,6 +304,7 @@ def _bus(label: int, length: float, width: float, height: float) -> Mesh:
 
 
 def _rider(half: float, seat: float, height: float) -> Mesh:
+    """Returns the mesh of a rider from the seat up to `height` in m, `half` in m to either side."""
     label = int(SemanticClass.RIDER)
     shoulder = height - 0.30
     return merge(
@@ -313,6 +319,7 @@ def _rider(half: float, seat: float, height: float) -> Mesh:
 
 
 def _two_wheeler(label: int, length: float, width: float, height: float) -> Mesh:
+    """Returns the mesh of a motorcycle or bicycle with its rider, within its box in m."""
     h = length / 2
     wheel = min(0.34, 0.4 * h)
     motorcycle = label == SemanticClass.MOTORCYCLE
@@ -333,6 +340,7 @@ def _two_wheeler(label: int, length: float, width: float, height: float) -> Mesh
 
 
 def _pedestrian(label: int, length: float, width: float, height: float) -> Mesh:
+    """Returns the mesh of a standing pedestrian within its box in m."""
     a, b = length / 2, width / 2
     hip, neck = 0.48 * height, 0.83 * height
     return merge(
@@ -349,5 +357,6 @@ def _pedestrian(label: int, length: float, width: float, height: float) -> Mesh:
 
 
 def _prop(label: int, length: float, width: float, height: float) -> Mesh:
+    """Returns the mesh of a plain box in m, standing on the ground."""
     half = (length / 2, width / 2)
     return box((-half[0], half[0]), (-half[1], half[1]), (0.0, height), label, Material.PAINT)

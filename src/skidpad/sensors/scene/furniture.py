@@ -49,6 +49,7 @@ def furniture_pieces(roadside: Roadside, box_material: dict[tuple[int, int, int]
 
 
 def _barrier(barrier: Barrier) -> Pieces:
+    """Yields (cell, meshes by level of detail) for each chunk of a barrier."""
     points = _resample_polyline(np.asarray(barrier.points, dtype=np.float64), CHORDS[0])
     per_chunk = int(CHUNK / CHORDS[0])
     label, material = BARRIER_LOOK[barrier.kind]
@@ -75,6 +76,7 @@ def _resample_polyline(points: Points, step: float) -> Points:
 
 
 def _barrier_mesh(barrier: Barrier, foot: Points, label: int, material: int) -> Mesh:
+    """Returns a barrier's mesh along its foot points (n, 3): a rail, a fence or a wall."""
     top: Points = np.add(foot, (0.0, 0.0, barrier.height))
     if barrier.kind is BarrierKind.GUARDRAIL:
         return ribbon(top, top - (0.0, 0.0, min(RAIL_DEPTH, barrier.height)), label, material)
@@ -93,6 +95,7 @@ def _barrier_mesh(barrier: Barrier, foot: Points, label: int, material: int) -> 
 
 
 def _post(foot: Points, height: float) -> Mesh:
+    """Returns the mesh of a guard rail's post at its foot point in m."""
     x, y, z = foot
     return box(
         (x - POST, x + POST),
@@ -122,6 +125,7 @@ def _facing(head: SignalHead, mesh: Mesh) -> Mesh:
 
 
 def _housing(head: SignalHead) -> Mesh:
+    """Returns the mesh of the housing of a signal head."""
     d = head.lamp_diameter
     body = box(
         (-0.6 * d, 0.0),

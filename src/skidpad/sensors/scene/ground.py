@@ -44,6 +44,7 @@ def _bulge(tile: Heights) -> float:
 
 
 def _tile(height: Heights, x0: float, y0: float, i: int, j: int, stride: int) -> Mesh:
+    """Returns the mesh of one tile of terrain, every `stride` cells a vertex."""
     at = np.arange(0, COARSE + 1, stride)
     a, b = np.meshgrid(i + at, j + at, indexing="ij")
     vertices = np.stack([x0 + a * CELL, y0 + b * CELL, height[a, b]], axis=-1).reshape(-1, 3)

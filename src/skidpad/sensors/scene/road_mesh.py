@@ -75,6 +75,7 @@ def road_pieces(samples: LaneSamples, lanes: LaneTable) -> Iterator[tuple[ChunkK
 
 
 def _edges(samples: LaneSamples, lanes: LaneTable, lane: int) -> Edges | None:
+    """Returns a lane's edges in the direction of the road; None for a lane narrower than MIN_WIDTH."""
     first, size = int(lanes.first[lane]), int(lanes.size[lane])
     part = slice(first, first + size)
     if samples.width[part].max() < MIN_WIDTH:
@@ -98,6 +99,7 @@ def _edges(samples: LaneSamples, lanes: LaneTable, lane: int) -> Edges | None:
 
 
 def _cut_edges(edges: Edges, part: slice) -> Edges:
+    """Returns the edges cut to a slice of their stations."""
     return Edges._make(field[part] for field in edges)
 
 
@@ -123,6 +125,7 @@ def _stations(s: NDArray[np.float64], chord: float) -> NDArray[np.intp]:
 
 
 def _levels(piece: Edges, lanes: LaneTable, lane: int, outer: NDArray[np.bool_]) -> list[Mesh]:
+    """Returns the meshes of a piece of lane by level of detail, with kerbs, skirts and edge lines."""
     kind = LaneKind(int(lanes.kind[lane]))
     label, material = SURFACE[kind]
     ground = piece
@@ -172,6 +175,7 @@ def _kerb(piece: Edges, at: NDArray[np.intp], side: int, inside: bool) -> list[M
 
 
 def _skirt(piece: Edges, at: NDArray[np.intp], side: int) -> Mesh:
+    """Returns the mesh of the embankment that falls from an outer edge into the terrain."""
     edge = (piece.left, piece.right)[side][at]
     out = edge + piece.normal[at] * (SKIRT_WIDTH if side == 0 else -SKIRT_WIDTH)
     out[:, 2] = edge[:, 2] - SKIRT_DROP

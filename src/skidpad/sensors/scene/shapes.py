@@ -29,6 +29,8 @@ def shape_levels(thing: Box, material: int) -> list[Mesh]:
 
 
 def _post(thing: Box, material: int) -> list[Mesh]:
+    """Returns the meshes of an elliptic post by level of detail."""
+
     def one(level: int) -> Mesh:
         rings = np.stack([_ring(thing, SIDES[level], z) for z in (0.0, thing.height)])
         return loft(rings, thing.label, material)
@@ -37,6 +39,7 @@ def _post(thing: Box, material: int) -> list[Mesh]:
 
 
 def _ring(thing: Box, sides: int, z: float, share: float = 1.0) -> Points:
+    """Returns the points (sides, 3) in m of an ellipse in the thing's box at height z, scaled by share."""
     angle = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides
     x = 0.5 * thing.length * share * np.cos(angle)
     y = 0.5 * thing.width * share * np.sin(angle)
@@ -96,6 +99,7 @@ def _cone(thing: Box, material: int) -> list[Mesh]:
 
 
 def _lamp(thing: Box, material: int) -> list[Mesh]:
+    """Returns the meshes of a lamp head by level of detail: a lid above a bright pane."""
     a, b, h = thing.length / 2, thing.width / 2, thing.height
     lid = box((-a, a), (-b, b), (0.4 * h, h), thing.label, material)
     pane = box(
@@ -128,14 +132,17 @@ def _lump(thing: Box, material: int, step: float, rough: float) -> list[Mesh]:
 
 
 def _hedge(thing: Box, material: int) -> list[Mesh]:
+    """Returns the meshes of a hedge by level of detail."""
     return _lump(thing, material, 1.2, 0.18)
 
 
 def _wood(thing: Box, material: int) -> list[Mesh]:
+    """Returns the meshes of a row of trees by level of detail."""
     return _lump(thing, material, 3.2, 0.5)
 
 
 def _shelter(thing: Box, material: int) -> list[Mesh]:
+    """Returns the meshes of a bus shelter by level of detail: roof, back, posts and bench."""
     a, b, h = thing.length / 2, thing.width / 2, thing.height
     roof = box((-a, a), (-b, b), (h - 0.12, h), thing.label, Material.TRIM)
     back = box((-a, a), (-0.04, 0.04), (0.3, h - 0.2), thing.label, material)
@@ -148,12 +155,14 @@ def _shelter(thing: Box, material: int) -> list[Mesh]:
 
 
 def _car(thing: Box, material: int) -> list[Mesh]:
+    """Returns the meshes of a parked car by level of detail, painted with the material."""
     body = body_mesh(ActorKind.CAR, thing.length, thing.width, thing.height)
     painted = np.where(body.material == Material.PAINT, np.uint8(material), body.material)
     return [body._replace(material=painted.astype(np.uint8))] * LEVELS
 
 
 def _fence(thing: Box, material: int) -> list[Mesh]:
+    """Returns the meshes of a rail fence by level of detail; the far ones are one band."""
     a, h, label = thing.length / 2, thing.height, SemanticClass.FENCE
     ends = np.array([[-a, 0.0, 0.0], [a, 0.0, 0.0]])
 

@@ -138,6 +138,7 @@ def pixel_key(mesh: Mesh) -> Ints:
 
 
 def _spheres(blocks: list[list[Mesh]]) -> tuple[Floats, Floats]:
+    """Returns centres (n, 3) and radii (n,) in m of spheres that enclose each block."""
     centre = np.empty((len(blocks), 3))
     radius = np.empty(len(blocks))
     for i, levels in enumerate(blocks):

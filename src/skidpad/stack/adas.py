@@ -233,6 +233,7 @@ class AdasStack:
         return s._replace(lead=None), sight._replace(distance=None)
 
     def _steer(self, frame: SensorFrame, v: float, view: LaneView) -> float:
+        """Returns the smoothed steering command in -1..1 that follows the lane at v in m/s."""
         command = self.steering.steer(
             frame.ego.pose, v, lambda d, heading: self.tracker.ahead(view, d, heading)
         )
@@ -247,6 +248,7 @@ class AdasStack:
         light: LightReading,
         hsv: LightState | None,
     ) -> StackReport:
+        """Returns the report of this tick: detections, tier, target speed, light and lane."""
         radar = sight.radar
         return StackReport(
             status=sight.status,
@@ -275,6 +277,7 @@ class AdasStack:
 
 
 def _lead(sight: Sight, v: float) -> Lead | None:
+    """Returns the lead with its distance in m and time gap in s; None where nothing is detected."""
     if sight.distance is None:
         return None
     confirmed = sight.confirmed or sight.status is DetectionStatus.RADAR_ACTIVE

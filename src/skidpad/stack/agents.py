@@ -153,6 +153,7 @@ class AgentStack:
         give(gps, world)
 
     def _reading(self, wanted: Mapping[str, Any], frame: SensorFrame) -> Any:
+        """Returns the data of one wanted sensor in CARLA's units and axes, as the Leaderboard hands them."""
         kind, ego = _kind(wanted), frame.ego
         if kind == GNSS:
             place = _gps(ego.pose)
@@ -179,6 +180,7 @@ def _instance(kind: type[Any]) -> Any:
 
 
 def _kind(wanted: Mapping[str, Any]) -> str:
+    """Returns the sensor type that an agent asks for; raises StackError for an unknown one."""
     kind = str(wanted.get("type", ""))
     if kind not in KINDS:
         known = ", ".join(KINDS)

@@ -49,6 +49,7 @@ class FunctionType:
 
 
 def _own_functions() -> tuple[FunctionType, ...]:
+    """Returns the driving functions that Skidpad itself registers."""
     titles = {
         Function.ACC: "ACC",
         Function.LCA: "lane centring",

@@ -74,6 +74,7 @@ def _kept_home() -> Iterator[None]:
 
 
 def _from_file(path: Path, what: str) -> ModuleType:
+    """Returns the module in a .py file, imported under a name of its own; raises an error if that fails."""
     if not path.is_file():
         raise FileError(f"{what} file {str(path)!r} does not exist")
     name = f"skidpad_user_{what}_{path.stem}"
@@ -92,6 +93,7 @@ def _from_file(path: Path, what: str) -> ModuleType:
 
 
 def _from_module(name: str, what: str) -> ModuleType:
+    """Returns the module of that name; raises ConfigError where its import fails."""
     try:
         return import_module(name)
     except FOREIGN as error:  # an import runs foreign code: anything can happen
@@ -210,11 +212,13 @@ def _has_added(settings: Mapping[str, Any]) -> bool:
 
 
 def _sensors_of(stack: Stack) -> tuple[Any, ...]:
+    """Returns the sensors that the stack asks for; empty where it has no method `sensors`."""
     ask = getattr(stack, "sensors", None)
     return () if ask is None else tuple(ask())
 
 
 def _folder() -> str:
+    """Returns the working directory; empty text where it was removed."""
     try:
         return os.getcwd()
     except OSError:  # it was removed
@@ -222,11 +226,13 @@ def _folder() -> str:
 
 
 def _enter(folder: str) -> None:
+    """Changes the working directory; does nothing where that fails."""
     with suppress(OSError):
         os.chdir(folder)
 
 
 def _check(name: str, command: VehicleCommand, tick: int) -> None:
+    """Raises StackError for a command out of range: throttle and brake 0..1, steer -1..1, two switches."""
     ranges: tuple[tuple[str, Any, float], ...] = (
         ("throttle", command.throttle, 0.0),
         ("brake", command.brake, 0.0),
@@ -248,6 +254,7 @@ def _check(name: str, command: VehicleCommand, tick: int) -> None:
 
 
 def _is_number(value: Any) -> bool:
+    """Returns whether the value is a real number."""
     return isinstance(value, Real)
 
 
@@ -266,6 +273,7 @@ def _check_report(name: str, report: StackReport, tick: int) -> None:
 
 
 def _check_sensors(name: str, wanted: Sequence[SensorSpec], taken: Collection[str]) -> None:
+    """Raises StackError for a wanted sensor of unknown kind or with an id that is taken."""
     for k, spec in enumerate(wanted):
         kind = find_sensor_type(spec)
         if kind is None and isinstance(spec, PointSensorSpec):

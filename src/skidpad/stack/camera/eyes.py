@@ -23,6 +23,7 @@ LEFT_ID, CENTRE_ID, RIGHT_ID = "camera/left", "camera/centre", "camera/right"
 
 
 def _camera(id: str, size: tuple[int, int], fov_deg: float, yaw_deg: float) -> CameraSpec:
+    """Returns the spec of an RGB camera at the common mount, turned by `yaw_deg`."""
     mount = Pose(AHEAD, 0.0, HEIGHT_ABOVE_ROAD, 0.0, radians(TILT_DEG), radians(yaw_deg))
     return CameraSpec(id, Modality.RGB, *size, fov_deg, mount)
 

@@ -17,6 +17,7 @@ WEIGHTS = "weights.onnx"
 
 @cache
 def _network() -> Any:
+    """Returns the lane network, loaded once from its weights."""
     cv2.setNumThreads(1)  # decision X-10; also the order of sums
     with as_file(files("skidpad.stack.camera") / WEIGHTS) as path:
         return cv2.dnn.readNetFromONNX(str(path))

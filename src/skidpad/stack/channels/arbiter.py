@@ -114,6 +114,7 @@ class Arbiter:
     def _choose_channel(
         self, able: Sequence[int], scores: Sequence[float], progress: Sequence[float]
     ) -> Choice:
+        """Returns the channel to drive with and why; None stands for a minimal risk manoeuvre or silence."""
         s = self.settings
         if not able:
             return Choice(None, Reason.ALL_SILENT)
@@ -132,6 +133,7 @@ class Arbiter:
         return Choice(best, Reason.SAFER)
 
     def _among_safe(self, safe: Sequence[int], progress: Sequence[float]) -> Choice:
+        """Returns the preferred channel if it is safe, else the safe one with most progress."""
         s = self.settings
         if s.preferred is not None and self.channels.index(s.preferred) in safe:
             return Choice(self.channels.index(s.preferred), Reason.PREFERRED)

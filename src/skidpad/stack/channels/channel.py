@@ -117,6 +117,7 @@ class Channel:
         sizes: Floats,
         predictions: Floats,
     ) -> Floats:
+        """Returns the plan (n, 3) from the ego on along the route, slowed by blocks and stops."""
         c, v = self.settings, float(view.ego[3])
         blocks = find_blocks(
             self.route.points, self.at, v, objects, sizes, predictions, self._times, self._params
@@ -162,6 +163,7 @@ class Channel:
     def _must_stop(
         self, line: Line, gap: float, view: ChannelView, objects: Floats, v: float
     ) -> bool:
+        """Returns whether the ego must stop before a line `gap` in m ahead, by light or by right of way."""
         if line.kind is SignalKind.LIGHT:
             if not self.settings.reads_lights:
                 return False

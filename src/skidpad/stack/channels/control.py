@@ -61,6 +61,7 @@ class Controller:
         return min(max(angle / car.steer_max, -1.0), 1.0)
 
     def _pedals(self, v: float, a: float, steer: float) -> VehicleCommand:
+        """Returns the command for an acceleration a in m/s^2 at v in m/s, trimmed by the measured one."""
         if v < V_STANDING and a <= 0.05:
             self.trim, self.v_before = 0.0, None
             return VehicleCommand(brake=BRAKE_STANDING, steer=steer)

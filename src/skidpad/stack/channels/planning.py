@@ -175,6 +175,7 @@ def roll_out(
 
 @inner_kernel
 def _point(path: PathPoints, at: int, s: float, offset: float, out: Floats) -> None:
+    """Writes x and y in m of the path `s` samples beyond `at`, at an offset that fades, into `out`."""
     j = min(at + int(s), path.x.size - 2)
     u = min(max(at + s - j, 0.0), 1.0)
     h = path.heading[j] + u * (path.heading[j + 1] - path.heading[j])

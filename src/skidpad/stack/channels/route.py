@@ -84,6 +84,7 @@ def route_path(map: RoadMap, lanes: Sequence[int], s_start: float = 0.0) -> Rout
 
 
 def _lines(map: RoadMap, lane: int, start: float) -> list[Line]:
+    """Returns the stop lines of lights, stop and yield signs on a lane that begins at `start` in m."""
     table = map.signals
     kinds = (SignalKind.LIGHT, SignalKind.STOP, SignalKind.YIELD)
     return [

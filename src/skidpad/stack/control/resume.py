@@ -65,6 +65,7 @@ class SpeedCaps:
         self.scope = scope
 
     def _resume(self, resume_active: bool) -> float:
+        """Returns the speed cap in km/h while resuming; inf where there is none."""
         return RESUME_KMH if self.resumes and resume_active else inf
 
     def cruise_kmh(self, resume_active: bool) -> float:

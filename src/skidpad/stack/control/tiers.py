@@ -250,6 +250,7 @@ class Following:
         return request._replace(throttle=0.0) if s.v_kmh > s.follow_cap_kmh else request
 
     def _by_distance(self, s: Situation, lead: Lead) -> Request:
+        """Returns throttle and brake that regulate the distance to TARGET_GAP in s of the own speed."""
         u = self.pid.update(lead.distance - TARGET_GAP * s.v)
         return zones(lead.gap)._replace(throttle=max(u, 0.0), brake=max(-u, 0.0))
 
@@ -278,6 +279,7 @@ class LightStop:
         return Request(Tier.LIGHT_STOP, brake=self._brake(s.v, v_required))
 
     def _brake(self, v: float, v_required: float) -> float:
+        """Returns the brake in 0..1 for a speed v that should be v_required, both in m/s."""
         if self.by_pid:
             return abs(self.pid.update((v_required - v) * 3.6))
         return clip((v - v_required) / LINE_BRAKE_SPAN, LINE_BRAKE_MIN, 1.0)

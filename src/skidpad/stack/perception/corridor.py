@@ -69,6 +69,7 @@ def in_corridor(z: float, u: float, c: Corridor, sin_yaw: float, kappa: float) -
 
 @inner_kernel
 def _is_one(label: np.uint8, first: np.uint8, count: np.uint8) -> bool:
+    """Returns whether the label is one of the `count` labels from `first` on."""
     return bool(np.uint8(label - first) < count)
 
 
@@ -101,6 +102,7 @@ def _found_in_row(
 
 @inner_kernel
 def _count_beside(labels: NDArray[np.uint8], c: Corridor, col_first: int, col_end: int) -> int:
+    """Returns how many wanted pixels the corridor's rows have in col_first <= column < col_end."""
     count = 0
     for row in range(c.row_first, c.row_end):
         count += _found_in_row(labels, row, col_first, col_end, c.wanted)

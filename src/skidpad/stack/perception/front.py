@@ -139,6 +139,7 @@ class Front:
 
 
 def _radar(map: RoadMap, settings: StackSettings) -> Radar:
+    """Returns the radar evaluation for the corridor and the candidates that the settings choose."""
     nearest_only = settings.radar_candidates is RadarCandidates.NEAREST
     if settings.radar_corridor is RadarCorridor.PARABOLA:
         return Radar(AnyPoint(), PARABOLA_HALF_WIDTH, nearest_only)

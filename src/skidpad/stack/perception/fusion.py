@@ -47,6 +47,7 @@ VERIFY_TOLERANCE = 2.0  # m between a pixel and the reported distance (A-065)
 
 
 def _rows(height: int, share: tuple[float, float]) -> tuple[int, int]:
+    """Returns the pixel rows that belong to two shares 0..1 of the image height."""
     return round(height * share[0]), round(height * share[1])
 
 
@@ -112,6 +113,7 @@ class CameraPair:
     def _pair(
         self, images: Mapping[str, CameraImage]
     ) -> tuple[NDArray[np.float32], NDArray[np.uint8]] | None:
+        """Returns inverse depth and labels of the read rows; None where either image is missing."""
         rows = self.keep.row_first, self.keep.row_end
         depth = image_rows(images, self.depth_id, rows)
         semantic = image_rows(images, self.semantic_id, rows)

@@ -75,6 +75,7 @@ def _has_lamp(
     shape: tuple[int, int],
     hues: tuple[tuple[int, int], ...],
 ) -> bool:
+    """Returns whether the pixels within the hues form a blob of a lamp's size and shape."""
     chosen: Any = np.zeros(len(places), dtype=np.uint8)
     for low, high in hues:
         chosen |= cv2.inRange(hsv, (low, MIN_SATURATION, MIN_VALUE), (high, 255, 255))[0]
@@ -86,6 +87,7 @@ def _has_lamp(
 
 
 def _is_lamp(contour: Any) -> bool:
+    """Returns whether a contour's area in px^2 and aspect ratio are those of a lamp."""
     _, _, width, height = cv2.boundingRect(contour)
     area = cv2.contourArea(contour)
     return AREAS[0] <= area <= AREAS[1] and ASPECTS[0] <= width / height <= ASPECTS[1]

@@ -83,6 +83,7 @@ class LightScan:
     def _triggering_light(
         self, ego: LanePoint, states: Mapping[int, LightState]
     ) -> LightReading | None:
+        """Returns the reading of a light, not green, at the ego on its own lane; None where there is none."""
         for line in self.lines.get(ego.lane, ()):
             distance = line.s - ego.s
             state = states.get(line.signal, LightState.UNKNOWN)
@@ -95,6 +96,7 @@ class LightScan:
     def _walk(
         self, pose: Pose, v: float, ego: LanePoint, states: Mapping[int, LightState]
     ) -> LightReading:
+        """Returns the first light ahead along the lanes within the scan distance; NO_LIGHT where none is."""
         reach = scan_distance(v)
         here, start = ego, -ego.s  # start: of lane `here`, m from the ego
         for _ in range(MAX_LANES):
@@ -113,6 +115,7 @@ class LightScan:
 
 
 def _is_ahead(pose: Pose, line: StopLine) -> bool:
+    """Returns whether a stop line lies ahead of the pose within the angle of COS_AHEAD."""
     dx, dy = line.x - pose.x, line.y - pose.y
     return dx * cos(pose.yaw) + dy * sin(pose.yaw) > COS_AHEAD * hypot(dx, dy)
 
@@ -155,6 +158,7 @@ class StopLock:
         return StopRequest(self.remaining) if self.signal is not None else None
 
     def _demands(self, light: LightReading, v: float, hsv: LightState | None) -> bool:
+        """Returns whether the light demands a stop at v in m/s: red, or yellow with room to brake."""
         if self.hsv_required and hsv is not light.state:
             return False
         if light.state is LightState.RED:

@@ -85,6 +85,7 @@ class Persistence:
         self.was_stopping = stopping
 
     def _detect(self, fused: float | None, bumper: float | None, radar: RadarReading) -> Detection:
+        """Returns the detection of this tick: fused, held for some ticks, or by radar alone."""
         if fused is not None and fused < self.gate:
             self.seen_ticks += 1
             self.missed_ticks = 0
@@ -98,11 +99,13 @@ class Persistence:
         return self._radar_fallback(bumper, radar)
 
     def _window(self) -> int:
+        """Returns how many ticks a missed detection is held, by what the ego was doing."""
         if self.was_stopping:
             return self.hold_stopping
         return self.hold_following if self.was_following else self.hold_short
 
     def _radar_active(self, radar: RadarReading) -> Detection:
+        """Returns the detection by radar alone; its distance is None for a rejected point that counts."""
         if radar.lane is not None:
             return Detection(DetectionStatus.RADAR_ACTIVE, radar.lane)
         if radar.pre is not None and self.rejected_stays_active:
@@ -110,6 +113,7 @@ class Persistence:
         return NOTHING_DETECTED
 
     def _radar_fallback(self, bumper: float | None, radar: RadarReading) -> Detection:
+        """Returns the detection by radar after a loss; a near one needs the bumper camera, if so set."""
         near = radar.lane is not None and radar.lane <= RADAR_ALONE_ABOVE
         if near and self.close_check is RadarCloseCheck.BUMPER:
             if bumper is None or bumper >= RADAR_ALONE_ABOVE:
@@ -118,6 +122,7 @@ class Persistence:
         return self._radar_active(radar)
 
     def _safety_holds(self) -> bool:
+        """Returns whether a close lead that was followed is held beyond the usual window."""
         return (
             self.safety_persist
             and self.was_following

@@ -161,6 +161,7 @@ def _onto_highway(
 
 @inner_kernel
 def _is_same(a: LaneArrays, one: int, other: int) -> bool:
+    """Returns whether two lane indices have the same road and lane id."""
     return bool(a.road[one] == a.road[other] and a.lane_id[one] == a.lane_id[other])
 
 

@@ -99,6 +99,7 @@ def sight_speed(road: RoadLook, visibility: float, reaction: float, fastest: flo
 
 
 def _stops(road: RoadLook, visibility: float, reaction: float, v: float) -> bool:
+    """Returns whether a driver at v in m/s can stop within what can be recognised ahead."""
     recognised = min(visibility, sqrt(CAR_WIDTH * v / LOOMING))
     b = FIRM_SHARE * G * believed_friction(road, v)
     return v * reaction + v * v / (2.0 * b) + STOP_MARGIN <= max(recognised, STOP_MARGIN + 1.0)

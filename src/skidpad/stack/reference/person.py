@@ -51,4 +51,5 @@ def person_of(seed: int) -> Person:
 
 
 def _within(value: float, bounds: tuple[float, float]) -> float:
+    """Returns the value clipped to its bounds (low, high)."""
     return min(max(value, bounds[0]), bounds[1])

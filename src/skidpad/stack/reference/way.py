@@ -79,6 +79,7 @@ class Way:
         return self.map.project(pose.x, pose.y, pose.z)
 
     def _lanes(self, start: LanePoint) -> list[int]:
+        """Returns the lanes ahead from a start, straight on, until LENGTH in m is known."""
         lanes, known = [start.lane], float(self.map.lanes.length[start.lane]) - start.s
         while known < LENGTH:
             length = float(self.map.lanes.length[lanes[-1]])
@@ -90,6 +91,7 @@ class Way:
         return lanes
 
     def _place(self, pose: Pose, near: int) -> Place:
+        """Returns the ego's place on the path: row, distance along it in m and offset in m."""
         p = self.path.points
         at, offset = locate(p, pose.x, pose.y, near, NEAR)
         self.at, h = int(at), float(p.heading[at])

@@ -168,6 +168,7 @@ def _others(
 
 
 def _take_rows(track: Track, begin: int, end: int) -> Track:
+    """Returns the track from moment `begin` up to, but without, moment `end`."""
     x, y, yaw, present = track.x, track.y, track.yaw, track.present
     part = slice(begin, end)
     return Track(x[part], y[part], yaw[part], present[part], track.length, track.width)

@@ -38,6 +38,7 @@ class ExportedHazard:
             )
 
     def _objects(self) -> list[Element]:
+        """Returns the elements of all scenario objects of the file."""
         return self.root.findall("Entities/ScenarioObject")
 
     def keep_one_world(self) -> None:
@@ -56,6 +57,7 @@ class ExportedHazard:
             raise FileError(f"{self.source}: has no other road user that could be met")
 
     def _take_out(self, name: str) -> None:
+        """Removes the Init actions and the manoeuvre groups of an entity."""
         actions = self.root.find("Storyboard/Init/Actions")
         assert actions is not None
         for part in list(actions):
@@ -67,6 +69,7 @@ class ExportedHazard:
                     act.remove(group)
 
     def _group(self, name: str) -> Element | None:
+        """Returns the manoeuvre group of an entity; None where it has none."""
         path = f".//ManeuverGroup/Actors/EntityRef[@entityRef='{name}']/../.."
         return self.root.find(path)
 
@@ -95,6 +98,7 @@ class ExportedHazard:
         return tuple(Variable(name, law) for name, law in laws.items()), values
 
     def _first_speed(self) -> float:
+        """Returns the ego's initial speed in m/s, at least 0; 0.0 where the file gives none."""
         one = self.root.find(f"Storyboard/Init/Actions/Private[@entityRef='{self.ego}']")
         target = None if one is None else one.find(".//AbsoluteTargetSpeed")
         return 0.0 if target is None else max(float(target.attrib["value"]), 0.0)
@@ -110,6 +114,7 @@ class ExportedHazard:
         return nearest
 
     def _declare(self, values: dict[str, float]) -> None:
+        """Declares the parameters with their values, and sets the file's version to 1.2."""
         header = self.root.find("FileHeader")
         declared = self.root.find("ParameterDeclarations")
         assert header is not None
@@ -123,6 +128,7 @@ class ExportedHazard:
             )  # fmt: skip
 
     def _use(self, x: float, y: float, h: float) -> None:
+        """Makes the ego's place, its speeds and the others' times depend on the declared parameters."""
         ego = next(o for o in self._objects() if o.attrib["name"] == self.ego)
         properties = ego.find(".//Properties")
         assert properties is not None
@@ -148,11 +154,13 @@ class ExportedHazard:
 
 
 def _property(thing: Element, name: str) -> str:
+    """Returns the value of a property of an object; empty text where it has none."""
     found = thing.find(f".//Property[@name='{name}']")
     return "" if found is None else found.get("value", "")
 
 
 def _vertices(group: Element) -> Iterator[tuple[float, float, float, float]]:
+    """Yields (time in s, x, y in m, heading in rad) of each vertex of a manoeuvre group."""
     for vertex in group.iter("Vertex"):
         place: Any = vertex.find(".//WorldPosition")
         if place is not None:

@@ -51,6 +51,7 @@ def read_exposure(path: Path) -> Exposure:
 
 
 def _mapping(value: Any, where: str, keys: tuple[str, ...] | None) -> dict[str, Any]:
+    """Returns a mapping with text keys; raises ConfigError for another type or an unknown key."""
     if not isinstance(value, dict):
         raise ConfigError(f"{where} must be a mapping, got {describe_value(value, 100)}")
     unknown = [str(k) for k in value if keys is not None and k not in keys]
@@ -60,6 +61,7 @@ def _mapping(value: Any, where: str, keys: tuple[str, ...] | None) -> dict[str, 
 
 
 def _variable(name: str, value: Any, where: str) -> Variable:
+    """Returns the variable of an exposure file: name, law and source."""
     fields = _mapping(value, where, ("law", "source"))
     if not isinstance(fields.get("law"), str):
         raise ConfigError(f'{where}: law must be a text such as "normal(3,1,0:8)"')
@@ -71,6 +73,7 @@ def _variable(name: str, value: Any, where: str) -> Variable:
 
 
 def _rate(value: Any, where: str) -> Rate | None:
+    """Returns a rate above 0 with its source; None for a value of None."""
     if value is None:
         return None
     fields = _mapping(value, where, ("value", "source"))

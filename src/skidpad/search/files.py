@@ -41,6 +41,7 @@ def read_space(file: Path) -> tuple[Path, Space]:
 
 
 def _law(node: Node) -> Law:
+    """Returns the law of a distribution node; raises an error for a kind that is not supported."""
     if node.tag == "DistributionSet":
         return Choice(tuple(e.text("value") for e in node.children("Element")))
     if node.tag == "ProbabilityDistributionSet":

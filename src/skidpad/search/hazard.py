@@ -120,6 +120,7 @@ def choose_record(source: Path, id: str | None) -> HazardRecord:
 
 
 def _read_one(file: Path) -> HazardRecord:
+    """Returns the record of a hazard in a file; raises FileError where it holds none."""
     try:
         return decode_record(
             read_bytes(file, "the record of a hazard", RECORD_LIMIT).decode("ascii")
@@ -150,6 +151,7 @@ def _centre_lane(road: Path) -> None:
 
 
 def _write_scene(source: Path, title: str, folder: Path, is_road_known: bool = False) -> Scene:
+    """Writes the recorded and the varied scenario of an exported hazard and returns them as a scene."""
     root = ElementTree.parse(source).getroot()
     found = ExportedHazard(root, source)
     found.keep_one_world()
@@ -171,6 +173,7 @@ def _write_scene(source: Path, title: str, folder: Path, is_road_known: bool = F
 
 
 def _write(path: Path, root: ElementTree.Element) -> None:
+    """Writes an XML tree to a file in UTF-8 with its declaration."""
     write_bytes(path, ElementTree.tostring(root, encoding="utf-8", xml_declaration=True))
 
 
@@ -194,6 +197,7 @@ def recorded_unit(space: Space, values: dict[str, float]) -> tuple[float, ...]:
 
 
 def _as_recorded(template: RunSpec, scene: Scene) -> RunSpec:
+    """Returns the run that replays the scene as recorded, with the ego as a passenger."""
     course = template.course
     assert isinstance(course, Scenario)
     moved = structs.replace(course, file=str(scene.recorded), parameters={})

@@ -52,6 +52,7 @@ def begin_risk(out: Path, asked: Risk, *, resume: bool) -> list[Trial]:
 def _begin(
     out: Path, name: str, asked: Struct, read: Callable[[Path], Struct], runs: str, resume: bool
 ) -> list[Trial]:
+    """Returns the trials done before; in a new folder it writes the options and returns an empty list."""
     check_folder(out, name, resume=resume)
     if (out / name).is_file():
         if msgspec.json.encode(read(out)) != msgspec.json.encode(asked):
@@ -120,6 +121,7 @@ class StoredTrials:
         return [self._known[point.number] for point in points]
 
     def _holds(self, point: Point) -> bool:
+        """Returns whether the point's trial is stored; raises FileError where the stored one differs."""
         trial = self._known.get(point.number)
         if trial is not None and trial.unit != point.unit:
             raise FileError(
@@ -130,6 +132,7 @@ class StoredTrials:
 
 
 def _encode(trials: Sequence[Trial]) -> bytes:
+    """Returns the trials as JSON lines in bytes."""
     return b"".join(msgspec.json.encode(trial) + b"\n" for trial in trials)
 
 
@@ -161,6 +164,7 @@ def drive_all(points: Sequence[Point], runner: Runner) -> list[Trial]:
 
 
 def _blank_trial(point: Point, detail: str) -> Trial:
+    """Returns the trial of a lost run: no conflict, and the last line of the detail as its fault."""
     values = point.space.values(point.unit)
     last = detail.strip().rpartition("\n")[2] or "the run was lost"
     return Trial(

@@ -56,27 +56,33 @@ def _rising(value: float | None, scale: float) -> float:
 
 
 def _least(found: Sequence[Pair], name: str) -> float | None:
+    """Returns the least value of that field over the pairs; None where no pair has one."""
     return min((v for p in found if (v := getattr(p, name)) is not None), default=None)
 
 
 def _most_braking(found: Sequence[Pair]) -> float | None:
+    """Returns the greatest needed deceleration in m/s^2 over the pairs; None where no pair has one."""
     return max((p.max_drac_mps2 for p in found if p.max_drac_mps2 is not None), default=None)
 
 
 def _by_gap(found: Sequence[Pair]) -> float:
+    """Returns the margin in 0..1 by the least gap in m; 1 where there is none."""
     return _rising(_least(found, "min_gap_m"), GAP_SCALE)
 
 
 def _by_ttc(found: Sequence[Pair]) -> float:
+    """Returns the margin in 0..1 by the least time to collision in s; 1 where there is none."""
     return _rising(_least(found, "min_ttc_s"), TTC_SCALE)
 
 
 def _by_braking(found: Sequence[Pair]) -> float:
+    """Returns the margin in 0..1 by the greatest needed deceleration; 1 where there is none."""
     worst = _most_braking(found)
     return 1.0 if worst is None else BRAKING_SCALE / (BRAKING_SCALE + max(worst, 0.0))
 
 
 def _by_all(found: Sequence[Pair]) -> float:
+    """Returns the mean of the margins by gap, time to collision and braking."""
     return (_by_gap(found) + _by_ttc(found) + _by_braking(found)) / 3.0
 
 

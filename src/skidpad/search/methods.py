@@ -105,6 +105,7 @@ class Descents:
             self.descent = None
 
     def _start(self, count: int) -> CMA:
+        """Returns a new CMA-ES search from the best point that is apart from all earlier starts."""
         from cmaes import CMA
 
         ordered = (np.array(p) for _, p in sorted(self.seen))

@@ -223,6 +223,7 @@ def sample_mixture(limit: Limit, failing: Floats, rng: np.random.Generator, coun
 
 
 def _blocks(z: Floats) -> list[Floats]:
+    """Returns the rows of z in blocks of at most BLOCK."""
     return [z[k : k + BLOCK] for k in range(0, len(z), BLOCK)]
 
 

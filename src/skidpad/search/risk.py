@@ -133,12 +133,14 @@ class Answer:
 
 
 def _plain(e: Estimate, simulated_s: float) -> Probability:
+    """Returns the estimate as a record; an infinite upper limit becomes None."""
     return Probability(
         method=e.method, p=e.p, low=e.low, high=_end(e.high), runs=e.runs, simulated_s=simulated_s
     )
 
 
 def _end(value: float) -> float | None:
+    """Returns the value; None where it is not finite."""
     return value if isfinite(value) else None
 
 

@@ -39,6 +39,7 @@ def parse_variable(text: str) -> Variable:
 
 
 def _parse_law(name: str, words: str) -> Law:
+    """Returns the law that the words of --vary describe; raises ConfigError for others."""
     if found := UNIFORM.fullmatch(words):
         return _require_range(name, Uniform(float(found[1]), float(found[2])))
     if found := DRAWN.fullmatch(words):
@@ -51,6 +52,7 @@ def _parse_law(name: str, words: str) -> Law:
 
 
 def _require_range(name: str, law: Uniform | Normal) -> Law:
+    """Returns the law; raises ConfigError for an empty range or a sigma of 0 or less."""
     low, high = law.range
     if not low < high:
         raise ConfigError(f"--vary {name}: the range {low:g}:{high:g} is empty")
@@ -78,10 +80,12 @@ def apply_values(template: RunSpec, values: Mapping[str, Value]) -> RunSpec:
 
 
 def _with_fields(weather: Weather, fields: Mapping[str, Value]) -> Weather:
+    """Returns the weather with these fields replaced."""
     return replace(weather, **fields) if fields else weather  # type: ignore[arg-type]
 
 
 def _require_own(variable: Variable) -> None:
+    """Raises ConfigError where the law does not fit its variable: the seed, or a weather field."""
     word, dot, name = variable.name.partition(".")
     if variable.name == SEED and isinstance(variable.law, Choice):
         raise ConfigError("--vary seed: takes a range, as seed=1:1000000")

@@ -78,6 +78,7 @@ def _bound_of(driven: Run, near: Closeness) -> str:
 
 
 def _columns(log: RunLog, near: Closeness) -> dict[str, object]:
+    """Returns the columns of a trial from its log: margins, motion hash and the contact, if any."""
     columns: dict[str, object] = {
         name: getattr(near, name)
         for name in ("margin", "min_gap_m", "min_ttc_s", "max_drac_mps2", "departed_s")

@@ -129,6 +129,7 @@ class InnerKernel(CPUDispatcher):  # type: ignore[misc]
 
 
 def _compile(function: Callable[..., Any], **flags: bool) -> Any:
+    """Returns the function compiled by numba, its machine code cached on disk."""
     if "NUMBA_CACHE_DIR" not in os.environ:  # numba's own variable: the user's word is final
         file = Path(function.__code__.co_filename).resolve()
         numba.config.CACHE_DIR = _cache_of(file) if file.is_relative_to(PACKAGE) else ""
@@ -148,6 +149,7 @@ class ForgivingIndex(IndexDataCacheFile):  # type: ignore[misc]
     """
 
     def _load_index(self) -> dict[Any, str]:
+        """Returns the index of the cache; empty where it cannot be read by this version."""
         try:
             return dict(super()._load_index())
         except (AttributeError, ImportError):

@@ -54,6 +54,7 @@ class Locality:
         return ", ".join(parts)
 
     def _describe_lane(self) -> str:
+        """Returns the lane in words, counted from the right, as "right lane of 3"."""
         if self.lane in (1, self.lanes):
             return f"{'right' if self.lane == 1 else 'left'} lane of {self.lanes}"
         return f"lane {self.lane} of {self.lanes} from the right"

@@ -151,6 +151,7 @@ def read_arrays(data: bytes, where: str, kind: str = "an .npz file") -> dict[str
 
 
 def _array(packed: zipfile.ZipFile, member: zipfile.ZipInfo, where: str) -> NDArray[Any]:
+    """Returns the array of one .npy member; raises FileError for objects or a size beyond its content."""
     with packed.open(member) as stream:
         version = npy.read_magic(stream)
         read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0

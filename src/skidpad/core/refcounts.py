@@ -31,6 +31,7 @@ class LeanLibrary(JITCodeLibrary):  # type: ignore[misc]
     _final_module: Any
 
     def _optimize_final_module(self) -> None:
+        """Removes the reference counts of a module that allocates nothing, and then optimises it."""
         text = str(self._final_module)
         if not self._returns_references() and not allocates(text):
             module = binding.parse_assembly(without_counting(text))
@@ -40,6 +41,7 @@ class LeanLibrary(JITCodeLibrary):  # type: ignore[misc]
         super()._optimize_final_module()
 
     def _returns_references(self) -> bool:
+        """Returns whether the compiled function's result holds reference-counted memory."""
         models = self.state.targetctx.data_model_manager
         return bool(models[self.state.return_type].contains_nrt_meminfo())
 

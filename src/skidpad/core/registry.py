@@ -54,6 +54,7 @@ class Source(Generic[E]):
 
 
 def _as_is(entry: E) -> E:
+    """Returns the entry itself, as the loader of entries that need no loading."""
     return entry
 
 
@@ -112,6 +113,8 @@ class Registry(Generic[E]):
         return tuple(s.load() for s in self.sources().values() if s.package != "skidpad")
 
     def _loader(self, point: EntryPoint, package: str) -> Callable[[], E]:
+        """Returns the function that loads an entry of another package and checks its type and name."""
+
         def load() -> E:
             where = f"{self.noun} {point.name!r} of the package {package}"
             try:

@@ -378,6 +378,7 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 def _pack_on_carla(course: Course, backend: BackendChoice) -> bool:
+    """Returns whether the course needs a pack of traffic around the ego and the backend is CARLA."""
     packed = isinstance(course, Roads) and course.traffic is TrafficStart.PACK
     risky = isinstance(course, Route) and course.stratum is Stratum.RISKY  # drives as one
     return (packed or risky) and backend.backend == BackendKind.CARLA

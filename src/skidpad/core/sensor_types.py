@@ -79,6 +79,7 @@ class SensorType:
 
 
 def _own_types() -> tuple[SensorType, ...]:
+    """Returns the sensor types that Skidpad itself registers."""
     at, outside = "skidpad.sensors.requested:", "skidpad.sensors.outside:"
     point = PointSensorSpec
     return (

@@ -97,11 +97,13 @@ class SettingField:
             require_range(self.name, value, self.low, self.high)
 
     def _read_switch(self, value: object) -> bool:
+        """Returns the value as a bool; raises ConfigError where it is no word for on or off."""
         if str(value).lower() not in SWITCH:
             raise ConfigError(f"setting {self.name} must be {self.range_text}, got {value!r}")
         return SWITCH[str(value).lower()]
 
     def _read_number(self, value: Any) -> float:
+        """Returns the value as a float, or the number that its word stands for; raises ConfigError."""
         if isinstance(value, str) and value in self.words:
             return self.words[value]
         try:
@@ -142,6 +144,7 @@ _described: dict[type[SettingsPart], dict[str, SettingField]] = {}
 
 
 def _describe(one: Field[Any], hint: Any) -> SettingField:
+    """Returns the setting of a dataclass field, from its type hint and its metadata."""
     kinds = get_args(hint) or (hint,)
     kind = next(k for k in kinds if k is not type(None))
     return SettingField(name=one.name, kind=kind, optional=type(None) in kinds, **one.metadata)

@@ -251,6 +251,7 @@ def load_profile(name: str, values: Mapping[str, object] | None = None) -> Setti
 
 @cache
 def _read_profile(name: str) -> Settings:
+    """Returns the settings of a bundled profile, read from its YAML file once."""
     text = (files("skidpad.core") / "profiles" / f"{name}.yaml").read_text(encoding="utf-8")
     return Settings(profile=name).with_values(msgspec.yaml.decode(text, type=dict[str, Any]))
 

@@ -74,6 +74,7 @@ class BackendType:
 
 
 def _own_backends() -> tuple[BackendType, ...]:
+    """Returns the backends that Skidpad itself registers: embedded and CARLA."""
     at = "skidpad.campaign.driving.backends:"
     return (
         BackendType(BackendKind.EMBEDDED, "The simulator of Skidpad", at + "make_embedded"),

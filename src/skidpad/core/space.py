@@ -107,6 +107,7 @@ class Normal(Struct, frozen=True, tag="normal", forbid_unknown_fields=True):
         return bell / (mass * self.sigma * (value if self.is_log else 1.0))
 
     def _z(self, value: float) -> float:
+        """Returns the standard score of a value, of its logarithm for a lognormal law."""
         if self.is_log:
             value = math.log(value) if value > 0.0 else -math.inf
         return (value - self.mean) / self.sigma
@@ -133,6 +134,7 @@ class Choice(Struct, frozen=True, tag="choice", forbid_unknown_fields=True):
         return shares[self.words.index(value)] / max(shares) if value in self.words else 0.0
 
     def _shares(self) -> list[float]:
+        """Returns the probability of each word, equal ones where no weights are given."""
         weights = self.weights or (1.0,) * len(self.words)
         return [weight / sum(weights) for weight in weights]
 

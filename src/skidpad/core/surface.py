@@ -50,6 +50,7 @@ class SurfacePatch(
         self._require_where()
 
     def _require_what(self) -> None:
+        """Raises ConfigError unless the patch has either a friction or a depth in mm, within its range."""
         deep = {"water_mm": WATER_MM, "ice_mm": ICE_MM, "snow_mm": SNOW_MM}
         for name, (low, high) in deep.items():
             require_range(name, getattr(self, name), low, high)
@@ -60,6 +61,7 @@ class SurfacePatch(
             require_range("friction", self.friction, *FRICTION)
 
     def _require_where(self) -> None:
+        """Raises ConfigError unless the patch has exactly one valid area: circle, polygon or road."""
         areas = (self.circle is not None, bool(self.polygon), self.road is not None)
         if sum(areas) != 1:
             raise ConfigError("needs one of circle, polygon and road")

@@ -35,6 +35,7 @@ def dress_map(map: RoadMap, scenery: Scenery) -> RoadMap:
 
 @lru_cache(maxsize=4)
 def _dress_fully(map: RoadMap) -> RoadMap:
+    """Returns a copy of the map with generated roadside, facades, signs and kerbs; cached for four maps."""
     dressed = copy(map)
     boxes = boxes_of(things_of(map), terrain_of(map.samples))
     own = (add_facade(box) for box in map.roadside.boxes)

@@ -86,6 +86,7 @@ def _lane_polygons(
 
 
 def _find_named_objects(roadside: Roadside) -> list[shapely.Geometry]:
+    """Returns the plan shapes of what the map itself names: boxes, barriers, signal heads, parking."""
     boxes = [shapely.Polygon(footprint(b.x, b.y, b.yaw, b.length, b.width)) for b in roadside.boxes]
     lines = [shapely.LineString(b.points[:, :2]) for b in roadside.barriers]
     heads = [shapely.Point(h.x, h.y) for h in roadside.heads]

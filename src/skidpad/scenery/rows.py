@@ -31,6 +31,7 @@ def backdrop_of(side: Side, rng: Rng) -> Iterator[Thing]:
 
 
 def _place(side: Side, s: float, offset: float) -> Place:
+    """Returns the place at s in m along the side, `offset` in m away from the road."""
     return Place(*side.at(s, offset))
 
 
@@ -43,10 +44,12 @@ def _walk(side: Side, rng: Rng, least: float, most: float) -> Iterator[float]:
 
 
 def _to_road(side: Side) -> float:
+    """Returns the sign of the direction towards the road: -1 on the left side, else 1."""
     return -1.0 if side.is_left else 1.0
 
 
 def _town(side: Side, rng: Rng) -> Iterator[Thing]:
+    """Yields what stands beside a street in town: bus stop, lamps, houses and trees."""
     is_avenue = bool(rng.random() < 0.6)
     setback = float(rng.uniform(6.4, 8.5)) if is_avenue else float(rng.uniform(2.2, 3.5))
     if side.length > 70.0 and rng.random() < 0.45:
@@ -89,6 +92,7 @@ def _houses(side: Side, rng: Rng, setback: float, is_suburb: bool) -> Iterator[T
 
 
 def _rural(side: Side, rng: Rng) -> Iterator[Thing]:
+    """Yields what stands beside a rural road: marker posts, farms, hedges and trees."""
     for s in _walk(side, rng, 49.0, 51.0):
         yield things.make_marker_post(_place(side, s, 1.3))
     for s in _walk(side, rng, 160.0, 420.0):
@@ -102,6 +106,7 @@ def _rural(side: Side, rng: Rng) -> Iterator[Thing]:
 
 
 def _motorway(side: Side, rng: Rng) -> Iterator[Thing]:
+    """Yields what stands beside a motorway: noise walls and trees."""
     for s in _walk(side, rng, 220.0, 700.0):
         for k in range(int(rng.integers(3, 9))):
             yield things.make_noise_wall(_place(side, s + 12.0 * k, 6.0), 11.9)

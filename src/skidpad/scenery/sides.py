@@ -98,6 +98,7 @@ def _border(
 def _edges(
     samples: LaneSamples, lanes: LaneTable, road: int, is_left: bool
 ) -> Iterator[tuple[Floats, Floats]]:
+    """Yields (edge (n, 3) in m, outward unit vectors (n, 2)) along each lane section's outermost lane."""
     own = np.flatnonzero(lanes.road == road)
     for section in np.unique(lanes.section[own]).tolist():
         members = own[lanes.section[own] == section]

@@ -48,6 +48,7 @@ def _triangle(samples: LaneSamples, lanes: LaneTable, own: int, other: int) -> N
 def _before_end(
     samples: LaneSamples, lanes: LaneTable, lane: int, distance: float
 ) -> tuple[float, float]:
+    """Returns x and y in m of the point `distance` in m before the end of a lane, at most its begin."""
     part = slice(int(lanes.first[lane]), int(lanes.first[lane] + lanes.size[lane]))
     s = max(float(samples.s[part][-1]) - distance, 0.0)
     x, y = (float(np.interp(s, samples.s[part], v[part])) for v in (samples.x, samples.y))

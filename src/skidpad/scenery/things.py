@@ -64,6 +64,7 @@ class Place:
 
 
 def _pick(colours: tuple[Rgb, ...], rng: np.random.Generator) -> Rgb:
+    """Returns one of the colours at random."""
     return colours[int(rng.integers(len(colours)))]
 
 
@@ -71,6 +72,7 @@ def _part(
     at: Place, label: SemanticClass, size: tuple[float, float, float], rgb: Rgb, shape: Shape,
     z: float = 0.0, solid: bool = True, variant: int = 0,
 ) -> Box:  # fmt: skip
+    """Returns a box at a place, its size (length, width, height) in m and z in m above the ground."""
     x, y, yaw = (round(v, 3) for v in (at.x, at.y, at.along))
     length, width, height = (round(v, 3) for v in size)
     return Box(
@@ -81,6 +83,7 @@ def _part(
 def _thing(
     name: str, at: Place, length: float, width: float, *boxes: Box, tall: bool = True
 ) -> Thing:
+    """Returns a thing of these boxes that needs a rectangle of length by width in m."""
     return Thing(name, boxes, (at.x, at.y, at.along, length, width), tall)
 
 

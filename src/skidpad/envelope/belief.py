@@ -66,6 +66,7 @@ def prior_grip(stage: int, air_c: float) -> float:
 
 
 def _stiffness_prior() -> Floats:
+    """Returns the prior over STIFFNESS_SHARES: a lognormal bell plus a uniform share, summing to 1."""
     bell = np.exp(-0.5 * (np.log(STIFFNESS_SHARES) / STIFFNESS_SPREAD) ** 2)
     p = np.full(len(bell), STIFFNESS_OPEN / len(bell))
     p += (1.0 - STIFFNESS_OPEN) * bell / bell.sum()
@@ -114,6 +115,7 @@ class GripBelief:
         self._multiply(np.exp(-0.5 * error * error)[:, None])
 
     def _multiply(self, likelihood: Floats, exponent: float = TEMPER) -> None:
+        """Multiplies the belief by a likelihood to a power and makes it sum to 1 again."""
         likely = likelihood / likelihood.max() if likelihood.max() > 0.0 else 1.0
         self.p = self.p * np.maximum(likely, WILD) ** exponent
         self.p /= self.p.sum()
@@ -136,5 +138,6 @@ class GripBelief:
 
 
 def _compute_spread(p: Floats) -> float:
+    """Returns the standard deviation of the logarithm of grip under the probabilities p."""
     mean = p @ LOG_GRIP
     return sqrt(max(float(p @ (LOG_GRIP - mean) ** 2), 1e-9))

@@ -170,6 +170,7 @@ class Envelope:
         return Allowed(*lowest(limits, set_to.most), grip, reach, v)
 
     def _limit_by_rss(self, frame: SensorFrame, way: Way | None, v: float) -> dict[Binding, float]:
+        """Returns the speed limits in m/s of the rival: a fixed table speed and RSS behind the lead."""
         limits = {Binding.TABLE: TABLE_KMH[0] / 3.6}
         lead = None if way is None else self.sight.look(frame.radar, frame.ego.pose, way, v)
         if lead is not None:
@@ -179,6 +180,7 @@ class Envelope:
     def _limits(
         self, frame: SensorFrame, way: Way | None, grip: Grip, stage: int, v: float
     ) -> tuple[dict[Binding, float], float]:
+        """Returns the speed limits in m/s by their cause, and the way seen to be clear in m."""
         set_to = self.settings
         braking = set_to.share * grip.value * G
         limits = {Binding.WATER: floating_speed(FILMS[stage])}

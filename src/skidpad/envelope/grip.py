@@ -145,6 +145,7 @@ class GripEstimator:
         self, v: float, ax: float, ay: float, front: float, rear: float, asked: float,
         steer: float, yaw_rate: float,
     ) -> None:  # fmt: skip
+        """Updates the belief from one window: slip against force, limits reached and force used."""
         force = ax + self.car.drag * v * v  # what the tyres give, over the mass
         use = sqrt(force * force + ay * ay) / G
         steady = self._is_steady()
@@ -220,6 +221,7 @@ class GripEstimator:
         return found
 
     def _estimate(self, v: float, stage: int) -> Grip:
+        """Returns the grip at v in m/s; the median is None while the confidence is 0.1 or less."""
         belief = self.belief
         careful, prior = quantile(belief.grips, CAUTION), quantile(belief.prior, CAUTION)
         if stage and v > self.v_shown + RISE:  # water takes more at a higher speed

@@ -109,6 +109,7 @@ class Sight:
         return float(min(seen, self.radar.range))
 
     def _carry_lead(self, v: float) -> Lead | None:
+        """Returns the last lead moved on by one step; None without one or when it is unseen for too long."""
         self.unseen += self.dt
         if self.lead is None or self.unseen > HOLD:
             return None
@@ -116,6 +117,7 @@ class Sight:
         return Lead(max(gap, 0.0), self.lead.speed)
 
     def _find(self, points: RadarPoints, pose: Pose, way: Way, v: float) -> Lead | None:
+        """Returns the lead (m, m/s) at the nearest radar point in the lane; None where there is none."""
         if self.radar is None or not len(points.range) or len(way.s) < 2:
             return None
         mount = self.radar.mount

@@ -110,10 +110,12 @@ class CarBus:
         return self._sent[0]
 
     def _draw(self) -> list[float]:
+        """Returns the next eight standard normal numbers, drawn in blocks."""
         if not self._block:
             self._block = self._noise.standard_normal((BLOCK, 8)).tolist()
         return self._block.pop()
 
 
 def _round(value: float, step: float) -> float:
+    """Returns the value rounded to a multiple of step; unchanged for a step of 0."""
     return round(value / step) * step if step > 0.0 else value

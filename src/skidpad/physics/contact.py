@@ -92,6 +92,7 @@ def bodies(
 
 @inner_kernel
 def _restitution(law: ContactLaw, v: float) -> float:
+    """Returns the coefficient of restitution at a closing speed v in m/s."""
     return law.e_fast + law.e_slow * exp(-v / law.v_scale)
 
 

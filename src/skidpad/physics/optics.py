@@ -185,6 +185,7 @@ _ALPHA_LINE = (0.67849, -1.95537)
 def _itu_curve(
     terms: tuple[tuple[float, float, float], ...], line: tuple[float, float], x: float
 ) -> float:
+    """Returns the sum of Gaussian terms (height, centre, width) and a line (slope, offset) at x."""
     return sum(a * exp(-(((x - b) / c) ** 2)) for a, b, c in terms) + line[0] * x + line[1]
 
 

@@ -50,6 +50,7 @@ def preset_groups() -> dict[str, dict[str, Weather]]:
 
 
 def _own_presets() -> tuple[Weather, ...]:
+    """Returns the weather presets of all groups that come with Skidpad."""
     return tuple(w for members in preset_groups().values() for w in members.values())
 
 

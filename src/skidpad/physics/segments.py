@@ -34,6 +34,7 @@ class Segments(NamedTuple):
 
 
 def _cell_size(low: Floats, high: Floats) -> float:
+    """Returns the edge in m of a grid cell between two corners, so that the cells stay few."""
     extent = np.maximum(high - low, 1.0)
     return float(max(CELL, np.sqrt(extent[0] * extent[1] / CELLS_MAX), extent.max() / 1.0e5))
 

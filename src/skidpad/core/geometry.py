@@ -76,12 +76,12 @@ def wrap_angle(angle: float) -> float:
 
 
 def mps_from_kmh(v_kmh: float) -> float:
-    """km/h to m/s."""
+    """Returns a speed in m/s for one in km/h."""
     return v_kmh / 3.6
 
 
 def kmh_from_mps(v: float) -> float:
-    """m/s to km/h."""
+    """Returns a speed in km/h for one in m/s."""
     return v * 3.6
 
 

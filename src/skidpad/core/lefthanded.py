@@ -65,7 +65,7 @@ def turns_to_carla(x: Floats, y: Floats, z: Floats) -> Floats:
 
 
 def angles_to_carla(angle: Floats) -> Floats:
-    """(n,) azimuths in rad."""
+    """Returns azimuths (n,) in rad in CARLA's left-handed frame: negated."""
     return -angle
 
 

@@ -65,7 +65,7 @@ class StackDriver(Struct, frozen=True, tag="stack", forbid_unknown_fields=True):
 
     @property
     def label(self) -> str:
-        """Name of the driver in results."""
+        """Returns the name of the driver in results: its own, or where it comes from."""
         return self.name or self.where
 
 
@@ -76,7 +76,7 @@ class AgentDriver(Struct, frozen=True, tag="agent", forbid_unknown_fields=True):
 
     @property
     def label(self) -> str:
-        """Name of the driver in results."""
+        """Returns the name of the driver in results: "agent:" and where it comes from."""
         return f"agent:{self.where}"
 
 
@@ -85,7 +85,7 @@ class CameraDriver(Struct, frozen=True, tag="camera", forbid_unknown_fields=True
 
     @property
     def label(self) -> str:
-        """Name of the driver in results."""
+        """Returns the name of the driver in results: "camera"."""
         return "camera"
 
 
@@ -94,7 +94,7 @@ class ReferenceDriver(Struct, frozen=True, tag="reference", forbid_unknown_field
 
     @property
     def label(self) -> str:
-        """Name of the driver in results."""
+        """Returns the name of the reference driver in results."""
         return REFERENCE
 
 
@@ -103,7 +103,7 @@ class Passenger(Struct, frozen=True, tag="ideal", forbid_unknown_fields=True):
 
     @property
     def label(self) -> str:
-        """Name of the driver in results."""
+        """Returns the name of the driver in results: "ideal"."""
         return "ideal"
 
 
@@ -131,7 +131,7 @@ class ChannelCrew(Struct, frozen=True, kw_only=True, tag="channels", forbid_unkn
 
     @property
     def label(self) -> str:
-        """Name of the driver in results."""
+        """Returns the name of the driver in results: the arbiter, or the channel that drives alone."""
         return self.drive_by
 
 
@@ -213,7 +213,7 @@ class Scenario(Struct, frozen=True, kw_only=True, tag="scenario", forbid_unknown
 
     @property
     def title(self) -> str:
-        """Name of the scenario in results."""
+        """Returns the name of the scenario in results: its own, or that of its file."""
         return self.name or self.file.rpartition("/")[2].removesuffix(".xosc")
 
 

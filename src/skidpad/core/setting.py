@@ -62,7 +62,7 @@ class SettingField:
 
     @property
     def range_text(self) -> str:
-        """What the setting takes, in words."""
+        """Returns in words what values the setting takes."""
         if self.kind is bool:
             return "on or off"
         if self.choices is not None:

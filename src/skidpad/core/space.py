@@ -27,7 +27,7 @@ class Uniform(Struct, frozen=True, tag="uniform", forbid_unknown_fields=True):
 
     @property
     def range(self) -> tuple[float, float]:
-        """The ends of the range."""
+        """Returns the lower and the upper end of the range."""
         return self.low, self.high
 
     def value(self, u: float) -> float:
@@ -177,7 +177,7 @@ class Space(Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the variables in order."""
+        """Returns the names of the variables in their order."""
         return tuple(v.name for v in self.variables)
 
     def values(self, unit: Sequence[float]) -> dict[str, Value]:

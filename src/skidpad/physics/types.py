@@ -79,7 +79,7 @@ class VehicleType(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
     @property
     def actor_kind(self) -> ActorKind:
-        """What the actor is."""
+        """Returns the kind of actor that this vehicle is."""
         return ActorKind[self.kind.upper()]
 
     @property
@@ -89,7 +89,7 @@ class VehicleType(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
     @property
     def x_rear_axle(self) -> float:
-        """Rear axle, m; negative."""
+        """Returns x of the rear axle in m from the footprint's centre; negative."""
         return self.x_front_axle - self.wheelbase
 
     @property
@@ -107,7 +107,7 @@ class VehicleType(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
     @property
     def steer_max(self) -> float:
-        """Largest road-wheel angle, rad."""
+        """Returns the largest road-wheel angle in rad."""
         return radians(self.steer_max_deg)
 
     @property

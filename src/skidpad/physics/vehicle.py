@@ -114,7 +114,7 @@ class Push(NamedTuple):
 
 @inner_kernel
 def _car(i: int, p: VehicleParams, command: Floats, grade: float, bank: float) -> Car:
-    """Vehicle i under this command (5,)."""
+    """Returns the parameters of vehicle i under this command (5,), on a road of this grade and bank."""
     brake = min(max(command[BRAKE], 0.0), 1.0)
     handbrake = command[HANDBRAKE] > 0.5
     radius, inertia = p.wheel_radius[i], p.wheel_inertia[i]

@@ -15,13 +15,13 @@ Sample = tuple[float, float, float, float, float, float, float, float, float]
 
 @kernel
 def project(map: Held[LaneArrays], x: float, y: float, z: float, driving: bool) -> Point:
-    """See `kernels.project_point`."""
+    """Returns the point on the map nearest to (x, y, z) in m; see `kernels.project_point`."""
     return kernels.project_point(map.value, x, y, z, driving)
 
 
 @kernel
 def advance(map: Held[LaneArrays], lane: int, s: float, distance: float, heading: float) -> Point:
-    """See `kernels.advance_point`."""
+    """Returns the point `distance` in m further along the lanes; see `kernels.advance_point`."""
     return kernels.advance_point(map.value, lane, s, distance, heading)
 
 
@@ -44,7 +44,7 @@ def trace_lane(
 
 @kernel
 def sample(map: Held[LaneArrays], lane: int, s: float) -> Sample:
-    """See `kernels.sample_kernel`."""
+    """Returns the interpolated sample of a lane at s in m; see `kernels.sample_kernel`."""
     return kernels.sample_kernel(map.value, lane, s)
 
 
@@ -52,5 +52,5 @@ def sample(map: Held[LaneArrays], lane: int, s: float) -> Sample:
 def signal_ahead(
     map: Held[LaneArrays], lane: int, s: float, distance: float, kind: int
 ) -> tuple[int, float]:
-    """See `kernels.signal_ahead`."""
+    """Returns row and distance in m of the next signal of a kind; see `kernels.signal_ahead`."""
     return kernels.signal_ahead(map.value, lane, s, distance, kind)

@@ -54,7 +54,7 @@ class LaneArrays(NamedTuple):
 
 @inner_kernel
 def wrapped(angle: float) -> float:
-    """`angle` wrapped to (-pi, pi]."""
+    """Returns the angle in rad wrapped to (-pi, pi]."""
     return pi - (pi - angle) % (2.0 * pi)
 
 
@@ -242,7 +242,7 @@ def project_point(
 def advance_point(
     a: LaneArrays, lane: int, s: float, distance: float, heading: float
 ) -> tuple[int, float, float, float, float, float, float, float, float]:
-    """`advance_kernel` likewise; the offset is 0."""
+    """Returns the point `distance` in m further along the lanes, offset 0; lane -1 and NaN at a dead end."""
     lane, s = advance_kernel(a, lane, s, distance, heading)
     if lane < 0:
         return -1, nan, nan, nan, nan, nan, nan, nan, nan

@@ -185,7 +185,7 @@ class RoadMap:
         return [found[lane] for lane in sorted(found)]
 
     def successors(self, lane: int) -> list[int]:
-        """Indices of the lanes that follow."""
+        """Returns the indices of the lanes that follow a lane."""
         start = self.lanes.next_start
         return [int(i) for i in self.lanes.next_lane[start[lane] : start[lane + 1]]]
 
@@ -218,7 +218,7 @@ class RoadMap:
         return place
 
     def s_road(self, point: LanePoint) -> float:
-        """OpenDRIVE s of a place."""
+        """Returns the OpenDRIVE s in m of a place."""
         return float(kernels.s_road_kernel(self._arrays, point.lane, point.s))
 
     def limit(self, point: LanePoint) -> float | None:

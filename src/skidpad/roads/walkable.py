@@ -135,7 +135,7 @@ def _weld_points(points: Floats, rings: list[Ring], areas: list[WalkArea]) -> Wa
 
 
 def _storeys(map: RoadMap) -> bool:
-    """Whether lanes lie above each other."""
+    """Returns whether lanes lie above each other anywhere on the map."""
     s = map.samples
     plan = cKDTree(np.column_stack((s.x, s.y)))
     pairs = plan.query_pairs(NEAR, output_type="ndarray")
@@ -204,7 +204,7 @@ def _kind(surfaces: dict[WalkArea, shapely.Geometry], face: shapely.Geometry) ->
 
 
 def _heights(map: RoadMap, plan: Floats) -> Floats:
-    """Heights of the nearest lane samples."""
+    """Returns the heights (n,) in m of the lane samples nearest to the points (n, 2)."""
     s = map.samples
     _, nearest = cKDTree(np.column_stack((s.x, s.y))).query(plan)
     return np.asarray(s.z[nearest], dtype=np.float64)

@@ -155,7 +155,7 @@ class ControllerOf:
     made: Make
 
     def make(self) -> ActiveController:
-        """Return it for one run."""
+        """Returns a new controller for one run."""
         return ActiveController(self.name, call(self.name, self.made, dict(self.properties)))
 
 

@@ -70,7 +70,7 @@ class Scenario:
 
     @property
     def ego_entity(self) -> Entity:
-        """Entity that is the ego."""
+        """Returns the entity that is the ego."""
         return self.entities[self.ego]
 
 

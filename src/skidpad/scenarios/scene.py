@@ -67,7 +67,7 @@ class Done:
     """An action that takes no time."""
 
     def step(self, scene: Scene) -> bool:
-        """It is over at once."""
+        """Returns True at once: it is over."""
         del scene
         return True
 
@@ -136,22 +136,22 @@ class Actor:
 
     @property
     def name(self) -> str:
-        """Returns the entity's name."""
+        """Returns the name of the actor's entity."""
         return self.entity.name
 
     @property
     def v(self) -> float:
-        """Speed over ground, m/s."""
+        """Returns the speed over ground in m/s, never negative."""
         return hypot(self.motion.vx, self.motion.vy)
 
     @property
     def v_signed(self) -> float:
-        """Speed over ground, m/s, negative backwards."""
+        """Returns the speed over ground in m/s, negative backwards."""
         return self.v if self.motion.speed >= 0.0 else -self.v
 
     @property
     def driven_by_file(self) -> bool:
-        """The scenario decides where it goes."""
+        """Returns whether the scenario decides where the actor goes."""
         return self.mode is not None or not self.handed
 
     @property

@@ -42,7 +42,7 @@ def find_scenario(file: Path) -> Path:
 
 @cache
 def find_shipped(name: str) -> Shipped:
-    """The scenario with this name."""
+    """Returns the parameters and entity names of the shipped scenario with this name."""
     root = etree.parse(str(scenario_file(name))).getroot()
     declared = root.iterfind("ParameterDeclarations/ParameterDeclaration")
     objects = root.iterfind("Entities/ScenarioObject")

@@ -196,7 +196,7 @@ class _Starting:
 
     @property
     def v_told(self) -> float:
-        """Speed when the scenario begins, m/s."""
+        """Returns the speed in m/s when the scenario begins."""
         return cast("float", self._once("speed", self._speed))
 
     def _speed(self) -> float:

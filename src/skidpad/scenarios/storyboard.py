@@ -96,7 +96,7 @@ class Storyboard:
 
     @property
     def events(self) -> tuple[Event, ...]:
-        """Every event."""
+        """Returns every event of all stories, in the order of the file."""
         acts = [a for s in self.stories for a in s.acts]
         return tuple(e for a in acts for g in a.groups for m in g.manoeuvres for e in m.events)
 

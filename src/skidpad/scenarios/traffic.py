@@ -162,7 +162,7 @@ class Directions:
     opposite: float
 
     def drawn(self, rng: Random, scene: Scene, spots: Spots) -> Mask:
-        """The spots of one draw."""
+        """Returns the mask of the spots in the direction of one draw: same as the entity's or opposite."""
         same = rng.random() * (self.same + self.opposite) < self.same
         mask = along(scene.actors[self.entity].pose, spots)
         return mask if same else ~mask

@@ -162,7 +162,7 @@ def _timed_condition(node: Node, ctx: Context) -> Timed:
 
 
 def condition(node: Node, ctx: Context) -> Condition:
-    """The condition inside a <Condition>."""
+    """Compiles the condition by value or by entity inside a <Condition>."""
     inner = node.only()
     if inner.tag == "ByValueCondition":
         leaf = inner.only()

@@ -12,11 +12,11 @@ _TICK = np.uint64(0xD1342543DE82EF95)
 
 @inner_kernel
 def mixed(key: np.uint64, tick: int, index: int) -> np.uint64:
-    """64 random bits."""
+    """Returns 64 random bits that depend only on key, tick and index."""
     return scrambled(key + np.uint64(tick) * _TICK + np.uint64(index) * GOLDEN + GOLDEN)
 
 
 @inner_kernel
 def uniform(key: np.uint64, tick: int, index: int) -> float:
-    """A number in [0, 1)."""
+    """Returns a random number in [0, 1) that depends only on key, tick and index."""
     return unit(mixed(key, tick, index))

@@ -55,7 +55,7 @@ class SensorHost(Protocol):
 
     @property
     def tick(self) -> int:
-        """The number of the present tick."""
+        """Returns the number of the present tick."""
 
     @property
     def seed(self) -> int:
@@ -175,7 +175,7 @@ def make_lidar(spec: LidarSpec, sensors: AskedSensors) -> Callable[[], LidarPoin
 
 
 def make_gnss(spec: PointSensorSpec, sensors: AskedSensors) -> Callable[[], GnssFix]:
-    """Returns what locates the antenna."""
+    """Returns the function that measures the antenna's position (deg, deg, m)."""
     return lambda: inertial.gnss(sensors.states.pose(EGO) @ spec.mount, sensors.origin)
 
 

@@ -36,5 +36,5 @@ class Backend(Protocol):
         ...
 
     def close(self) -> None:
-        """Release everything; safe to call twice."""
+        """Releases everything; it is safe to call twice."""
         ...

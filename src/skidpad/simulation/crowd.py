@@ -239,7 +239,7 @@ def _over(map: RoadMap, zebra: Floats, side: float) -> tuple[Floats, int | None]
 
 
 def _along(map: RoadMap, lane: int, side: float) -> Floats:
-    """Way along a sidewalk."""
+    """Returns the way (n, 2) in m along a sidewalk, at the share `side` (0..1) of its width."""
     first, size = int(map.lanes.first[lane]), int(map.lanes.size[lane])
     step = slice(first, first + size, 5)
     p = map.samples
@@ -249,7 +249,7 @@ def _along(map: RoadMap, lane: int, side: float) -> Floats:
 
 
 def _riders(map: RoadMap, count: int, rng: np.random.Generator) -> list[_Rider]:
-    """Cyclists on lanes with town limits."""
+    """Returns at most `count` cyclists on lanes with town limits."""
     lanes = _streets(map)
     found: list[_Rider] = []
     for i in range(count if len(lanes) else 0):

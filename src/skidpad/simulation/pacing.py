@@ -32,7 +32,7 @@ class Pacer:
         self._was_enabled = self._running = False
 
     def begin(self) -> None:
-        """The loop starts now."""
+        """Starts the loop's clock and, if so set, switches garbage collection off."""
         self._running, self._was_enabled = True, gc.isenabled()
         if self.own_gc:
             gc.collect()

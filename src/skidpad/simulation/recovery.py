@@ -114,7 +114,7 @@ class Supervisor:
         self.reset()
 
     def reset(self) -> None:
-        """Begin a run."""
+        """Resets phase, counters and memory for the begin of a run."""
         self.phase = Supervision.NONE
         self.left = 0  # ticks of the present phase still to come
         self.cool_down = 0  # ticks

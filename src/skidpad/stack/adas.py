@@ -152,7 +152,7 @@ class AdasStack:
             self.bends.reset()
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
-        """Sense, decide, actuate (A-010)."""
+        """Returns the command of one tick: it senses, decides and actuates (A-010)."""
         self._follow_supervision(frame.supervision)
         v = frame.ego.speed
         view = self.tracker.update(frame.ego.pose)

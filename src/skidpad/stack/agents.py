@@ -132,7 +132,7 @@ class AgentStack:
         )
 
     def close(self) -> None:
-        """The run is over."""
+        """Calls the agent's `destroy`, where it has one."""
         destroy = getattr(self.agent, "destroy", None)
         if callable(destroy):
             destroy()
@@ -248,6 +248,6 @@ def _gps(pose: Pose) -> dict[str, float]:
 
 
 def transform(pose: Pose) -> Transform:
-    """A pose in CARLA's axes."""
+    """Returns a pose in CARLA's axes, m and deg."""
     x, y, z, roll, pitch, yaw = pose_to_carla(pose)
     return Transform(Vector(x, y, z), Rotation(pitch, yaw, roll))

@@ -45,7 +45,7 @@ def numbered_driver(number: int) -> AdasDriver:
 
 
 def functions_of(configuration: int) -> Functions:
-    """The functions of a published configuration."""
+    """Returns the functions of a published configuration; raises ConfigError for an unknown one."""
     if configuration not in CONFIGURATIONS:
         raise ConfigError(
             f"unknown configuration {configuration!r}; choose one of: "

@@ -74,7 +74,7 @@ class AddedFunctions:
         self.reset()
 
     def reset(self) -> None:
-        """Starts all of them afresh."""
+        """Makes all added functions anew from their factories."""
         factories = [kind.factory for kind in self.kinds if kind.factory is not None]
         self._functions = [factory(self._map, self._dt) for factory in factories]
 

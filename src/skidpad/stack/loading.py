@@ -129,7 +129,7 @@ class GuardedStack:
             raise StackError(f"{self.name} could not be built: {describe_value(error)}") from error
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
-        """The stack's command, checked."""
+        """Returns the stack's checked command; raises StackError where the stack fails."""
         self._tick = frame.tick
         try:
             command = self._call(self.stack.tick, frame)

@@ -134,7 +134,7 @@ class Reader:
         self.file, self.shift = file, shift
 
     def fail(self, node: Node, problem: str) -> FileError:
-        """The error to raise about `node`."""
+        """Returns the error to raise about a node, with file and line."""
         named = f" id={node.get('id')}" if node.get("id") is not None else ""
         return FileError(f"{self.file}, line {node.sourceline}: <{node.tag}{named}> {problem}")
 
@@ -167,7 +167,7 @@ class Reader:
         return value
 
     def id(self, node: Node, name: str = "id", default: str | None = None) -> int:
-        """An id as a number."""
+        """Returns an id as a number; raises an error where the attribute is missing."""
         text = node.get(name, default)
         if text is None:
             raise self.fail(node, f"needs {name}")
@@ -219,7 +219,7 @@ def parse_root(text: bytes, file: str) -> Node:
 
 
 def parse(text: bytes, file: str) -> Document:
-    """Records of an OpenDRIVE file."""
+    """Returns the records of an OpenDRIVE file; raises an error for a faulty one."""
     root = parse_root(text, file)
     read = Reader(file, _shift(Reader(file), root.find("header/offset")))
     roads: dict[int, RoadRecord] = {}

@@ -25,7 +25,7 @@ class Cubics:
 
     @classmethod
     def none(cls) -> Cubics:
-        """The function that is zero everywhere."""
+        """Returns the function that is zero everywhere."""
         return cls(np.zeros(1), np.zeros((1, 4)))
 
     def at(self, s: Floats, select: Floats | None = None) -> tuple[Floats, Floats, Floats]:

@@ -248,7 +248,7 @@ def _stop_lines(
     shapes: Sequence[LaneShape],
     index: Mapping[LaneKey, int],
 ) -> Iterator[tuple[int, float]]:
-    """(lane, s) of every stop line."""
+    """Yields (lane index, s in m) of every stop line."""
     for road, node in _signals(document):
         if node.get("type") == STOP_LINE:
             for lane in _governed_lanes(read, node, road, shapes, index):

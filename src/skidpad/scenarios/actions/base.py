@@ -15,7 +15,7 @@ class PrivateAction(Protocol):
     """Something that one entity does."""
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Start it for an entity."""
+        """Starts the action for an entity and returns it running."""
         ...
 
 
@@ -34,12 +34,12 @@ class NoEffect:
     what: str
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Ends at once."""
+        """Notes that the action has no effect on the actor, and returns an action that is done."""
         scene.notice(f"<{self.what}> of {actor.name} has no effect")
         return DONE
 
     def happen(self, scene: Scene) -> Running:
-        """Does nothing."""
+        """Notes that the global action has no effect, and returns an action that is done."""
         scene.notice(f"<{self.what}> has no effect")
         return DONE
 
@@ -100,7 +100,7 @@ class Dynamics:
 
 
 def dynamics(node: Node) -> Dynamics:
-    """<...Dynamics> of an action."""
+    """Compiles a <...Dynamics> element; a step without value takes 0 s."""
     following = node.choice("followingMode", Following, Following.POSITION)
     shape = node.choice("dynamicsShape", Shape)
     if shape is Shape.STEP and not node.has("value"):

@@ -57,7 +57,7 @@ class LateralDistance:
     bounds: Bounds
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Keeps the distance from now on."""
+        """Returns the running action that keeps the lateral distance from now on."""
         actor.leave_track(scene.network)
         _, left = scene.between(self.other, actor.name)
         to_left = left >= 0.0 if self.side is Side.ANY else self.side is Side.LEFT
@@ -178,7 +178,7 @@ class Approach:
         return between(self.at(t)[0], place.x, place.y)[0]
 
     def skip(self, way: float) -> None:
-        """Be `way` m further on."""
+        """Moves the pose forward by `way` in m."""
         self.pose = self.pose.moved(forward=way)
 
     def step(self, scene: Scene) -> bool:
@@ -238,7 +238,7 @@ class Approach:
 
 
 def compile_lateral_distance(node: Node, ctx: Context) -> LateralDistance:
-    """A <LateralDistanceAction>."""
+    """Compiles a <LateralDistanceAction> element; absent constraints are infinite."""
     found = node.find("DynamicConstraints")
     axes = node.choice("coordinateSystem", Axes, Axes.ENTITY)
     bounds = Bounds()

@@ -69,7 +69,7 @@ class Several:
     actions: tuple[PrivateAction, ...]
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """All at once."""
+        """Begins all actions at once and returns an action that is done."""
         for action in self.actions:
             action.begin(scene, actor)
         return DONE
@@ -81,7 +81,7 @@ def _flag(node: Node, name: str) -> bool | None:
 
 
 def compile_activate(node: Node, ctx: Context) -> Activate:
-    """An <ActivateControllerAction>."""
+    """Compiles an <ActivateControllerAction>; a flag that it omits is None, for no change."""
     return Activate(_flag(node, "lateral"), _flag(node, "longitudinal"), ctx.controllers)
 
 
@@ -119,7 +119,7 @@ class Override:
 
 
 def compile_override(node: Node, ctx: Context) -> PrivateAction:
-    """An <OverrideControllerValueAction>."""
+    """Compiles an <OverrideControllerValueAction>; without a supported input it has no effect."""
     del ctx
     inputs: dict[str, float | None] = {}
     for part in node.children():
@@ -200,7 +200,7 @@ def _is_known(node: Node) -> bool:
 
 
 def no_effect(node: Node, ctx: Context) -> NoEffect:
-    """Something that nobody here can see."""
+    """Compiles an action that nothing in the simulation can perceive."""
     del ctx
     return NoEffect(node.tag)
 

@@ -38,7 +38,7 @@ class Limits:
 
     @property
     def none(self) -> bool:
-        """Whether nothing is limited."""
+        """Returns whether neither acceleration nor deceleration is limited."""
         return self.a_max == self.b_max == inf
 
     def of(self, own: Performance) -> Performance:
@@ -66,7 +66,7 @@ class KeepGap:
     limits: Limits
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Keeps the gap from now on."""
+        """Returns the running action that keeps the gap from now on."""
         own = actor.entity.performance
         limits = self.limits.of(own)
         for name, unit, asked, has in (
@@ -165,7 +165,7 @@ class GapKept:
 
 
 def compile_gap(node: Node, ctx: Context) -> KeepGap:
-    """A <LongitudinalDistanceAction>."""
+    """Compiles a <LongitudinalDistanceAction> with either a distance in m or a time gap in s."""
     if node.has("distance") == node.has("timeGap"):
         raise node.error("needs either distance or timeGap")
     limits = Limits()

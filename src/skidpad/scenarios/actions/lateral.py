@@ -170,7 +170,7 @@ class LaneChange:
 
 
 def compile_lane_change(node: Node, ctx: Context) -> LaneChange:
-    """A <LaneChangeAction>."""
+    """Compiles a <LaneChangeAction> to a lane counted from an entity's, or to a lane id."""
     change = dynamics(node.child("LaneChangeActionDynamics"))
     target = node.child("LaneChangeTarget").only()
     if target.tag not in ("RelativeTargetLane", "AbsoluteTargetLane"):
@@ -216,7 +216,7 @@ class LaneOffset:
 
 
 def compile_lane_offset(node: Node, ctx: Context) -> LaneOffset:
-    """A <LaneOffsetAction>."""
+    """Compiles a <LaneOffsetAction>: an offset in m, absolute or from another entity's."""
     found = node.child("LaneOffsetActionDynamics")
     a_max = found.limit("maxLateralAcc", A_LATERAL)
     if a_max <= 0.0:

@@ -146,7 +146,7 @@ class Synchronized:
         return self._stopping(scene, v, v_road, own, v_end) if turn < 0.0 else v + a * dt
 
     def _note(self, scene: Scene, asked: float, applied: float, of: str) -> None:
-        """Says once what bounds its course."""
+        """Notes once what bounds the synchronised course."""
         if not self.noted:
             self.noted = note_bound(scene, self.actor, "SynchronizeAction", asked, applied, of)
 
@@ -194,7 +194,7 @@ def away(v: float, v_end: float, own: float, time: float) -> tuple[float, float]
 
 
 def compile_synchronize(node: Node, ctx: Context) -> Synchronize:
-    """A <SynchronizeAction>."""
+    """Compiles a <SynchronizeAction>, with or without a final speed in m/s."""
     v_end, relative, steady = None, False, Steady()
     found = node.find("FinalSpeed")
     if found is not None:

@@ -42,7 +42,7 @@ class Teleport:
 
 
 def compile_teleport(node: Node, ctx: Context) -> Teleport:
-    """A <TeleportAction>."""
+    """Compiles a <TeleportAction> to the position of its node."""
     return Teleport(position(node.child("Position"), ctx))
 
 
@@ -60,7 +60,7 @@ class AssignRoute:
 
 
 def compile_assign_route(node: Node, ctx: Context) -> AssignRoute:
-    """An <AssignRouteAction>."""
+    """Compiles an <AssignRouteAction> with the route of its node."""
     return AssignRoute(compile_route(node.only(), ctx))
 
 
@@ -81,7 +81,7 @@ class RandomRoute:
 
 
 def compile_random_route(node: Node, ctx: Context) -> RandomRoute:
-    """A <RandomRouteAction>."""
+    """Compiles a <RandomRouteAction>, which has no content of its own."""
     del node, ctx
     return RandomRoute()
 
@@ -108,7 +108,7 @@ def _way_there(network: Network, actor: Actor, goal: Position, scene: Scene) -> 
 
 
 def compile_acquire(node: Node, ctx: Context) -> AcquirePosition:
-    """An <AcquirePositionAction>."""
+    """Compiles an <AcquirePositionAction> to the position of its node."""
     return AcquirePosition(position(node.child("Position"), ctx))
 
 

@@ -59,7 +59,7 @@ class Speed:
 
     @property
     def at_once(self) -> bool:
-        """It takes no time."""
+        """Returns whether the change takes no time: a step, or a duration or distance of 0 or less."""
         d = self.dynamics
         return d.shape is Shape.STEP or (d.dimension is not Dimension.RATE and d.value <= 0.0)
 
@@ -237,7 +237,7 @@ class SmoothChange(SmoothProfile):
 
 
 def compile_speed(node: Node, ctx: Context) -> Speed:
-    """A <SpeedAction>."""
+    """Compiles a <SpeedAction> with an absolute or relative target speed."""
     change = dynamics(node.child("SpeedActionDynamics"))
     target = node.child("SpeedActionTarget").only()
     if target.tag == "AbsoluteTargetSpeed":
@@ -332,7 +332,7 @@ class Profiled:
 
 
 def compile_profile(node: Node, ctx: Context) -> Profile:
-    """A <SpeedProfileAction>."""
+    """Compiles a <SpeedProfileAction> with its entries (m/s, s) and its limits."""
     following = node.choice("followingMode", Following, Following.POSITION)
     entries = []
     for entry in node.children("SpeedProfileEntry"):

@@ -31,7 +31,7 @@ class StartTraffic:
     flow: Callable[[str, Scene], Sourcing | Sinking | Filling]
 
     def happen(self, scene: Scene) -> Running:
-        """Lets traffic come from now on."""
+        """Starts the flow of traffic and returns it running."""
         flow = self.flow(self.name, scene)
         scene.flows.append(flow)
         return flow
@@ -209,7 +209,7 @@ TRAFFIC: Mapping[str, Callable[[Node, Context], Start]] = {
 
 
 def compile_traffic(node: Node, ctx: Context) -> GlobalAction:
-    """A <TrafficAction>."""
+    """Compiles a <TrafficAction> that starts or stops traffic of that name."""
     name, what = node.text("trafficName", ""), node.only()
     if what.tag == "TrafficStopAction":
         return StopTraffic(name)

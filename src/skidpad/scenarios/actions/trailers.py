@@ -47,7 +47,7 @@ class DisconnectTrailer:
     """Let the own trailer go; on a road it keeps its speed, as the standard says nothing of brakes."""
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Let it go in this step."""
+        """Disconnects the actor's trailer, which goes on along its road."""
         for trailer in scene.actors.values():
             if trailer.towed_by is actor:
                 trailer.towed_by = None

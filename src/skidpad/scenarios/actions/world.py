@@ -68,7 +68,7 @@ class SetValue:
     change: Callable[[str], str]
 
     def happen(self, scene: Scene) -> Running:
-        """Sets the value at once."""
+        """Sets the value at once; with a notice and no change where the old one is no number."""
         values = scene.variables if self.variable else scene.parameters
         old = values[self.name]
         try:
@@ -112,7 +112,7 @@ class SetSignal:
     state: str
 
     def happen(self, scene: Scene) -> Running:
-        """Sets the signal at once."""
+        """Sets the signal's state, or its controller's phase, at once."""
         scene.signals[self.name] = self.state
         return DONE
 
@@ -184,7 +184,7 @@ GLOBAL: Mapping[str, Callable[[Node, Context], GlobalAction]] = {
 
 
 def global_action(node: Node, ctx: Context) -> GlobalAction:
-    """The action inside a <GlobalAction>."""
+    """Compiles the action inside a <GlobalAction>; raises an error for an unsupported one."""
     inner = node.only()
     if inner.tag not in GLOBAL:
         raise inner.unsupported()

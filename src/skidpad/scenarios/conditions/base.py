@@ -51,7 +51,7 @@ def rule(node: Node, value: str = "value") -> Rule:
 
 
 def rule_name(node: Node) -> str:
-    """The attribute `rule`."""
+    """Returns the attribute `rule` of a node; raises an error for one that is not supported."""
     name = node.text("rule")
     if name not in RULES:
         raise node.unsupported(f"rule={name!r} is not supported, only {', '.join(RULES)}")

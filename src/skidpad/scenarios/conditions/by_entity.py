@@ -109,7 +109,7 @@ class ReachPosition:
     position: Position
 
     def holds(self, scene: Scene, actor: str) -> bool:
-        """Straight distance."""
+        """Returns whether the straight distance to the position is within the tolerance."""
         goal, here = self.position.place(scene).pose, scene.actors[actor].pose
         return hypot(goal.x - here.x, goal.y - here.y) <= self.tolerance
 
@@ -127,7 +127,7 @@ class Collision:
     body: Body = Body.VEHICLE
 
     def holds(self, scene: Scene, actor: str) -> bool:
-        """Now."""
+        """Returns whether the actor touches one of the others now."""
         others = self.others
         if others is None:
             others = tuple(n for n, a in scene.actors.items() if a.entity.body is self.body)
@@ -224,7 +224,7 @@ class Clearance:
     lanes: tuple[tuple[float, float], ...]  # from, to; relative to the own lane
 
     def holds(self, scene: Scene, actor: str) -> bool:
-        """Whether nothing is there now."""
+        """Returns whether no other entity is in the stretch and lanes; True off every lane."""
         here = scene.actors[actor]
         place = scene.network.place_of(here.pose)
         base = place.lane

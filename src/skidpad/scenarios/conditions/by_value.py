@@ -25,7 +25,7 @@ class SimulationTime:
     rule: Rule
 
     def probe(self) -> Probe:
-        """t against the value."""
+        """Returns the function of a scene that compares its time in s with the value."""
         return lambda scene: self.rule.met(scene.t)
 
 
@@ -82,7 +82,7 @@ class Never:
     """Stands in the place of a condition that means nothing here."""
 
     def probe(self) -> Probe:
-        """Never."""
+        """Returns the function of a scene that is always False."""
         return lambda _: False
 
 

@@ -90,7 +90,7 @@ class Distance:
     goal: Position | None
 
     def holds(self, scene: Scene, actor: str) -> bool:
-        """Against the value."""
+        """Returns whether the actor's distance in m meets the comparison with the value."""
         goal, other = target(scene, self.other, self.goal)
         return self.rule.met(self.measure.distance(scene, scene.actors[actor], goal, other))
 
@@ -126,7 +126,7 @@ class TimeHeadway:
     other: str
 
     def holds(self, scene: Scene, actor: str) -> bool:
-        """Against the value."""
+        """Returns whether the time headway in s meets the comparison; a standing actor has none."""
         own, other = scene.actors[actor], scene.actors[self.other]
         behind = scene.between(actor, self.other)[0] < 0.0
         if own.v <= 0.0 or (behind and self.measure.direction is Direction.LONGITUDINAL):
@@ -150,7 +150,7 @@ class TimeToCollision:
     goal: Position | None
 
     def holds(self, scene: Scene, actor: str) -> bool:
-        """Against the value."""
+        """Returns whether the time to collision in s meets the comparison; inf where nothing closes in."""
         own = scene.actors[actor]
         goal, other = target(scene, self.other, self.goal)
         distance = self.measure.distance(scene, own, goal, other)

@@ -39,7 +39,7 @@ class OscVersion(str, Enum):
 
     @property
     def minor(self) -> int:
-        """Minor revision for the file header."""
+        """Returns the minor revision for the file header."""
         return int(self.value.split(".")[1])
 
 

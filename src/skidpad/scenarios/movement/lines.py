@@ -58,7 +58,7 @@ class Line:
 
     @property
     def length(self) -> float:
-        """Length of the line in m."""
+        """Returns the length of the line in m."""
         return self.s[-1]
 
     def at_length(self, s: float) -> Pose:
@@ -126,7 +126,7 @@ class Line:
 
     @staticmethod
     def _find(values: Sequence[float], value: float) -> tuple[int, float]:
-        """Segment and share of it."""
+        """Returns the segment in which the value lies and its share 0..1 of that, cut at both ends."""
         last = len(values) - 1
         if last == 0 or value <= values[0]:
             return 0, 0.0

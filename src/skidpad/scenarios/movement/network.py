@@ -35,7 +35,7 @@ class Place:
 
     @property
     def along(self) -> bool:
-        """It looks as its lane runs."""
+        """Returns whether the place faces as its lane runs; True off every lane."""
         return self.lane is None or cos(self.pose.yaw - self.lane.heading) >= 0.0
 
 

@@ -66,7 +66,7 @@ class Fixed:
     fixed: Place
 
     def place(self, scene: Scene) -> Place:
-        """The same at all times."""
+        """Returns the same place at all times."""
         del scene
         return self.fixed
 
@@ -189,7 +189,7 @@ class RelativeObject:
     facing: Orientation
 
     def place(self, scene: Scene) -> Place:
-        """Seen from the entity now."""
+        """Returns the place as seen from the entity's present pose."""
         pose = scene.actors[self.other].pose
         if self.own_axes:
             moved = pose.moved(forward=self.dx, left=self.dy)
@@ -236,7 +236,7 @@ POSITIONS: Mapping[str, Callable[[Node, Context], Position]] = {
 
 
 def position(node: Node, ctx: Context) -> Position:
-    """The place inside a <Position>."""
+    """Compiles the position inside a <Position>; raises an error for an unsupported one."""
     inner = node.only()
     make = POSITIONS.get(inner.tag) or ctx.further_positions.get(inner.tag)
     if make is None:

@@ -116,7 +116,7 @@ class OfEntity:
 
 
 def route_position(node: Node, ctx: Context) -> Position:
-    """Compiles a <RoutePosition> element."""
+    """Compiles a <RoutePosition>: that of an entity, or road or lane coordinates on a route."""
     inside = node.child("InRoutePosition").only()
     if inside.tag == "FromCurrentEntity":
         return OfEntity(ctx.entity(inside))

@@ -60,7 +60,7 @@ def spots_of(map: RoadMap) -> Spots:
 
 
 def spot_at(map: RoadMap, point: LanePoint) -> Spots:
-    """Returns one place as spots."""
+    """Returns one lane point as spots of length 1."""
     values = (
         point.x, point.y, point.heading, point.road, point.lane_id, map.s_road(point), point.lane,
         point.s,
@@ -72,7 +72,7 @@ class Region(Protocol):
     """A part of the world, perhaps around something that moves."""
 
     def inside(self, scene: Scene, spots: Spots) -> Mask:
-        """Which spots lie in it now."""
+        """Returns the mask of the spots that lie in the region now."""
         ...
 
 

@@ -235,7 +235,7 @@ class OnTrajectory:
 
 
 def trajectory_position(node: Node, ctx: Context) -> Position:
-    """Compiles a <TrajectoryPosition> element."""
+    """Compiles a <TrajectoryPosition> with s and t in m from its trajectory."""
     trajectory = compile_trajectory(node.child("TrajectoryRef").only(), ctx)
     s, t = node.number("s"), node.number("t", 0.0)
     return OnTrajectory(trajectory, s, t, orientation(node))

@@ -29,19 +29,19 @@ class StatefulElement:
         self.path, self.state = path, State.STANDBY
 
     def turn(self, scene: Scene, state: State, move: Move) -> None:
-        """Turns into another state."""
+        """Sets the element's state and reports it, and the transition, to the scene."""
         self.state = state
         scene.states[self.path] = state
         scene.moved(self.path, move)
 
     @property
     def running(self) -> bool:
-        """Whether the element is under way."""
+        """Returns whether the element is under way."""
         return self.state is State.RUNNING
 
     @property
     def complete(self) -> bool:
-        """Whether the element is over."""
+        """Returns whether the element is in the state COMPLETE."""
         return self.state is State.COMPLETE
 
 
@@ -100,7 +100,7 @@ class ToldEvent(StatefulElement):
             self.turn(scene, State.STANDBY if self.left > 0 else State.COMPLETE, Move.END)
 
     def stop(self, scene: Scene) -> None:
-        """Ends the event early."""
+        """Ends the event early: actors let go of its actions, and it is complete."""
         if self.complete:
             return
         for path, runs in self.going:
@@ -142,14 +142,14 @@ class ToldParent(StatefulElement):
                 child.start(scene)
 
     def look(self, scene: Scene) -> None:
-        """Look at the triggers inside."""
+        """Checks the triggers of the elements inside, while it is running."""
         if self.running:
             for child in self.children:
                 if isinstance(child, ToldParent):
                     child.look(scene)
 
     def step(self, scene: Scene) -> None:
-        """Go on with what is inside."""
+        """Steps the elements inside, and ends when all of them are complete."""
         if not self.running:
             return
         for child in self.children:
@@ -158,7 +158,7 @@ class ToldParent(StatefulElement):
             self.end(scene)
 
     def end(self, scene: Scene) -> None:
-        """All inside is complete."""
+        """Sets the element complete, as all inside is complete."""
         self.turn(scene, State.COMPLETE, Move.END)
 
     def stop(self, scene: Scene) -> None:
@@ -177,7 +177,7 @@ class ToldManoeuvre(ToldParent):
         super().__init__(manoeuvre.path, self.events)
 
     def look(self, scene: Scene) -> None:
-        """Let events begin."""
+        """Launches every event that is due, while the manoeuvre is running."""
         if not self.running:
             return
         for event in self.events:
@@ -194,7 +194,7 @@ class ToldGroup(ToldParent):
         super().__init__(group.path, self.manoeuvres)
 
     def end(self, scene: Scene) -> None:
-        """Begins once more, or is complete."""
+        """Begins the group once more, or sets it complete when its count is used up."""
         self.left -= 1
         if self.left <= 0:
             self.turn(scene, State.COMPLETE, Move.END)
@@ -235,7 +235,7 @@ class ToldStory(ToldParent):
         super().__init__(story.path, self.acts)
 
     def start(self, scene: Scene) -> None:
-        """Acts have triggers of their own."""
+        """Sets the story running; its acts have triggers of their own."""
         self.turn(scene, State.RUNNING, Move.START)
 
 
@@ -250,7 +250,7 @@ class Telling:
 
     @property
     def events(self) -> list[ToldEvent]:
-        """Every event of all stories."""
+        """Returns every event of all stories."""
         return [e for a in self.acts for g in a.groups for m in g.manoeuvres for e in m.events]
 
     def look(self, scene: Scene) -> None:

@@ -31,7 +31,7 @@ class Node:
 
     @property
     def tag(self) -> str:
-        """Name of the XML element."""
+        """Returns the name of the XML element."""
         return str(self.element.tag)
 
     @property
@@ -45,7 +45,7 @@ class Node:
         return Finding(self.file.name, self.line, self.tag, what, kind)
 
     def error(self, what: str) -> Fault:
-        """Something in this element is wrong."""
+        """Returns the fault to raise about something wrong in this element."""
         return Fault(self.finding(what))
 
     def unsupported(self, what: str = "") -> Fault:
@@ -84,7 +84,7 @@ class Node:
         return children[0]
 
     def has(self, name: str) -> bool:
-        """Whether the attribute is there."""
+        """Returns whether the node has that attribute."""
         return self.element.get(name) is not None
 
     def label(self) -> str:
@@ -132,7 +132,7 @@ class Node:
         return value
 
     def limit(self, name: str, default: float | None = None) -> float:
-        """A number that may be infinite."""
+        """Returns a number that may be infinite; raises a fault for any other text."""
         text = self.text(name, None if default is None else repr(default))
         try:
             value = float(text)

@@ -116,7 +116,7 @@ class Entity:
 
     @property
     def is_ghost(self) -> bool:
-        """It is seen and touches nothing."""
+        """Returns whether the entity is seen but touches nothing."""
         return self.properties.get(GHOST, "").lower() in ("true", "1")
 
 
@@ -130,7 +130,7 @@ class Entities:
 
 
 def compile_entities(root: Node, catalogs: Catalogs) -> Entities:
-    """The <Entities> of a file."""
+    """Compiles the <Entities> of a file; faulty ones become findings."""
     found: dict[str, Entity] = {}
     findings: list[Finding] = []
     node = root.child("Entities")

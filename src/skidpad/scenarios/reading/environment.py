@@ -77,7 +77,7 @@ class Environment:
 
 
 def compile_environment(node: Node) -> Environment:
-    """Compiles an <Environment> element."""
+    """Compiles an <Environment> with its weather, road condition and time of day."""
     weather, road, time = (node.find(t) for t in ("Weather", "RoadCondition", "TimeOfDay"))
     wetness, scale = None, None
     if road is not None:

@@ -159,7 +159,7 @@ class _Reader:
             raise ExpressionError(f"{self.peek()!r} is too much")
 
     def value(self, binding: int) -> Value:
-        """What binds at least so strongly."""
+        """Returns the value of the operators that bind more strongly than `binding`."""
         self.depth += 1
         if self.depth > DEPTH_MAX:
             raise ExpressionError("too many brackets")
@@ -202,7 +202,7 @@ class _Reader:
         raise ExpressionError(f"parameter {text!r} is not declared")
 
     def call(self, name: str) -> float:
-        """A function of the standard."""
+        """Returns the value of a function of the standard with its arguments in parentheses."""
         count, function = FUNCTIONS[name]
         self.take("(")
         arguments = [_number(self.value(0))]

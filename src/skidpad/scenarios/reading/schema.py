@@ -21,7 +21,7 @@ INSTALLER = "scenariogeneration"
 
 
 def schema_file(minor: str) -> Path:
-    """The schema of OpenSCENARIO 1.`minor`."""
+    """Returns the path of the installed schema of OpenSCENARIO 1.`minor`."""
     installed = distribution(INSTALLER)
     found = next(f for f in installed.files or () if Path(f).name == FILES[minor])
     return Path(str(installed.locate_file(found)))

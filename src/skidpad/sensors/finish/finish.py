@@ -47,7 +47,7 @@ class Finish:
         self._lamps = Lamps(table, roadside.heads)
 
     def look_out(self, weather: Weather, light: Lighting) -> None:
-        """The weather is another one."""
+        """Sets what the pictures take from the weather and its light."""
         self._light = light
         self._shade = shade_of(light)
         self._gains = gains(light)

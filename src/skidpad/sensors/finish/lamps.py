@@ -70,7 +70,7 @@ class Lamps:
         braking: NDArray[np.bool_],
         light: Lighting,
     ) -> Sources:
-        """The lamps that shine now."""
+        """Returns the lamps that shine now, as light sources."""
         dark = max(float(light.lamps), BY_DAY)
         on = self._has & states.present
         head = HEAD_POWER * dark if light.lamps > 0.0 or light.wet > WET_DAY else 0.0

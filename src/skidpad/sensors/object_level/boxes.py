@@ -125,7 +125,7 @@ def group_walls(walls: Walls) -> WallGroups:
 
 
 def posts_of(roadside: Roadside) -> Boxes:
-    """Every roadside box."""
+    """Returns every box of the roadside as arrays."""
     rows = [(b.x, b.y, b.z, b.yaw, b.length, b.width, b.height) for b in roadside.boxes]
     return Boxes(*np.array(rows, dtype=np.float64).reshape(-1, 7).T.copy())
 

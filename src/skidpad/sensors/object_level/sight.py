@@ -141,5 +141,5 @@ def sees_point(
 
 
 def empty_sight(n: int) -> Sight:
-    """A buffer for n actors."""
+    """Returns an empty buffer of sight for n actors."""
     return Sight(np.full(BEARINGS, np.inf), np.full(BEARINGS, -1, dtype=np.int32), np.zeros(n))

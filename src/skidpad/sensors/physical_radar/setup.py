@@ -74,7 +74,7 @@ def setup_of(spec: RadarSpec, key: np.uint64, weather: Weather | None) -> RadarS
 
 
 def _air(spec: RadarSpec, factor: float, ranges: int, high: float, rain: float) -> RadarAir:
-    """Losses and clutter; rain: mm/h."""
+    """Returns losses and clutter by range; rain is in mm/h."""
     distance = np.maximum(np.arange(ranges) * RANGE_STEP, RANGE_STEP)
     loss = 2.0 * DB * rain_attenuation_db_km(rain) / 1000.0
     radome = np.array([DB * wet_radome_db(rain, float(v), RADAR_GHZ) for v in range(FASTEST)])

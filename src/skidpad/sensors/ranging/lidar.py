@@ -72,7 +72,7 @@ class Lidar:
         carrier: int,
         states: ActorStates | None = None,
     ) -> LidarPoints:
-        """The returns of one tick.
+        """Returns the points of one tick.
 
         carrier: row of the actor that carries it unseen, or -1. states: of all, for their spray.
         """

@@ -38,7 +38,7 @@ class Radar:
         self._points = np.empty((4, beam.rays), dtype=np.float32)
 
     def view(self, pose_world_carrier: Pose) -> View:
-        """The pyramid that holds every ray."""
+        """Returns the view whose pyramid holds every ray of the radar."""
         pose = pose_world_carrier @ self.spec.mount
         return View(
             self._columns,

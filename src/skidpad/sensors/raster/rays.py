@@ -60,7 +60,7 @@ def make_rays(n: int, width: int, height: int) -> Rays:
 
 
 def make_hits(n: int) -> Hits:
-    """Room for n hits."""
+    """Returns arrays that have room for n hits."""
     return Hits(np.zeros(n), np.zeros(n, dtype=np.int32), np.zeros(n))
 
 

@@ -40,7 +40,7 @@ EMPTY = Mesh.of(np.empty((0, 3)), np.empty((0, 3), dtype=np.int32), 0, 0)
 
 
 def merge(meshes: Sequence[Mesh]) -> Mesh:
-    """All of them as one mesh."""
+    """Returns all the meshes as one mesh."""
     if not meshes:
         return EMPTY
     offsets = np.cumsum([0, *(len(m.vertices) for m in meshes[:-1])])
@@ -95,7 +95,7 @@ def box(
     label: int,
     material: int,
 ) -> Mesh:
-    """An axis-parallel box."""
+    """Returns the mesh of an axis-parallel box between the limits (low, high) in m."""
     corners = np.array([[a, b, c] for a in x for b in y for c in z], dtype=np.float64)
     return hexahedron(corners, label, material)
 

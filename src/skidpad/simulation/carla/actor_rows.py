@@ -118,7 +118,7 @@ def make_row_in_waiting(name: str, blueprint: Any) -> ActorRow:
 
 
 def table_of(players: Sequence[ActorRow]) -> ActorTable:
-    """What does not change about them."""
+    """Returns the table of what does not change about the actors: names, types, sizes."""
     sizes = np.array([p.size for p in players])
     return ActorTable(
         names=tuple(p.name for p in players),

@@ -36,16 +36,16 @@ class ActorSet:
 
     @property
     def ego(self) -> Any:
-        """The carla.Vehicle of the ego."""
+        """Returns the carla.Vehicle of the ego."""
         return self.players[EGO].actor
 
     def grip_on(self, player: ActorRow) -> None:
-        """Only vehicles have tyres (B-065)."""
+        """Applies the grip to the actor where it is a vehicle: only vehicles have tyres (B-065)."""
         if player.actor is not None and player.is_vehicle:
             self._grip.apply(player.actor)
 
     def command(self, player: ActorRow, c: VehicleCommand) -> None:
-        """Pedals and steer of a vehicle."""
+        """Applies pedals and steer to a vehicle, steer mirrored into CARLA's axes."""
         control = self._carla.VehicleControl(
             throttle=c.throttle,
             steer=mirror_value(c.steer),

@@ -67,7 +67,7 @@ class CarlaBackend:
         return frame
 
     def truth(self) -> WorldTruth:
-        """Ground truth of the moment."""
+        """Returns the ground truth of the present tick."""
         return self.session.truth()
 
     def relocate(self, pose: Pose, v: float) -> None:

@@ -36,11 +36,11 @@ class EgoEvents:
         self._quiet_until = 0
 
     def hear_collision(self, event: Any) -> None:
-        """Receives a message of sensor.other.collision."""
+        """Stores a message of sensor.other.collision."""
         self._collisions.append(event)
 
     def hear_invasion(self, event: Any) -> None:
-        """Receives a message of sensor.other.lane_invasion."""
+        """Stores a message of sensor.other.lane_invasion."""
         self._invasions.append(event)
 
     def forget(self, tick: int) -> None:
@@ -105,7 +105,7 @@ def marking_name(kind: Any) -> str:
 
 
 def drain(queue: deque[Any]) -> list[Any]:
-    """Everything that has arrived by now."""
+    """Removes and returns everything that has arrived in the queue by now."""
     return [queue.popleft() for _ in range(len(queue))]
 
 

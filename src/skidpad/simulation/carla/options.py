@@ -34,9 +34,9 @@ class CarlaOptions:
 
     @property
     def address(self) -> str:
-        """The address as host:port, for messages."""
+        """Returns the address as host:port, for messages."""
         return f"{self.host}:{self.port}"
 
     def uses(self, one: Optimisation) -> bool:
-        """Whether an optimisation is switched on."""
+        """Returns whether an optimisation is switched on."""
         return one in self.optimisations

@@ -171,7 +171,7 @@ class Session:
         self._read()
 
     def _push(self, i: int) -> None:
-        """An initial speed."""
+        """Gives actor i its initial speed along its yaw, where it has one."""
         v = self._starting.get(i)
         if v is not None:
             self.actor_set.push(i, float(self.states.yaw[i]), v)
@@ -215,7 +215,7 @@ class Session:
         self.invasions = self.events.invasions(self.tick, self.states)
 
     def truth(self) -> WorldTruth:
-        """Ground truth of the moment."""
+        """Returns the ground truth of the present tick."""
         return WorldTruth(
             tick=self.tick,
             table=self.table,
@@ -229,7 +229,7 @@ class Session:
         )
 
     def frame(self) -> SensorFrame:
-        """What the ego's sensors say."""
+        """Returns the frame of the ego's sensors at the present tick."""
         seen, asked = self.reader.read(
             self.tick, self.messages, self.states, self.commands, self.light_states
         )

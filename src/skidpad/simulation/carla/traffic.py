@@ -75,7 +75,7 @@ class Traffic:
         return entered
 
     def close(self) -> None:
-        """Let the manager's thread go."""
+        """Shuts the Traffic Manager and its thread down."""
         self.manager.set_synchronous_mode(False)
         self.manager.shut_down()
 

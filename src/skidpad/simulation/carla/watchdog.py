@@ -30,7 +30,7 @@ class Watchdog:
             self._timer.start()
 
     def stop(self) -> None:
-        """Awaits nothing any more."""
+        """Cancels the timer, so that nothing is awaited any more."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None

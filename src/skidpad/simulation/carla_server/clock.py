@@ -89,7 +89,7 @@ class Clock:
 
     @property
     def step(self) -> float:
-        """s by which one tick advances."""
+        """Returns the time in s by which one tick advances."""
         return self.settings.step
 
     def advance(self) -> None:

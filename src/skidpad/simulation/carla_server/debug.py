@@ -28,7 +28,7 @@ class DebugShapes:
         self.shapes: list[Shape] = []
 
     def draw(self, value: Any) -> None:
-        """Keep one shape from a call."""
+        """Adds one debug shape from a call, for its life time in s or for ever."""
         primitive, colour, life, persistent = wire.items(value, "debug shape", 4)
         index, body = wire.items(primitive, "debug shape.primitive", 2)
         kind = KINDS[wire.integer(index, "debug shape.primitive", 0, len(KINDS) - 1)]

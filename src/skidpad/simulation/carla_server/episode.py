@@ -118,7 +118,7 @@ class Episode:
         self._enter(self.spectator)
 
     def _place_map_actors(self) -> None:
-        """Traffic lights and signs."""
+        """Adds an actor for each traffic light and sign of the map."""
         roads = self.map.roads
         for post in posts_of(roads, self.moving.lights):
             actor = light_actor(self.actors.new_id(), post)
@@ -289,7 +289,7 @@ class Episode:
         self.falling.tick(dt)
 
     def follow(self) -> None:
-        """Children go where their parents went."""
+        """Moves each attached actor to its mount on its parent."""
         for actor in self.actors:
             carrier = self.actors.carrier(actor) if actor.parent else None
             if carrier is not None:

@@ -51,7 +51,7 @@ class ServerProcess:
             pass
 
     def stop(self) -> None:
-        """End it; safe to call twice."""
+        """Ends the server process; it is safe to call twice."""
         if self._process.poll() is None:
             self._process.terminate()
             try:
@@ -62,7 +62,7 @@ class ServerProcess:
 
     @property
     def alive(self) -> bool:
-        """Whether the server's process still runs."""
+        """Returns whether the server's process still runs."""
         return self._process.poll() is None
 
     def __enter__(self) -> ServerProcess:

@@ -122,7 +122,7 @@ class RpcConnection(asyncio.Protocol):
 
 
 def ticks(request: Request) -> bool:
-    """Whether a request advances the simulation."""
+    """Returns whether a request advances the simulation."""
     if request.method == "apply_batch":
         return len(request.arguments) == 2 and request.arguments[1] is True
     return request.method == "tick_cue"

@@ -141,7 +141,7 @@ class Rows:
         return {actor: row for row, actor in enumerate(self._ids)}
 
     def tobytes(self) -> bytes:
-        """All rows as they travel."""
+        """Returns the bytes of all rows as they travel."""
         return self._buffer[: self.count].tobytes()
 
 

@@ -68,7 +68,7 @@ class Waker:
             self._timer = self.later(self.patience, self._silent)
 
     def stop(self) -> None:
-        """Wait for nothing any more."""
+        """Cancels the timer, so that nothing is awaited any more."""
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None

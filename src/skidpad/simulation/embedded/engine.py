@@ -47,7 +47,7 @@ class EmbeddedBackend:
 
     @property
     def map(self) -> RoadMap:
-        """The map of the run."""
+        """Returns the map of the run."""
         return self.world.map
 
     def reset(self, setup: Setup, seed: int) -> Frame:
@@ -62,13 +62,13 @@ class EmbeddedBackend:
         return self._frame()
 
     def step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand] = ()) -> Frame:
-        """Apply the commands for one step."""
+        """Applies the commands for one step and returns its frame."""
         self.world.command(EGO, command)
         self.world.step(actor_commands)
         return self._frame()
 
     def truth(self) -> WorldTruth:
-        """Ground truth of the moment."""
+        """Returns the ground truth of the present tick."""
         w = self.world
         return WorldTruth(
             tick=w.tick,
@@ -124,7 +124,7 @@ class EmbeddedBackend:
         return AskedSensors(self.map, self.world.table, self._setup, seed=self._seed)
 
     def close(self) -> None:
-        """Forget the run."""
+        """Drops the world of the run."""
         self._world = None
 
     def _frame(self) -> SensorFrame:

@@ -35,6 +35,6 @@ def contacts_of_nobody() -> tuple[Any, ...]:
 
 
 def compile_parts() -> None:
-    """Vehicles and contacts."""
+    """Compiles the kernels of vehicle motion and of contacts by running them on no actors."""
     resolve_contacts(*contacts_of_nobody())
     step_vehicles(*vehicles_of_nobody())

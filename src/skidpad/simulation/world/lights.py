@@ -39,7 +39,7 @@ class Light:
     elapsed: float = 0.0  # s in this state
 
     def show(self, state: LightState, elapsed: float = 0.0) -> None:
-        """Another state, its time anew."""
+        """Sets the light's state and the time in s for which it has shown it."""
         self.state, self.elapsed = state, elapsed
 
 
@@ -53,7 +53,7 @@ class Group:
     frozen: bool = False
 
     def lights(self) -> Iterable[Light]:
-        """All of them."""
+        """Returns all lights of the group, phase by phase."""
         return (light for phase in self.phases for light in phase)
 
     def reset(self) -> None:
@@ -171,7 +171,7 @@ class Lights:
         return next(phase for phase in self.groups[light.group].phases if light in phase)
 
     def is_frozen(self, light: Light) -> bool:
-        """Whether its group stands still."""
+        """Returns whether the cycle of the light's group stands still."""
         return self.frozen or self.groups[light.group].frozen
 
     def reset(self, group: Group | None = None) -> None:

@@ -43,7 +43,7 @@ class _Segment(NamedTuple):
 
 @lru_cache(maxsize=8)
 def obstacles(map: RoadMap) -> Obstacles:
-    """Everything solid beside the road."""
+    """Returns everything solid beside the roads of a map."""
     found = [s for b in map.roadside.barriers if b.kind in BARRIERS for s in _of_barrier(b)]
     found += [s for b in map.roadside.boxes if b.solid for s in _of_box(b)]
     lines = np.array([s.line for s in found], dtype=np.float64).reshape(-1, 4)

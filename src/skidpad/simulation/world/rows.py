@@ -50,7 +50,7 @@ class Member:
 
     @property
     def kind(self) -> ActorKind:
-        """What it is."""
+        """Returns the kind of actor that the member's body is."""
         body = self.actor.body
         return body.actor_kind if isinstance(body, VehicleType) else body.kind
 
@@ -77,7 +77,7 @@ class Rows(NamedTuple):
 
     @classmethod
     def of(cls, members: Sequence[Member], seed: int) -> Rows:
-        """Actors at the origin, not present."""
+        """Returns the rows of the members: at the origin and not present."""
         n = len(members)
         sizes = [m.actor.body for m in members]
         return cls(

@@ -176,7 +176,7 @@ def _glide(rows: Rows, moved: Flags, first: int, dt: float) -> None:
 
 @inner_kernel
 def _touchable(a: Arena) -> ActorStates:
-    """The states, present who collides."""
+    """Returns the states in which only actors that collide are present."""
     s = a.rows.states
     for i in range(len(a.touchable)):
         a.touchable[i] = s.present[i] and a.rows.collides[i]

@@ -125,7 +125,7 @@ def cross_markings(m: Markings, lanes: LaneArrays, placed: Places) -> int:
 def invasions(
     m: Markings, map: RoadMap, placed: Places, tick: int, crossed: int
 ) -> tuple[LaneInvasion, ...]:
-    """The events behind these bits."""
+    """Returns the ego's lane invasion for each side in the bits `crossed`."""
     at, road = int(placed["sample"][EGO]), int(map.lanes.road[placed["lane"][EGO]])
     sides = [column[at] for bit, column in ((LEFT, m.left), (RIGHT, m.right)) if crossed & bit]
     return tuple(LaneInvasion(tick, Marking(int(kind)).name.lower(), road) for kind in sides)

@@ -424,7 +424,7 @@ class World:
     # --- questions
 
     def braking(self) -> NDArray[np.bool_]:
-        """(n,) whose brake lamps are lit."""
+        """Returns the mask (n,) of the actors whose brake lamps are lit."""
         return self.commands[:, 1] > BRAKING
 
     def signs(self) -> RoadSigns:
@@ -436,7 +436,7 @@ class World:
         self.commands[i] = (c.throttle, c.brake, c.steer, c.handbrake, c.reverse)
 
     def _obey(self, word: ActorCommand) -> None:
-        """Follow a player's word."""
+        """Carries out the command of an actor; raises ConfigError for an actor that the run lacks."""
         i = self.index.get(word.actor)
         if i is None:
             raise ConfigError(f"there is no actor {word.actor!r} in this run")

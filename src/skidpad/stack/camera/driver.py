@@ -64,7 +64,7 @@ class CameraDriver:
 
     @property
     def mode(self) -> str:
-        """The winner of the tiers."""
+        """Returns the tier that won, in lower case; empty text before the first tick."""
         return "" if self.report.tier is None else self.report.tier.name.lower()
 
     def sensors(self) -> tuple[SensorSpec, ...]:
@@ -72,7 +72,7 @@ class CameraDriver:
         return CAMERAS
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
-        """See, decide, actuate."""
+        """Returns the command of one tick from the front picture and the own speed."""
         label = seen(self.picture(frame))
         v = frame.ego.speed
         offsets, gap = self._path(label), self._gap(label)
@@ -96,7 +96,7 @@ class CameraDriver:
         return VehicleCommand(request.throttle, request.brake, steer, request.handbrake)
 
     def picture(self, frame: SensorFrame) -> Picture:
-        """What the network is shown."""
+        """Returns the picture that the network is shown."""
         return mosaic(images_of(frame.extra))
 
     def _path(self, label: Label) -> Floats:

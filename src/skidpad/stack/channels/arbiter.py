@@ -60,7 +60,7 @@ class Arbiter:
         self.reset()
 
     def reset(self) -> None:
-        """Nobody drives yet."""
+        """Resets the choice: no channel drives and none was heard."""
         self.driving: int | None = None
         self.changed_at = -np.inf
         self.wanted_since: tuple[int | None, float] = (None, -np.inf)

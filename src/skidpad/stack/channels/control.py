@@ -27,7 +27,7 @@ class Controller:
         self.reset()
 
     def reset(self) -> None:
-        """No trim."""
+        """Resets the trim of the pedals and the last measured speed."""
         self.trim = 0.0
         self.v_before: float | None = None
         self.a_wanted = 0.0

@@ -52,7 +52,7 @@ class RoutePath:
 
     @property
     def length(self) -> float:
-        """m."""
+        """Returns the length of the path in m."""
         return (len(self.points.x) - 1) * STEP
 
 

@@ -69,7 +69,7 @@ class Tracker:
         self._poses: deque[tuple[float, Floats]] = deque(maxlen=16)
 
     def update(self, view: ChannelView) -> None:
-        """Take in one view."""
+        """Moves the own pose on and updates the tracks with one view of the channel."""
         dt = 0.0 if self.t is None else view.t - self.t
         self.t = view.t
         speed, rate = float(view.ego[3]), float(view.ego[4])

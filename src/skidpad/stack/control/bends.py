@@ -41,7 +41,7 @@ class BendSpeed:
         self.reset()
 
     def reset(self) -> None:
-        """Forgets what was looked at."""
+        """Resets the allowed speed to none, so that bends are looked at anew."""
         self.allowed, self.wait = inf, 0
 
     def update(self, v: float, curvature: CurvatureAhead) -> float:

@@ -35,7 +35,7 @@ class Pid:
         self.integral = 0.0
 
     def update(self, error: float) -> float:
-        """The output after one more step."""
+        """Returns the controller's output for the error of one more step."""
         g = self.gains
         self.integral += error * self.dt
         self.integral = min(max(self.integral, -INTEGRAL_LIMIT), INTEGRAL_LIMIT)

@@ -24,7 +24,7 @@ class ResumeProtocol:
         self.reset()
 
     def reset(self) -> None:
-        """No stop yet."""
+        """Resets the protocol to no stop and no curve."""
         self.ticks: int | None = None
         self.in_curve = self.past_curve = False
 
@@ -35,7 +35,7 @@ class ResumeProtocol:
 
     @property
     def active(self) -> bool:
-        """The cap holds (A-174, A-176)."""
+        """Returns whether the speed cap after a stop holds (A-174, A-176)."""
         if self.ticks is None:
             return False
         if self.ticks < self.duration:
@@ -69,7 +69,7 @@ class SpeedCaps:
         return RESUME_KMH if self.resumes and resume_active else inf
 
     def cruise_kmh(self, resume_active: bool) -> float:
-        """Target of free cruise (A-135, A-174)."""
+        """Returns the target of free cruise in km/h (A-135, A-174)."""
         return min(self.v_cruise_kmh, self._resume(resume_active))
 
     def following_kmh(self, resume_active: bool) -> float:

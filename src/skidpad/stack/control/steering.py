@@ -76,7 +76,7 @@ class LazyDriver:
         self.lookahead, self.dead_band, self.gain = lookahead, dead_band, gain
 
     def steer(self, pose: Pose, v: float, path: PathAhead) -> float:
-        """Steers as `LaneCentring.steer` does."""
+        """Returns the steering command in -1..1 by a proportional law with a dead band."""
         command = steer_towards(pose, kmh_from_mps(v), path(self.lookahead, pose.yaw))
         return 0.0 if abs(command) < self.dead_band else self.gain * command
 
@@ -106,11 +106,11 @@ class Smoothing:
         self.reset()
 
     def reset(self) -> None:
-        """Wheel straight."""
+        """Resets the smoothed command to a straight wheel."""
         self.steer = 0.0
 
     def update(self, command: float) -> float:
-        """The smoothed command."""
+        """Returns the command, smoothed and limited in its change per tick."""
         change = self.share * (command - self.steer)
         self.steer += min(max(change, -self.step), self.step)
         return self.steer
@@ -123,5 +123,5 @@ class NoSmoothing(NamedTuple):
         """Does nothing, as nothing is remembered."""
 
     def update(self, command: float) -> float:
-        """The command."""
+        """Returns the command as it is."""
         return command

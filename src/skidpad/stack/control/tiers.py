@@ -117,7 +117,7 @@ class SpeedControl(Protocol):
     """What holds a speed."""
 
     def reset(self) -> None:
-        """Forget what was summed."""
+        """Resets what the controller has summed up."""
         ...
 
     def update(self, error: float) -> float:
@@ -134,7 +134,7 @@ class Rule(Protocol):
 
 
 def clip(value: float, low: float, high: float) -> float:
-    """`value` limited to [low, high]."""
+    """Returns the value limited to [low, high]."""
     return min(max(value, low), high)
 
 
@@ -196,7 +196,7 @@ class LeadAtLight:
         self.reset()
 
     def reset(self) -> None:
-        """Let go."""
+        """Releases the hold behind a lead at a red light."""
         self.holding = False
 
     def __call__(self, s: Situation) -> Request | None:
@@ -294,7 +294,7 @@ class Cruise:
         self.reset()
 
     def reset(self) -> None:
-        """No lead for long."""
+        """Resets the time since the last lead, so that no coasting is due."""
         self.ticks_since_lead = self.coast_ticks
 
     def __call__(self, s: Situation) -> Request:
@@ -307,7 +307,7 @@ class Cruise:
         return Request(Tier.CRUISE, brake=min(-u, CRUISE_BRAKE_MAX))
 
     def conclude(self, winner: Tier) -> None:
-        """What the tick came to."""
+        """Counts the ticks since a tier that followed a lead has won."""
         self.ticks_since_lead = 0 if winner in COASTED_FROM else self.ticks_since_lead + 1
 
 

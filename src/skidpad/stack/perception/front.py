@@ -88,7 +88,7 @@ class Front:
         self.switch(functions)
 
     def switch(self, functions: Functions) -> None:
-        """Functions that perception depends on."""
+        """Sets what perception evaluates for these driving functions."""
         self.follows = Function.ACC in functions
         narrow = self.settings.roof_corridor is RoofCorridor.FLAT_WITHOUT_LCA
         flat = narrow and Function.LCA not in functions
@@ -100,7 +100,7 @@ class Front:
         self.verification = Verification(self.bumper, self.roof)
 
     def reset(self) -> None:
-        """The ego stands elsewhere."""
+        """Resets all filters, as after a relocation of the ego."""
         self.median.reset()
         self.persistence.reset()
         for part in (self.rate, self.radar):
@@ -130,7 +130,7 @@ class Front:
         )
 
     def conclude(self, sight: Sight, stopping: bool) -> None:
-        """What the tick came to."""
+        """Passes the outcome of the tick on to the persistence of detections."""
         self.persistence.conclude(sight.distance is not None, self.follows, stopping)
 
     def verify(self, frame: SensorFrame, distance: float, view: LaneView) -> tuple[bool, str]:

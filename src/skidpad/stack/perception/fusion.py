@@ -166,7 +166,7 @@ class MedianFilter:
         self.reset()
 
     def reset(self) -> None:
-        """Forget all targets."""
+        """Resets the samples to no target."""
         self.samples = deque([NOTHING] * MEDIAN_SAMPLES, maxlen=MEDIAN_SAMPLES)
 
     def update(self, distance: float | None) -> float | None:
@@ -185,7 +185,7 @@ class RateFilter:
         self.reset()
 
     def reset(self) -> None:
-        """Start from no target."""
+        """Resets the smoothed distance and its history to no target."""
         self.smoothed = NOTHING
         self.history = deque([NOTHING] * self.length, maxlen=self.length)
 

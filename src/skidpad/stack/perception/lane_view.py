@@ -66,7 +66,7 @@ class FirstBranchRoute:
     """A route as printed: stay in the lane and take whichever branch comes first."""
 
     def reference(self, map: RoadMap, point: LanePoint, highway: frozenset[int]) -> LanePoint:  # noqa: ARG002
-        """The lane itself."""
+        """Returns the point itself: the reference is the ego's own lane."""
         return point
 
     def ahead(

@@ -134,7 +134,7 @@ class StopLock:
         self.reset()
 
     def reset(self) -> None:
-        """No commitment."""
+        """Resets the lock, so that no stop is committed to."""
         self.signal: int | None = None
         self.remaining = 0.0
 

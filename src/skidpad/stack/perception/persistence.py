@@ -55,7 +55,7 @@ class Persistence:
         self.reset()
 
     def reset(self) -> None:
-        """No target yet."""
+        """Resets the counters and the memory to no target."""
         self.seen_ticks = 0
         self.missed_ticks = 0
         self.last_distance: float | None = None

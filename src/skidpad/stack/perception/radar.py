@@ -207,7 +207,7 @@ class Radar:
         self.reset()
 
     def reset(self) -> None:
-        """No measurement yet."""
+        """Resets the velocity limit to that of the first measurement."""
         self.velocity_limit = FIRST_VELOCITY_LIMIT
 
     def update(

@@ -81,7 +81,7 @@ class ReferenceDriver:
         self.report = StackReport()
 
     def act(self, view: DriverView) -> VehicleCommand:
-        """Look, decide, actuate."""
+        """Returns the driver's command for one view; moderate braking off every lane."""
         place = self.way.update(view.pose)
         if place is None:  # off every lane
             self.report = StackReport(tier=Tier.NONE)
@@ -222,7 +222,7 @@ class ReferenceStack:
         return "" if tier is None else tier.name.lower()
 
     def sensors(self) -> tuple[SensorSpec, ...]:
-        """The eyes of this person."""
+        """Returns the eyes of this person as the only sensor."""
         return (EyesSpec(EYES, self.person.reaction),)
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:

@@ -34,7 +34,7 @@ class Person:
 
 
 def person_of(seed: int) -> Person:
-    """The driver of a seed.
+    """Returns the driver that a seed draws.
 
     A careful driver keeps at least the headway that the own reaction needs: who follows closer than
     that cannot stop behind a leader that brakes as hard.

@@ -49,7 +49,7 @@ class Way:
         self.reset()
 
     def reset(self) -> None:
-        """The car stands elsewhere."""
+        """Resets the place on the path, as after a relocation of the car."""
         self.at: int | None = None
 
     def update(self, pose: Pose) -> Place | None:

@@ -214,7 +214,7 @@ def load_data() -> dict[str, Any]:
 
 @cache
 def load_catalogue() -> dict[str, Blueprint]:
-    """Returns all blueprints by id."""
+    """Returns the blueprints of all actors by id."""
     data = load_data()
     actor = _attributes(data["attributes"]["actor"])
     made: list[Blueprint] = []

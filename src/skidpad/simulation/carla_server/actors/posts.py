@@ -40,11 +40,11 @@ class Posts:
         self._actors[post.light.signal] = actor
 
     def light(self, actor: int) -> Light:
-        """The light of an actor."""
+        """Returns the light of an actor id."""
         return self._by_actor[actor].light
 
     def actor(self, light: Light) -> int:
-        """The actor of a light."""
+        """Returns the actor id of a light."""
         return self._actors[light.signal]
 
 

@@ -148,7 +148,7 @@ class ActorTable:
         return self.alive.get(id) or self.dead.get(id)
 
     def of(self, family: Family) -> list[Actor]:
-        """All living actors of a family."""
+        """Returns all living actors of a family."""
         return [a for a in self.alive.values() if a.family is family]
 
     def in_row(self, i: int) -> Actor:

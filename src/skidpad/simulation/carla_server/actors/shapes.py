@@ -36,7 +36,7 @@ def body_of(actor: Actor) -> Newcomer:
 
 
 def is_flat(actor: Actor) -> bool:
-    """Whether vehicles roll over it."""
+    """Returns whether the actor is a prop so low that vehicles roll over it."""
     return actor.family is Family.PROP and 2.0 * actor.half[2] < ROLLED_OVER
 
 

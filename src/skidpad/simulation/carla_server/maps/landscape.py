@@ -75,7 +75,7 @@ class EnvironmentObject:
 
 @lru_cache(maxsize=4)
 def objects(roads: RoadMap) -> tuple[EnvironmentObject, ...]:
-    """All objects of a map."""
+    """Returns all objects of a map, with ids in a fixed order."""
     side = roads.roadside
     found = [*_boxes(side), *_heads(side), *_barriers(side)]
     return tuple(
@@ -177,13 +177,13 @@ class Landscape:
         )
 
     def present(self) -> tuple[EnvironmentObject, ...]:
-        """What is there at present."""
+        """Returns the objects of the map that are not switched off."""
         missing = self.missing()
         return tuple(o for o in objects(self.whole) if o.id not in missing)
 
     @property
     def roads(self) -> RoadMap:
-        """The map without what is missing."""
+        """Returns the map without the objects that are switched off."""
         missing = self.missing()
         if missing != self._shown[0]:
             self._shown = missing, without(self.whole, missing) if missing else self.whole
@@ -214,7 +214,7 @@ def without(roads: RoadMap, missing: frozenset[int]) -> RoadMap:
 
 
 def _remaining_barriers(barrier: Barrier, gone: list[Source]) -> Iterator[Barrier]:
-    """What is left of a barrier."""
+    """Yields what is left of a barrier without the pieces that are gone."""
     if not gone:
         yield barrier
         return

@@ -21,7 +21,7 @@ def pack_actor(served: Served, actor: Actor) -> list[Any]:
 
 
 def parse_description(value: Any) -> Wanted:
-    """An ActorDescription of a call."""
+    """Returns blueprint id and attributes of a call's ActorDescription."""
     _, id, given = wire.items(value, "description", 3)
     values = {}
     for entry in wire.items(given, "description.attributes"):

@@ -16,7 +16,7 @@ LONGEST = 1.0e6  # s
 
 
 def light_of(served: Served, id: Any) -> Light:
-    """The light with this actor id."""
+    """Returns the traffic light with this actor id."""
     episode = served.episode
     return episode.posts.light(episode.actors.get(id, Family.TRAFFIC_LIGHT).id)
 

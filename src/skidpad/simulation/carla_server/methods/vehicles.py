@@ -27,7 +27,7 @@ TABLE = Table("vehicles")
 
 
 def vehicle_of(served: Served, id: Any) -> Vehicle:
-    """The living vehicle with this id."""
+    """Returns the living vehicle with this actor id."""
     return served.episode.vehicles.of(served.episode.actors.get(id, Family.VEHICLE).id)
 
 

@@ -124,7 +124,7 @@ def pack(value: Any) -> bytes:
 
 
 def answer(msgid: int, result: Any) -> bytes:
-    """The bytes of a successful answer."""
+    """Returns the bytes of a successful answer."""
     return pack([ANSWER, msgid, None, result])
 
 

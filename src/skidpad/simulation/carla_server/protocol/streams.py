@@ -33,7 +33,7 @@ TOKEN = struct.Struct("<IHBB16s")
 
 
 def canonical(stream: int) -> int:
-    """The stream behind an id."""
+    """Returns the stream behind an id; aliases stand for the episode stream."""
     return EPISODE_STREAM if stream >= EPISODE_ALIASES else stream
 
 
@@ -72,7 +72,7 @@ class StreamHub:
         return TOKEN.pack(stream, self.port, TCP, ADDRESS_NOT_SET, b"")
 
     def exists(self, stream: int) -> bool:
-        """Whether `stream` may be subscribed."""
+        """Returns whether the stream may be subscribed to."""
         return canonical(stream) in self._open
 
     def announce(self, stream: int) -> None:
@@ -104,7 +104,7 @@ class StreamHub:
         return bool(self._listeners.get(stream))
 
     def publish(self, stream: int, *parts: bytes | memoryview) -> None:
-        """Send one message to all listeners."""
+        """Sends one message to all listeners of a stream."""
         listeners = self._listeners.get(stream)
         if not listeners:
             return
@@ -166,7 +166,7 @@ class StreamHub:
         )
 
     def protocol(self) -> StreamConnection:
-        """A connection's protocol, for asyncio's server."""
+        """Returns a connection's protocol, for asyncio's server."""
         return StreamConnection(self)
 
     def admit(self) -> bool:

@@ -37,7 +37,7 @@ def number(value: Any, field: str) -> float:
 
 
 def integer(value: Any, field: str, low: int = 0, high: int = 2**64 - 1) -> int:
-    """An integer in [low, high]."""
+    """Returns the value, an integer in [low, high]; raises WireError for any other."""
     if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
         raise WireError(f"{field} must be an integer between {low} and {high}")
     return value
@@ -51,7 +51,7 @@ def flag(value: Any, field: str) -> bool:
 
 
 def text(value: Any, field: str, longest: int = 4096) -> str:
-    """A text of bounded length."""
+    """Returns the value, a text of bounded length; raises WireError for any other."""
     if not isinstance(value, str) or len(value) > longest:
         raise WireError(f"{field} must be a text of at most {longest} characters")
     return value
@@ -92,7 +92,7 @@ def iso_steer(steer: float) -> float:
 
 
 def iso_to_wire(v: Vector) -> Vector:
-    """A vector in CARLA's axes."""
+    """Returns an ISO 8855 vector in CARLA's axes."""
     return vector_from_carla(*v)
 
 
@@ -102,7 +102,7 @@ def yaw_to_wire(yaw: float) -> float:
 
 
 def pose(value: Any, field: str) -> Pose:
-    """A Transform as an ISO pose."""
+    """Returns the ISO 8855 pose of a Transform on the wire."""
     location, rotation = items(value, field, 2)
     x, y, z = numbers(location, f"{field}.location", 3)
     pitch, yaw, roll = numbers(rotation, f"{field}.rotation", 3)
@@ -110,7 +110,7 @@ def pose(value: Any, field: str) -> Pose:
 
 
 def transform(place: Pose) -> list[list[float]]:
-    """An ISO pose as a Transform."""
+    """Returns an ISO 8855 pose as a Transform on the wire."""
     x, y, z, roll, pitch, yaw = pose_to_carla(place)
     return [[x, y, z], [pitch, yaw, roll]]
 
@@ -125,7 +125,7 @@ def optional(value: Any, field: str) -> Any | None:
 
 
 def some(value: Any | None) -> list[Any]:
-    """An optional as it travels."""
+    """Returns an optional value as on the wire: [False] for None, else [True, value]."""
     return [False] if value is None else [True, value]
 
 

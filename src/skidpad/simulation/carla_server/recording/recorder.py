@@ -76,7 +76,7 @@ class Recorder:
         return f"Recording to file: {path.name}"
 
     def stop(self) -> None:
-        """End the recording, if any."""
+        """Ends the recording and closes its file, if one runs."""
         if self._file is not None:
             self._file.close()
             self._file = None

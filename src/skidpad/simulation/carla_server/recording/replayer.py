@@ -37,7 +37,7 @@ class CarlaRecording:
 
     @property
     def total(self) -> float:
-        """Length of the recording in s."""
+        """Returns the length of the recording in s."""
         return self.times[-1]
 
     def at(self, t: float) -> dict[int, tuple[Pose, Vector]]:
@@ -128,7 +128,7 @@ class Replayer:
         self.release()
 
     def release(self) -> None:
-        """Give the actors back to physics."""
+        """Hands the actors of the replay back to physics."""
         if self._run is not None:
             self._run.free()
         self._run = None

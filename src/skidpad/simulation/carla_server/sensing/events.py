@@ -36,7 +36,7 @@ def collision(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
 
 
 def _of_map(label: SemanticClass) -> Actor:
-    """A nameless piece of the map."""
+    """Returns a nameless actor that stands for a piece of the map with this label."""
     blueprint = Blueprint(MAP_THINGS.get(label, "static.unknown"), Family.PROP, {}, label=label)
     return Actor(0, blueprint, {}, Pose(0.0, 0.0))
 

@@ -120,7 +120,7 @@ def _depth(_: Pictured, __: View, camera: Camera, out: Bytes) -> None:
 
 
 def srgb(linear: Floats) -> Floats:
-    """IEC 61966-2-1, 0 to 1."""
+    """Returns linear light of 0 to 1 encoded as sRGB of 0 to 1 (IEC 61966-2-1)."""
     encoded: Floats = np.where(
         linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055
     )
@@ -133,7 +133,7 @@ def _normal(_: Pictured, view: View, camera: Camera, out: Bytes) -> None:
 
 
 def _material(scene: Pictured, _: View, camera: Camera, out: Bytes) -> None:
-    """Red: metallic, green: specular, blue: roughness."""
+    """Writes metallic into red, specular into green and roughness into blue of the picture `out`."""
     drawn = camera.drawn
     surfaces = scene.shading.surfaces(drawn.key)
     metal = np.isin(drawn.key & 255, METALS)

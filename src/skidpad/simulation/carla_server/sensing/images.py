@@ -59,7 +59,7 @@ class Camera:
         return scene, view
 
     def paint(self, around: Surroundings, actor: Actor, scene: Pictured, view: View) -> None:
-        """Colours the picture that was drawn."""
+        """Colours the picture that was drawn, with the lamps of the carrier."""
         lamps = headlights(around.actors, actor)
         scene.shading.paint(view, lamps, self.drawn.inverse, self.drawn.key, self.rgb)
 

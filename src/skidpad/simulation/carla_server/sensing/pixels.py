@@ -19,7 +19,7 @@ def bgra_from_rgb(packed: NDArray[np.uint32], out: Bytes) -> None:
 
 @kernel
 def bgra_from_labels(labels: Bytes, out: Bytes) -> None:
-    """(H, W) tags into red."""
+    """Writes tags (H, W) into the red channel of the picture `out` (H, W, 4)."""
     for y in range(labels.shape[0]):
         for x in range(labels.shape[1]):
             out[y, x, 0] = 0

@@ -59,11 +59,11 @@ class Radio:
 
     @property
     def wavelength(self) -> float:
-        """Wavelength of the carrier in m."""
+        """Returns the wavelength of the carrier in m."""
         return LIGHT / (self.frequency_ghz * 1e9)
 
     def deviation(self, way: Way) -> float:
-        """dB of fading by shadows."""
+        """Returns the standard deviation in dB of fading by shadows."""
         return FADING[way][self.scenario] if self.fading is None else self.fading
 
 
@@ -114,7 +114,7 @@ class Air:
     calls: list[Call] = field(default_factory=list)
 
     def send(self, frame: int, call: Call) -> None:
-        """Heard in this frame only."""
+        """Adds a message that is heard in this frame only."""
         if frame != self.frame:
             self.frame, self.calls = frame, []
         self.calls.append(call)

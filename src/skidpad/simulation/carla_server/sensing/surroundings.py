@@ -44,7 +44,7 @@ class Pictured:
         self.elapsed = -np.inf
 
     def shade(self, weather: Weather) -> None:
-        """The light of this weather."""
+        """Sets the light of the pictures to that of this weather."""
         if self.weather is not weather:
             self.weather = weather
             static, light = self.live.static, lighting(weather)

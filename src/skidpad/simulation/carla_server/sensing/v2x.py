@@ -52,7 +52,7 @@ def make_station(actor: Actor, _: int) -> Station:
 
 
 def make_messenger(actor: Actor, _: int) -> Station:
-    """A sensor of clients' own messages."""
+    """Returns the station of a sensor that sends clients' own messages."""
     return Station(make_radio(actor))
 
 

@@ -71,7 +71,7 @@ class GivingWay:
 
 
 def _bodies(placed: Places) -> list[tuple[int, float, float]]:
-    """Lane, rear and front of everybody."""
+    """Returns (lane, s of the rear, s of the front) in m of every actor."""
     s, half = placed["s"], placed["half_length"]
     return list(zip(placed["lane"].tolist(), (s - half).tolist(), (s + half).tolist(), strict=True))
 

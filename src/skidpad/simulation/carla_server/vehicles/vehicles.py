@@ -128,7 +128,7 @@ class Vehicles:
         return actor in self._by_actor
 
     def of(self, actor: int) -> Vehicle:
-        """The vehicle that is this actor."""
+        """Returns the vehicle that is this actor."""
         return self._by_actor[actor]
 
     def row(self, actor: int) -> int:
@@ -136,7 +136,7 @@ class Vehicles:
         return self.moving.row(self._by_actor[actor].body)
 
     def add(self, actor: int, blueprint: Blueprint, pose: Pose) -> Vehicle:
-        """A new vehicle at rest."""
+        """Adds a vehicle at rest at the pose and returns it."""
         model = model_of(blueprint)
         body = self.moving.add(Newcomer(model, type=blueprint.id), pose)
         vehicle = Vehicle(actor, body, model, PhysicsControl.of(model))

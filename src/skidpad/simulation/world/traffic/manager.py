@@ -311,7 +311,7 @@ class Traffic:
 
 
 def _traits(bodies: Sequence[VehicleType | Shape]) -> NDArray[np.void]:
-    """Drivers know their vehicles."""
+    """Returns the traits (n,) of the drivers, with what they know of their vehicles."""
     traits = np.zeros(len(bodies), dtype=TRAIT)
     traits["factor"] = 1.0
     traits["headway"] = traits["headway_town"] = T_HEADWAY

@@ -29,7 +29,7 @@ class Occupancy(NamedTuple):
 
 
 def occupancy(lanes: int, actors: int) -> Occupancy:
-    """Empty lists."""
+    """Returns empty lists of the actors on each lane."""
     slots = actors * SLOTS
     return Occupancy(
         head=np.full(lanes, NOBODY, dtype=np.int32),

@@ -27,7 +27,7 @@ def uniform(key: np.uint64, tick: int, salt: int) -> float:
 
 @inner_kernel
 def wrapped(angle: float) -> float:
-    """`angle` in [-pi, pi)."""
+    """Returns the angle in rad wrapped to [-pi, pi)."""
     return (angle + pi) % (2.0 * pi) - pi
 
 
@@ -56,7 +56,7 @@ def extend(net: Network, path: Ints, s: float, key: np.uint64, turn: int, free: 
 
 @kernel
 def begin(path: Ints, lane: int) -> None:
-    """Restart `path` on `lane`."""
+    """Empties the path and begins it with `lane`."""
     for k in range(PATH):
         path[k] = -1
     path[0] = lane

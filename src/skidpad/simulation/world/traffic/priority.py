@@ -89,12 +89,12 @@ class _Bake:
         return np.column_stack([p.x[at], p.y[at]]), p.s[at]
 
     def before(self, lane: int) -> set[int]:
-        """Lanes that lead here."""
+        """Returns the indices of the lanes that lead to a lane."""
         start = self.lanes.prev_start
         return {int(i) for i in self.lanes.prev_lane[start[lane] : start[lane + 1]]}
 
     def after(self, lane: int) -> set[int]:
-        """Lanes that follow."""
+        """Returns the indices of the lanes that follow a lane."""
         start = self.lanes.next_start
         return {int(i) for i in self.lanes.next_lane[start[lane] : start[lane + 1]]}
 

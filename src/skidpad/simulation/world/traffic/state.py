@@ -120,7 +120,7 @@ class View(NamedTuple):
 
 
 def drivers(n: int) -> Drivers:
-    """n inactive drivers."""
+    """Returns the state of n drivers, all inactive."""
     state = np.zeros(n, dtype=DRIVER)
     state["change"] = state["cap"] = np.inf
     state["halted"] = state["blocker"] = -1

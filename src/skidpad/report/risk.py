@@ -108,7 +108,7 @@ def rate_lines(asked: Risk, found: RiskFound) -> list[str]:
 
 
 def _rate_text(unit: str, rate: Rate, found: RiskFound) -> str:
-    """Returns a sentence with the crashes per `unit` and their interval, at the rate of encounters."""
+    """Return a sentence with the crashes per `unit` and their interval, at the rate of encounters."""
     high = "no end" if found.high is None else f"{found.high * rate.value:.2g}"
     return (
         f"Per {unit}, with {rate.value:g} encounters: {found.p * rate.value:.2g} crashes "
@@ -117,7 +117,7 @@ def _rate_text(unit: str, rate: Rate, found: RiskFound) -> str:
 
 
 def _answers(asked: Risk, found: RiskFound, trials: Sequence[Trial]) -> Answers:
-    """Returns the answers at the head of the risk page: probability, kinds of crash, cost in runs."""
+    """Return the answers at the head of the risk page: probability, kinds of crash, cost in runs."""
     lines = rate_lines(asked, found)
     if asked.assumptions:
         lines += [f"Inputs without a source: {', '.join(asked.assumptions)}."]
@@ -165,7 +165,7 @@ def _estimates(found: RiskFound) -> Figure | None:
 
 
 def _methods(found: RiskFound) -> list[Block]:
-    """Returns the table of methods, and a text on subset simulation where it has levels."""
+    """Return the table of methods, and a text on subset simulation where it has levels."""
     columns = [
         ("method", ""),
         ("probability", "per encounter"),
@@ -190,7 +190,7 @@ def _methods(found: RiskFound) -> list[Block]:
 
 
 def _method_row(e: Probability) -> list[Cell]:
-    """Returns the cells of a method's row; the half-width is a dash without estimate or upper end."""
+    """Return the cells of a method's row; the half-width is a dash without estimate or upper end."""
     high = "no end" if e.high is None else f"{e.high:.2g}"
     width = None if e.p == 0.0 or e.high is None else e.high / e.p - 1.0
     return [
@@ -204,7 +204,7 @@ def _method_row(e: Probability) -> list[Cell]:
 
 
 def _inputs(asked: Risk, found: RiskFound) -> Table:
-    """Returns the table of inputs: distribution, source, and the factor on the probability per scaling."""
+    """Return the table of inputs: distribution, source, and the factor on the probability per scaling."""
     columns = [
         ("input", ""),
         ("distribution", ""),
@@ -234,7 +234,7 @@ def _inputs(asked: Risk, found: RiskFound) -> Table:
 
 
 def _influence_cells(one: Influence | None) -> list[Cell]:
-    """Returns a cell per scale with the factor on the probability, a dash where it is unknown."""
+    """Return a cell per scale with the factor on the probability, a dash where it is unknown."""
     if one is None:
         return [Cell("-") for _ in SCALES]
     return [
@@ -246,7 +246,7 @@ def _influence_cells(one: Influence | None) -> list[Cell]:
 
 
 def _limits(asked: Risk, found: RiskFound) -> str:
-    """Returns the text on what the answer holds for and what it misses."""
+    """Return the text on what the answer holds for and what it misses."""
     run = asked.template
     noise = (
         "Sensor noise is drawn anew in each run."

@@ -173,17 +173,17 @@ def change_text(change: Change) -> str:
 
 
 def _precise(value: float | str) -> str:
-    """Returns a number with five digits as text; text stays as it is."""
+    """Return a number with five digits as text; text stays as it is."""
     return value if isinstance(value, str) else f"{value:.5g}"
 
 
 def _value(value: float | str) -> str:
-    """Returns a number with four digits as text; text stays as it is."""
+    """Return a number with four digits as text; text stays as it is."""
     return value if isinstance(value, str) else f"{value:.4g}"
 
 
 def _answers(search: Search, trials: Sequence[Trial], findings: Findings) -> Answers:
-    """Returns the answers at the head of the search page: where it fails, and what was not counted."""
+    """Return the answers at the head of the search page: where it fails, and what was not counted."""
     unavoidable = [t for t in distinct_failures(trials) if not t.is_avoidable]
     faults = [t for t in trials if t.fault]
     items = [
@@ -207,7 +207,7 @@ def _answers(search: Search, trials: Sequence[Trial], findings: Findings) -> Ans
 def _failures(
     out: Path, search: Search, trials: Sequence[Trial], findings: Findings
 ) -> list[Block]:
-    """Returns the failures by group and those that are not avoidable; a sentence where there are none."""
+    """Return the failures by group and those that are not avoidable; a sentence where there are none."""
     blocks: list[Block] = []
     for group in findings.groups:
         blocks += [Text(group_sentence(group), "lead")]
@@ -227,7 +227,7 @@ def _failures(
 
 
 def _failure_table(out: Path, search: Search, failures: Sequence[Trial], caption: str) -> Table:
-    """Returns the table of the LISTED likeliest failures."""
+    """Return the table of the LISTED likeliest failures."""
     columns = [
         ("run", "number in the search; a link where the run is kept"),
         ("contact, km/h", "larger delta-v of the two, else closing speed"),
@@ -248,7 +248,7 @@ def _failure_table(out: Path, search: Search, failures: Sequence[Trial], caption
 
 
 def _failure_row(out: Path, trial: Trial, likelihood: float) -> list[Cell]:
-    """Returns the cells of a failure's row; it links to the run's report where its folder is kept."""
+    """Return the cells of a failure's row; it links to the run's report where its folder is kept."""
     folder = failure_folder(out, trial.number)
     href = folder.relative_to(out).as_posix() + f"/{REPORT}" if folder.is_dir() else ""
     values = ", ".join(f"{name} {_value(v)}" for name, v in trial.values.items())
@@ -275,7 +275,7 @@ def _reference_cell(reference: Trial | None) -> Cell:
 
 
 def _number(value: float | None, spec: str) -> Cell:
-    """Returns a cell with the number in the format `spec`, a dash for None."""
+    """Return a cell with the number in the format `spec`, a dash for None."""
     return Cell("-") if value is None else Cell(f"{value:{spec}}", value)
 
 
@@ -318,7 +318,7 @@ def influence(search: Search, trials: Sequence[Trial]) -> dict[str, float]:
 
 
 def _coverage(search: Search, trials: Sequence[Trial]) -> list[Block]:
-    """Returns the figure of all runs over the most influential variable and up to three others."""
+    """Return the figure of all runs over the most influential variable and up to three others."""
     ranked = sorted(influence(search, trials).items(), key=lambda item: -item[1])
     names = [name for name, _ in ranked]
     pairs = [(names[0], n) for n in names[1:4]] or [(names[0], names[0])]
@@ -332,7 +332,7 @@ def _coverage(search: Search, trials: Sequence[Trial]) -> list[Block]:
 
 
 def _draw_pair(axis, search: Search, trials: Sequence[Trial], x: str, y: str) -> None:  # type: ignore[no-untyped-def]
-    """Draws all runs over two variables on one axis, failures apart from the others."""
+    """Draw all runs over two variables on one axis, failures apart from the others."""
     for bad, marker, colour, label in (
         (False, ".", PALETTE[5], "no failure"),
         (True, "x", PALETTE[1], "failure"),
@@ -353,18 +353,18 @@ def _draw_pair(axis, search: Search, trials: Sequence[Trial], x: str, y: str) ->
 
 
 def _variable(search: Search, name: str) -> Variable:
-    """Returns the search's variable of this name; it must be there."""
+    """Return the search's variable of this name; it must be there."""
     return next(v for v in search.space.variables if v.name == name)
 
 
 def _place(search: Search, name: str, trial: Trial) -> float:
-    """Returns a trial's value of a variable as a coordinate: the index of a word, else the number."""
+    """Return a trial's value of a variable as a coordinate: the index of a word, else the number."""
     value, law = trial.values[name], _variable(search, name).law
     return float(law.words.index(str(value))) if isinstance(law, Choice) else float(value)
 
 
 def _variables(search: Search, trials: Sequence[Trial]) -> Table:
-    """Returns the table of variables with distribution, source and influence from 0 to 1."""
+    """Return the table of variables with distribution, source and influence from 0 to 1."""
     shares = influence(search, trials)
     columns = [
         ("variable", "parameter of the scenario, weather, or a field of the weather"),
@@ -401,7 +401,7 @@ def law_text(variable: Variable) -> str:
 
 
 def _method(search: Search) -> str:
-    """Returns the text on method, seeds and weather, and on what counts as a failure."""
+    """Return the text on method, seeds and weather, and on what counts as a failure."""
     run = search.template
     return (
         f"Method {search.method}, objective {search.objective}, seed {search.seed}; "

@@ -119,7 +119,7 @@ def _near(points: Floats, way: Floats) -> NDArray[np.bool_]:
 
 
 def _place(log: RunLog, k: int, i: int, centre: NDArray[np.float64]) -> list[int | None]:
-    """Returns actor `i` at tick `k`: x, y in UNIT from `centre`, yaw in mrad; None each if absent."""
+    """Return actor `i` at tick `k`: x, y in UNIT from `centre`, yaw in mrad; None each if absent."""
     if not log.present[k, i]:
         return [None, None, None]
     a = log.actors
@@ -127,7 +127,7 @@ def _place(log: RunLog, k: int, i: int, centre: NDArray[np.float64]) -> list[int
 
 
 def _whole(points: NDArray[np.float64]) -> list[int]:
-    """Returns points in m flattened to whole multiples of UNIT."""
+    """Return points in m flattened to whole multiples of UNIT."""
     whole: list[int] = np.round(points.ravel() / UNIT).astype(int).tolist()
     return whole
 

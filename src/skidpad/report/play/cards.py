@@ -92,7 +92,7 @@ def facts(run: PlayRun) -> list[tuple[str, str]]:
 
 
 def _unit(value: float | None, unit: str) -> str | None:
-    """Returns a value with two digits and its unit as text; None stays None."""
+    """Return a value with two digits and its unit as text; None stays None."""
     return None if value is None else f"{value:.2f} {unit}"
 
 
@@ -134,7 +134,7 @@ def _choose_counterparts(run: PlayRun) -> list[Counterpart]:
 
 
 def _speed(log: RunLog, i: int, label: str) -> Strip:
-    """Returns the strip of actor `i`'s speed in km/h over time."""
+    """Return the strip of actor `i`'s speed in km/h over time."""
     a = log.actors
     v = np.where(log.present[:, i], kmh_from_mps(1.0) * np.hypot(a.vx[:, i], a.vy[:, i]), np.nan)
     top = float(np.nanmax(v, initial=0.0))
@@ -142,7 +142,7 @@ def _speed(log: RunLog, i: int, label: str) -> Strip:
 
 
 def _of_other(log: RunLog, other: Counterpart) -> list[Strip]:
-    """Returns three strips: the counterpart's speed in km/h, its gap in m and TTC in s with the ego."""
+    """Return three strips: the counterpart's speed in km/h, its gap in m and TTC in s with the ego."""
     i = log.table.names.index(other.name)
     both = together(log, EGO, i)
     one, two = body(log, EGO), body(log, i)
@@ -162,14 +162,14 @@ def _of_other(log: RunLog, other: Counterpart) -> list[Strip]:
 
 
 def _least(value: float | None, unit: str) -> str:
-    """Returns "least" with the value and unit as text, "no conflict" for None."""
+    """Return "least" with the value and unit as text, "no conflict" for None."""
     return "no conflict" if value is None else f"least {value:.2f} {unit}"
 
 
 def _strip(
     log: RunLog, label: str, value: Floats, high: float, note: str, threshold: float | None = None
 ) -> Strip:
-    """Returns a strip from 0 to `high`, in alarm where the value is below the threshold; None: never."""
+    """Return a strip from 0 to `high`, in alarm where the value is below the threshold; None: never."""
     value = np.asarray(value, np.float64)
     with np.errstate(invalid="ignore"):
         alarm = value < threshold if threshold is not None else np.zeros(len(log), bool)
@@ -197,5 +197,5 @@ def _events(path: Path, t: Floats) -> Iterator[Strip]:
 
 
 def _short(text: str) -> str:
-    """Returns the text cut to LABEL characters, with an ellipsis where it was longer."""
+    """Return the text cut to LABEL characters, with an ellipsis where it was longer."""
     return text if len(text) <= LABEL else text[: LABEL - 1] + "…"

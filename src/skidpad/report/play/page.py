@@ -135,7 +135,7 @@ def answer(played: Played) -> str:
 
 
 def _word(verdict: PlayVerdict) -> str:
-    """Returns a verdict as the word for a sentence."""
+    """Return a verdict as the word for a sentence."""
     return "in error" if verdict is PlayVerdict.ERROR else verdict.value
 
 
@@ -150,7 +150,7 @@ def criterion(played: Played) -> str:
 
 
 def _answers(played: Played) -> Answers:
-    """Returns the answers at the head of the page; what went wrong is told where a run is bad."""
+    """Return the answers at the head of the page; what went wrong is told where a run is bad."""
     items = [
         Answer("Did it pass?", answer(played)),
         Answer("By which criterion?", criterion(played)),
@@ -177,7 +177,7 @@ def _links(played: Played, runs: Sequence[PlayRun]) -> dict[str, str]:
 
 
 def _cards(played: Played, runs: Sequence[PlayRun]) -> list[Block]:
-    """Returns the cards of the first INLINE runs, open where the verdict is not good or the run is alone."""
+    """Return the cards of the first INLINE runs, open where the verdict is not good or the run is alone."""
     blocks: list[Block] = []
     if len(runs) > INLINE:
         text = f"The {INLINE} runs that need a look most. The others are linked from the table."
@@ -207,17 +207,17 @@ def _matrix(runs: Sequence[PlayRun], links: dict[str, str]) -> list[Block]:
 
 
 def _seeds(runs: Sequence[PlayRun]) -> int:
-    """Returns the number of different known seeds."""
+    """Return the number of different known seeds."""
     return len({run.seed for run in runs if run.seed is not None})
 
 
 def _outside(run: PlayRun) -> str:
-    """Returns the run's weather, with its friction unless that is the original."""
+    """Return the run's weather, with its friction unless that is the original."""
     return f"{run.weather}, {run.friction} friction" if run.friction == "original" else run.weather
 
 
 def _verdict_cell(run: PlayRun | None, links: dict[str, str]) -> Cell:
-    """Returns a cell with a run's verdict, least TTC in s and gap in m; "not driven" for None."""
+    """Return a cell with a run's verdict, least TTC in s and gap in m; "not driven" for None."""
     if run is None:
         return Cell("not driven", kind="muted")
     numbers = []
@@ -232,7 +232,7 @@ def _verdict_cell(run: PlayRun | None, links: dict[str, str]) -> Cell:
 
 
 def _runs_table(runs: Sequence[PlayRun], links: dict[str, str]) -> Table:
-    """Returns the table of runs, in the order given, with a column of seeds where there are several."""
+    """Return the table of runs, in the order given, with a column of seeds where there are several."""
     columns: list[Column[PlayRun]] = [
         Column("scenario", lambda r: Cell(r.scenario, href=links[r.name])),
         Column("weather", _outside),
@@ -249,7 +249,7 @@ def _runs_table(runs: Sequence[PlayRun], links: dict[str, str]) -> Table:
 
 
 def _plain_verdict(run: PlayRun) -> Cell:
-    """Returns a cell with the run's verdict, its reasons as hint."""
+    """Return a cell with the run's verdict, its reasons as hint."""
     return Cell(run.verdict.value, kind=KINDS[run.verdict], hint="; ".join(run.judged.reasons))
 
 
@@ -261,7 +261,7 @@ def _format_bounded(value: float | None, spec: str) -> Cell:
 
 
 def _contact_speed(run: PlayRun) -> float | None:
-    """Returns the closing speed at the first contact in km/h; None without a contact."""
+    """Return the closing speed at the first contact in km/h; None without a contact."""
     return None if run.contact is None else kmh_from_mps(run.contact[2])
 
 
@@ -278,7 +278,7 @@ Of = tuple[PlayRun, Counterpart]
 
 
 def _counterparts(runs: Sequence[PlayRun]) -> list[Block]:
-    """Returns the table of the ego and each other actor; empty where no run has another."""
+    """Return the table of the ego and each other actor; empty where no run has another."""
     rows = [(run, other) for run in runs for other in run.others]
     if not rows:
         return []
@@ -290,7 +290,7 @@ def _counterparts(runs: Sequence[PlayRun]) -> list[Block]:
 
 
 def _speed_of_contact(of: Of) -> float | None:
-    """Returns the counterpart's speed at the contact in km/h; None without a contact."""
+    """Return the counterpart's speed at the contact in km/h; None without a contact."""
     v = of[1].contact_v
     return None if v is None else kmh_from_mps(v)
 

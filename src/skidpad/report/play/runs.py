@@ -100,7 +100,7 @@ def load_played(out: Path) -> Played:
 
 
 def _runs(out: Path, rules: Sequence[Expectation]) -> Iterator[PlayRun]:
-    """Yields the runs in a folder by its ledger; the folder itself as one run where it has none."""
+    """Yield the runs in a folder by its ledger; the folder itself as one run where it has none."""
     if not (out / LEDGER).is_file():
         yield _run(out, out, rules, None)
         return
@@ -138,7 +138,7 @@ def _run(out: Path, folder: Path, rules: Sequence[Expectation], entry: GripEntry
 
 
 def _of_file(out: Path, log: RunLog, staging: Staging) -> list[Any]:
-    """Returns the judged criteria of the scenario file; empty where it has none."""
+    """Return the judged criteria of the scenario file; empty where it has none."""
     if not staging.criteria:
         return []
     return judge_criteria(prepare(log, find_road(out, log.header)), staging.criteria)
@@ -152,7 +152,7 @@ def find_road(out: Path, header: LogHeader) -> RoadMap:
 
 
 def _contact(log: RunLog) -> tuple[float, str, float] | None:
-    """Returns time in s, what was hit, and closing speed in m/s of the first contact; None without one."""
+    """Return time in s, what was hit, and closing speed in m/s of the first contact; None without one."""
     first = next(iter(log.contacts), None)
     if first is None:
         return None
@@ -161,7 +161,7 @@ def _contact(log: RunLog) -> tuple[float, str, float] | None:
 
 
 def _last_line(path: Path) -> list[str]:
-    """Returns the last line of a text file, alone in a list; empty for an empty file."""
+    """Return the last line of a text file, alone in a list; empty for an empty file."""
     text = path.read_text(encoding="utf-8", errors="replace").strip()
     return [text.rpartition("\n")[2]] if text else []
 
@@ -201,7 +201,7 @@ def write_results_csv(played: Played) -> Path:
 
 
 def _row(run: PlayRun, other: Counterpart | None) -> dict[str, Any]:
-    """Returns a row of the results table; None for `other` leaves the counterpart's fields empty."""
+    """Return a row of the results table; None for `other` leaves the counterpart's fields empty."""
     row: dict[str, Any] = {
         "run": run.name, "scenario": run.scenario, "weather": run.weather,
         "friction": run.friction, "seed": run.seed, "verdict": run.verdict.value,
@@ -229,5 +229,5 @@ def _row(run: PlayRun, other: Counterpart | None) -> dict[str, Any]:
 
 
 def _kmh(v: float | None) -> float | None:
-    """Returns m/s in km/h; None stays None."""
+    """Return m/s in km/h; None stays None."""
     return None if v is None else kmh_from_mps(v)

@@ -349,4 +349,5 @@ def has_columns(table: pl.DataFrame, *needed: pl.Expr) -> bool:
 
 
 def _join_words(words: Sequence[str]) -> str:
+    """Returns the words joined by commas and "and"."""
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

@@ -56,6 +56,7 @@ def encounter(log: RunLog, ego: int, other: int, since: float = 0.0) -> Encounte
 
 
 def _in_play(one: Body, two: Body, ways_apart: bool) -> bool:
+    """Return True when two bodies nearly meet, follow or, if `ways_apart`, come near side by side."""
     if bool((time_to_meet(one, two) <= TIME).any()) or _follows(one, two) or _follows(two, one):
         return True
     near = _alongside(one, two) & (box_distance(one, two) <= DISTANCE)
@@ -63,11 +64,13 @@ def _in_play(one: Body, two: Body, ways_apart: bool) -> bool:
 
 
 def _select_rows(one: Body, rows: Mask | NDArray[np.int64]) -> Body:
+    """Return a body with these rows alone."""
     x, y, yaw, vx, vy, ax, ay = (column[rows] for column in one[:7])
     return Body(x, y, yaw, vx, vy, ax, ay, one.length, one.width)
 
 
 def _axes(one: Body) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
+    """Return the unit vectors forward and left of a body, each as (x, y) arrays."""
     c, s = np.cos(one.yaw), np.sin(one.yaw)
     return (c, s), (-s, c)
 
@@ -116,6 +119,7 @@ def _follows(behind: Body, ahead: Body) -> bool:
 
 
 def _alongside(one: Body, other: Body) -> Mask:
+    """Return (n,) True where both lie along one line or one of them stands."""
     same_line = np.abs(np.cos(other.yaw - one.yaw)) > ALONG
     stands = (np.hypot(one.vx, one.vy) < STANDING) | (np.hypot(other.vx, other.vy) < STANDING)
     mask: Mask = same_line | stands

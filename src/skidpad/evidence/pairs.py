@@ -75,6 +75,7 @@ def pairs_of_others(log: RunLog) -> tuple[Pair, ...]:
 
 
 def _pairs(log: RunLog, chosen: Iterable[tuple[int, int]]) -> Iterator[Pair]:
+    """Yields how critical it became between the chosen actors, where both were there at once."""
     names = log.table.names
     bodies = [body(log, i) for i in range(len(names))]
     for i, j in chosen:
@@ -168,13 +169,16 @@ def post_encroachment(a: Body, b: Body, both: NDArray[np.bool_], dt: float) -> f
 
 
 def _motion(one: Body, rows: NDArray[np.int64]) -> Floats:
+    """Returns (n, 4) x, y in m and cosine, sine of yaw of a body at the rows."""
     columns = (one.x, one.y, np.cos(one.yaw), np.sin(one.yaw))
     return np.ascontiguousarray(np.column_stack([c[rows] for c in columns]))
 
 
 def _half(one: Body) -> Floats:
+    """Returns (2,) half the length and half the width in m."""
     return np.array([0.5 * one.length, 0.5 * one.width])
 
 
 def _most(values: Floats) -> float | None:
+    """Returns the largest value; None without values."""
     return float(values.max()) if len(values) else None

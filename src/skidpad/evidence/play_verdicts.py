@@ -148,6 +148,7 @@ def void_reasons(staging: Staging, others: Sequence[Counterpart]) -> list[str]:
 
 
 def _apart(nearest: Counterpart) -> str:
+    """Return a sentence on how the nearest partner missed the ego."""
     met = nearest.encounter
     if met.crossed_after is None:
         how = f"came no nearer than {met.distance:.1f} m"

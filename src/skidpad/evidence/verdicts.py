@@ -113,6 +113,7 @@ def _sides(contrasts: list[Contrast]) -> tuple[float, float]:
 def _judgement(
     finding: Finding, contrasts: list[Contrast], p: tuple[float, float] | None, seeds: int
 ) -> Judgement:
+    """Returns a finding's judgement from its contrasts; `p` are its p values, None: not tested."""
     verdict = _verdict(contrasts, p, built_in=bool(finding.built_in))
     needed = _seeds_needed(contrasts, seeds) if verdict is Verdict.UNDECIDED else None
     least = min(p) if p else None
@@ -138,6 +139,7 @@ def _verdict(
 
 
 def _seeds_needed(contrasts: list[Contrast], seeds: int) -> int | None:
+    """Returns how many seeds would decide; None where a contrast cannot tell or there are no seeds."""
     ratios = [c.units_needed / c.units if c.units_needed else None for c in contrasts]
     if not seeds or None in ratios:
         return None
@@ -145,6 +147,7 @@ def _seeds_needed(contrasts: list[Contrast], seeds: int) -> int | None:
 
 
 def _limits(contrast: Contrast) -> str:
+    """Returns a contrast's interval as text, or why it has none."""
     found = contrast.interval
     return contrast.without_limits if found is None else interval_text(found)
 
@@ -156,6 +159,7 @@ def _text(
     p: float | None,
     needed: int | None,
 ) -> str:
+    """Returns the sentence of a verdict: numbers, p, margin missed, seeds needed."""
     if verdict is Verdict.NOT_TESTABLE:
         return f"Not testable: it needs {finding.needs}."
     if verdict is Verdict.BY_CONSTRUCTION:

@@ -74,6 +74,7 @@ def _orient_box(
 
 @kernel
 def _move_plan(ego: Floats, polygon: Floats, plan: Floats, movers: Movers) -> int:
+    """Fills mover 0 with the ego's box along its plan; returns how many samples lie within the plan."""
     points = np.empty((SAMPLES, 2))
     inside = sample_plan(plan, ego, 0.0, STEP, points)
     _orient_box(points, ego[2], polygon, polygon.shape[0], movers, 0)
@@ -89,6 +90,7 @@ def _move_objects(
     prediction_t: Floats,
     movers: Movers,
 ) -> None:
+    """Fills the movers with the boxes of all objects along their predictions."""
     points = np.empty((SAMPLES, 2))
     for i in range(objects.shape[0]):
         sample_path(prediction_t, predictions[i], objects[i], 0.0, STEP, points)
@@ -122,4 +124,5 @@ def world_movers(frame: ChannelFrame | None) -> Movers | None:
 
 
 def _movers(n: int) -> Movers:
+    """Returns movers for `n` boxes; their arrays are not filled yet."""
     return Movers(np.empty((n, SAMPLES, 4)), np.empty((n, 2)), np.empty((n, 4)))

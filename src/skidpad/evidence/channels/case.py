@@ -68,6 +68,7 @@ def evidence_lines(table: pl.DataFrame) -> Iterator[str]:
 
 
 def _line(n: NodeEvidence) -> str:
+    """Returns a line of text on a node's evidence: value now, range and violated cycles."""
     if n.now is None:
         return f"{n.indicator.value} ({n.subject}): never evaluated in {n.cycles} cycles"
     share = 100.0 * n.violated / n.evaluated

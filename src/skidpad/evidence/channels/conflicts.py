@@ -114,6 +114,7 @@ def _shared_corners(
 
 @inner_kernel
 def _stride(motion: Floats) -> float:
+    """Returns the longest step in m between neighbouring samples of a motion; 0 for one sample."""
     longest = 0.0
     for k in range(motion.shape[0] - 1):
         d = np.hypot(motion[k + 1, 0] - motion[k, 0], motion[k + 1, 1] - motion[k, 1])

@@ -183,6 +183,7 @@ def load_rules(profile: Profile, path: Path | None = None) -> tuple[Rule, ...]:
 
 @cache
 def _own_rules(profile: Profile) -> tuple[Rule, ...]:
+    """Returns the built-in rules of the profile."""
     built_in = files("skidpad.evidence.channels").joinpath("hazard_rules.yaml")
     return _rules(profile, built_in.read_bytes(), built_in.name)
 
@@ -197,6 +198,7 @@ def load_only_rules(path: Path) -> tuple[Profile, tuple[Rule, ...]]:
 
 
 def _tables(data: bytes, name: str) -> dict[Profile, dict[HazardType, _RuleText]]:
+    """Returns the rule texts by profile and hazard in the YAML `data`; `name` stands in errors."""
     tables: dict[Profile, dict[HazardType, _RuleText]] = decode_yaml(
         data, name, dict[Profile, dict[HazardType, _RuleText]]
     )
@@ -204,6 +206,7 @@ def _tables(data: bytes, name: str) -> dict[Profile, dict[HazardType, _RuleText]
 
 
 def _rules(profile: Profile, data: bytes, name: str) -> tuple[Rule, ...]:
+    """Returns the profile's rules in the YAML `data`; raises ConfigError where it lacks the profile."""
     tables = _tables(data, name)
     if profile not in tables:
         raise ConfigError(f"{name}: holds no profile {profile.value}")
@@ -211,6 +214,7 @@ def _rules(profile: Profile, data: bytes, name: str) -> tuple[Rule, ...]:
 
 
 def _compile_rules(table: Mapping[HazardType, _RuleText]) -> tuple[Rule, ...]:
+    """Returns a rule per hazard with its clauses parsed."""
     return tuple(
         Rule(
             hazard,
@@ -301,6 +305,7 @@ class _Steadiness:
     def update(
         self, t: float, readings: IndicatorReadings, values: dict[Signal, float]
     ) -> dict[Signal, float]:
+        """Takes in a cycle's values at `t` s and returns the signals over the last 20 s; nan until known."""
         count = _least(readings[Indicator.OBJECT_COUNT])
         row = np.concatenate([[values[Signal.SAFETY_SCORE], count], readings.values[self.steady]])
         if self.blocks and not 0.0 <= t - self.blocks[-1][0] <= 2.0:
@@ -321,6 +326,7 @@ class _Steadiness:
         return self._signals(t)
 
     def _count_dips(self, t: float, cross_path: float) -> None:
+        """Notes a begin of a dip of the cross path at `t` s; drops those older than STEADY_TIME."""
         down = cross_path < 1.0 - DIP
         if down and not self.down:
             self.dips.append(t)
@@ -329,6 +335,7 @@ class _Steadiness:
             self.dips.popleft()
 
     def _signals(self, t: float) -> dict[Signal, float]:
+        """Returns the share of steady indicators, dips and ranges; all nan until nearly 20 s are known."""
         if self.before is None or t - self.blocks[0][0] < STEADY_TIME - 1.5:
             nan = float("nan")
             return {
@@ -350,8 +357,10 @@ class _Steadiness:
 
 
 def _greatest(values: Floats) -> float:
+    """Returns the greatest value that is not nan; nan where there is none."""
     return max((v for v in values.tolist() if v == v), default=float("nan"))  # v == v: not NaN
 
 
 def _least(values: Floats) -> float:
+    """Returns the least value that is not nan; nan where there is none."""
     return min((v for v in values.tolist() if v == v), default=float("nan"))

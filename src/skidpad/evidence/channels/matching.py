@@ -59,6 +59,7 @@ def match(detected: Sequence[Span], true: Sequence[Span], tolerance: float = 1.0
 
 
 def _compatible(d: Span, h: Span, tolerance: float) -> bool:
+    """Returns True when two spans can match: same hazard, `tolerance` s apart at most, actors alike."""
     if d.hazard is not h.hazard:
         return False
     apart = d.t_start > h.t_end + tolerance or h.t_start > d.t_end + tolerance
@@ -211,6 +212,7 @@ def percent(ratio: float) -> str:
 
 
 def _mean(values: Sequence[float | None]) -> float | None:
+    """Returns the mean of the known values; None without any."""
     known = [v for v in values if v is not None]
     return sum(known) / len(known) if known else None
 

@@ -156,6 +156,7 @@ class Monitor:
     def _apply_rules(
         self, cycle: Cycle, readings: IndicatorReadings, risk: RiskMatrix, signals: SignalReadings
     ) -> CycleEvidence:
+        """Returns the cycle's evidence with the rules that fired and those undecided; adds the hazards."""
         fired, undecided = [], []
         learned = self._learned_hazards(cycle.t, readings, risk, signals)
         for rule in self.rules:
@@ -184,6 +185,7 @@ class Monitor:
     def _learned_hazards(
         self, t: float, readings: IndicatorReadings, risk: RiskMatrix, signals: SignalReadings
     ) -> list[HazardType]:
+        """Returns the hazards that the learned identifier finds at `t` s; empty without one."""
         if self.learned is None:
             return []
         return self.learned.update(t, feature_row(readings, risk, signals))
@@ -207,6 +209,7 @@ class Monitor:
         return self._recorder.finish() if self._recorder else []
 
     def _count_unusable(self, kept: Sequence[Usable | None]) -> None:
+        """Counts per channel what could not be used in the cycle; None stands for an absent frame."""
         u = self.unusable
         for name, one in zip(self.channels, kept, strict=True):
             if one is None:
@@ -224,6 +227,7 @@ class Monitor:
                 u.shapes[name] += len(flat)
 
     def _count_violations(self, t: float, readings: IndicatorReadings) -> None:
+        """Counts the cycle's missing and violated values, and adds the violations at `t` s."""
         self._missing += np.isnan(readings.values)
         beyond = (readings.values < self._low) | (readings.values > self._high)
         self._violated += beyond
@@ -243,6 +247,7 @@ class Monitor:
         return self._tally(self._violated)
 
     def _tally(self, cycles: NDArray[np.int64]) -> Counter[Place]:
+        """Returns the counts of cycles by place, those at 0 left out."""
         return Counter({self.layout.places[k]: int(cycles[k]) for k in np.flatnonzero(cycles)})
 
     def _bounds(self) -> tuple[Floats, Floats]:

@@ -90,6 +90,7 @@ class Recorder:
         self.past.append(cycle)
 
     def _note_firing(self, hazard: HazardType, cycle: Cycle, evidence: CycleEvidence) -> None:
+        """Begins or extends the open record of a hazard that fired; keeps the cycle of its worst value."""
         rule = self.rules[hazard]
         value = evidence.signals.values[rule.extreme.signal]
         one = self.open.get(hazard)
@@ -112,6 +113,7 @@ class Recorder:
             one.signals, one.risk, one.frames = evidence.signals, evidence.risk, cycle.frames
 
     def _close(self, hazard: HazardType) -> None:
+        """Turns the hazard's open record into a finished one and appends it to `closed`."""
         one = self.open.pop(hazard)
         self.number += 1
         involved, objects = _name_involved(hazard, one, self.channels)
@@ -183,4 +185,5 @@ def _name_involved(
 
 
 def _pair(channels: tuple[str, ...], pair: int) -> tuple[str, ...]:
+    """Returns the names of the channels of the pair of this number."""
     return tuple(combinations(channels, 2))[pair]

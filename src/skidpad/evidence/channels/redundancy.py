@@ -67,6 +67,7 @@ def differences(outcomes: Sequence[DriveOutcome]) -> list[Difference]:
 
 
 def _by_driver(outcomes: Sequence[DriveOutcome]) -> dict[str, dict[Key, DriveOutcome]]:
+    """Returns the outcomes by driver, and by route and seed."""
     runs: dict[str, dict[Key, DriveOutcome]] = defaultdict(dict)
     for o in outcomes:
         runs[o.drive_by][o.route, o.seed] = o

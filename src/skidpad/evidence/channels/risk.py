@@ -87,6 +87,7 @@ class RiskMatrix:
 
 
 def _worst_known(row: list[float]) -> float:
+    """Returns the greatest value of a row that is not nan; nan where there is none."""
     return max((v for v in row if v == v), default=np.nan)  # v == v: not NaN
 
 
@@ -202,6 +203,7 @@ def _worst(judged: Floats) -> tuple[float, float, float, float, float, int, int]
 
 
 def _object_risk(row: Floats) -> ObjectRisk:
+    """Returns a row (TTC s, PET s, behind, risk) as a value; infinite times become None."""
     ttc, pet, behind, risk = row.tolist()
     return ObjectRisk(
         ttc=ttc if ttc < np.inf else None,

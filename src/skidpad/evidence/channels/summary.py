@@ -89,6 +89,7 @@ def _audit(monitor: Monitor, events: dict[Place, int]) -> list[dict[str, Any]]:
 
 
 def _event(event: Event[Any], name: str, subject: str | None = None) -> dict[str, Any]:
+    """Returns an event as plain data, times rounded to ms; an extreme of nan becomes None."""
     extreme = None if event.extreme != event.extreme else event.extreme
     row = {
         "name": name,
@@ -101,4 +102,5 @@ def _event(event: Event[Any], name: str, subject: str | None = None) -> dict[str
 
 
 def _count_keys(keys: list[Any]) -> dict[Any, int]:
+    """Returns how often each key occurs, in the order of first occurrence."""
     return {key: keys.count(key) for key in dict.fromkeys(keys)}

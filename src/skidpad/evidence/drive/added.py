@@ -38,12 +38,14 @@ class MetricType:
 
 
 def _own_value(name: str, drive: Drive, road_map: RoadMap) -> float | None:
+    """Returns one metric of a drive by its field name; None where it is not defined."""
     metrics = summarise(drive, find_crashes(drive), highway_roads(drive, road_map))
     value: float | None = getattr(metrics, name)
     return value
 
 
 def _own_metrics() -> tuple[MetricType, ...]:
+    """Returns the built-in metrics as entries of the registry."""
     return tuple(
         MetricType(name, meaning, "", partial(_own_value, name))
         for name, meaning, _ in definitions_of(Metrics)
@@ -68,6 +70,7 @@ def measure_added(
 
 
 def _measure(kind: MetricType, drive: Drive, road_map: RoadMap) -> float | None:
+    """Returns a metric's finite value or None; raises ConfigError if the code of its package fails."""
     try:
         value = kind.measure(drive, road_map)
         number = None if value is None else float(value)

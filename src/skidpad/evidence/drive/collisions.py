@@ -112,6 +112,7 @@ def _culprit(log: RunLog, row: int) -> ContactEvent | None:
 
 
 def _crash(drive: Drive, row: int, contact: ContactEvent | None) -> Crash:
+    """Returns the crash of a contact; None: of the tick of `row`, with something that is not known."""
     log = drive.log
     at = row if contact is None else drive.row(contact.tick)
     other = contact.actor if contact is not None and contact.actor > 0 else None
@@ -135,6 +136,7 @@ def _crash(drive: Drive, row: int, contact: ContactEvent | None) -> Crash:
 
 
 def _correct_crash(drive: Drive, at: int, kind: CrashKind) -> Crash:
+    """Returns the crash of an ego that left the road, rolled over or drove the wrong way at row `at`."""
     left = kind in (CrashKind.OFF_ROAD, CrashKind.ROLL_OVER)
     return _event(drive, at, kind=kind, other="", bend_exit=left and _is_bend_exit(drive, at))
 
@@ -172,6 +174,7 @@ def _event(
     v_other: float | None = None,
     contact: ContactEvent | None = None,
 ) -> Crash:
+    """Returns a crash at row `at` with what log and map say of it, just before and within LOOK_BACK."""
     log, a = drive.log, drive.log.actors
     recent = slice(rows_before(drive, at, JUST_BEFORE), at + 1)
     history = slice(rows_before(drive, at, LOOK_BACK), at + 1)
@@ -255,10 +258,12 @@ def _grip(log: RunLog, row: int) -> float | None:
 
 
 def _speed(log: RunLog, row: int, actor: int) -> float:
+    """Returns an actor's speed in m/s at a row."""
     return float(np.hypot(log.actors.vx[row, actor], log.actors.vy[row, actor]))
 
 
 def _lead_since(drive: Drive, at: int, actor: int | None) -> float | None:
+    """Returns for how many s the actor had been the lead up to row `at`; None where it was not."""
     if actor is None:
         return None
     is_lead = np.asarray(drive.lead.actor[: at + 1] == actor)

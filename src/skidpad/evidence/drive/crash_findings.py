@@ -42,6 +42,7 @@ VEHICLE = Crashes("crashes_vehicle", "v", "crashes with vehicles", "crashes with
 
 
 def _order(kind: Crashes) -> Finding:
+    """Returns finding F-01: crashes of this kind do not fall steadily with automation."""
     return Finding(
         f"F-01{kind.mark}",
         f"{kind.name.capitalize()} do not fall steadily with automation: 0 > 3 > 2 > 1 > 4.",
@@ -52,6 +53,7 @@ def _order(kind: Crashes) -> Finding:
 
 
 def _paradox(kind: Crashes) -> Finding:
+    """Returns finding F-04: lane centring adds crashes of this kind."""
     return Finding(
         f"F-04{kind.mark}",
         f"Lane centring adds {kind.name}, because it lets the car go faster into bends.",
@@ -65,6 +67,7 @@ def _paradox(kind: Crashes) -> Finding:
 
 
 def _limiter(kind: Crashes) -> Finding:
+    """Returns finding F-07: a limit of 80 km/h removes crashes of this kind."""
     return Finding(
         f"F-07{kind.mark}",
         f"A limit of 80 km/h removes the {kind.name}.",
@@ -81,6 +84,7 @@ def _limiter(kind: Crashes) -> Finding:
 
 
 def _speed_decides(kind: Crashes) -> Finding:
+    """Returns finding F-08: speed, not perception, decides on crashes of this kind."""
     return Finding(
         f"F-08{kind.mark}",
         f"Speed, not perception, decides on {kind.name}.",
@@ -101,6 +105,7 @@ def _speed_decides(kind: Crashes) -> Finding:
 
 
 def _rain(kind: Crashes) -> Finding:
+    """Returns finding F-13: rain gives configuration 3 more crashes of this kind."""
     return Finding(
         f"F-13{kind.mark}",
         f"Rain makes configuration 3 have more {kind.name}.",

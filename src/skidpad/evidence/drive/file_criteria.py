@@ -28,6 +28,7 @@ def judge_criteria(drive: Drive, criteria: Sequence[FileCriterion]) -> list[Resu
 
 
 def _wrong(drive: Drive, criterion: FileCriterion) -> str | None:
+    """Returns what is wrong by a criterion, "" if nothing; None where it cannot be judged."""
     judge = JUDGES.get(criterion.name)
     if judge is None:
         return None
@@ -37,6 +38,7 @@ def _wrong(drive: Drive, criterion: FileCriterion) -> str | None:
 
 
 def _collision(drive: Drive, limit: float) -> str:
+    """Returns how many contacts the ego had, "" for none; the limit is not used."""
     del limit
     n = len(drive.log.contacts)
     return "" if n == 0 else f"the ego had {count_text(n, 'contact')}"
@@ -49,12 +51,14 @@ def _distance(drive: Drive, limit: float) -> str:
 
 
 def _keep_lane(drive: Drive, limit: float) -> str:
+    """Returns how many markings the ego crossed, "" for none; the limit is not used."""
     del limit
     n = len(drive.log.invasions)
     return "" if n == 0 else f"the ego crossed {count_text(n, 'marking')}"
 
 
 def _on_road(drive: Drive, limit: float) -> str:
+    """Returns when the ego first had all wheels off every lane, "" for never; `limit` is not used."""
     del limit
     rows = np.flatnonzero(drive.strays)
     if not len(rows):
@@ -63,6 +67,7 @@ def _on_road(drive: Drive, limit: float) -> str:
 
 
 def _right_way(drive: Drive, limit: float) -> str:
+    """Returns when the ego first drove against its lane, "" for never; the limit is not used."""
     del limit
     place = drive.place
     turn = np.cos(drive.log.actors.yaw[:, 0] - place.heading)
@@ -73,20 +78,24 @@ def _right_way(drive: Drive, limit: float) -> str:
 
 
 def _at_most(drive: Drive, limit: float) -> str:
+    """Returns the ego's top speed in words where it was above `limit` m/s, else ""."""
     v = float(drive.v.max(initial=0.0))
     return "" if v <= limit else f"the ego drove {_kmh(v)}, at most {_kmh(limit)} are allowed"
 
 
 def _on_average(drive: Drive, limit: float) -> str:
+    """Returns the ego's mean speed in words where it was below `limit` m/s, else ""."""
     v = float(drive.v.mean()) if len(drive.v) else 0.0
     return "" if v >= limit else f"the ego drove {_kmh(v)} on average, {_kmh(limit)} are asked for"
 
 
 def _kmh(v: float) -> str:
+    """Returns a speed in m/s as text in km/h."""
     return f"{kmh_from_mps(v):.1f} km/h"
 
 
 def _way(drive: Drive) -> float:
+    """Returns the length of the ego's way in m."""
     a = drive.log.actors
     return float(np.hypot(np.diff(a.x[:, 0]), np.diff(a.y[:, 0])).sum())
 

@@ -86,16 +86,19 @@ def hits_in_cool_down(log: RunLog) -> int:
 
 
 def _free(log: RunLog) -> Mask:
+    """Returns (n,) True in the ticks in which no supervisor had the ego."""
     free: Mask = log.supervision == Supervision.NONE
     return free
 
 
 def _emergency(log: RunLog) -> Mask:
+    """Returns (n,) True in free ticks in which the stack reports a braking tier."""
     braking: Mask = np.isin(log.report.tier, BRAKING) & _free(log)
     return braking
 
 
 def _begins(mask: Mask) -> Mask:
+    """Returns (n,) True where the mask is True and was False the tick before."""
     begins: Mask = mask & ~np.concatenate([[False], mask[:-1]])
     return begins
 

@@ -92,10 +92,12 @@ def combine_metrics(*parts: Metrics) -> Metrics:
 
 
 def _among(drive: Drive, events: Iterable[Event], where: Mask) -> int:
+    """Returns how many of the events lie in ticks of the mask `where`."""
     return sum(bool(where[drive.row(e.tick)]) for e in events)
 
 
 def _collisions(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
+    """Returns the metrics of crashes in `where`; `here` are the crashes there."""
     log = drive.log
     kinds, first = [c.kind for c in here], [c.kind for c in here if not c.follows]
     impacts = [(c.kind, c.v_closing * KMH) for c in here if c.v_closing is not None]
@@ -125,6 +127,7 @@ def _collisions(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
 
 
 def _severity(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
+    """Returns the metrics of how hard contacts were in `where`; `here` are the crashes there."""
     touches = [c for c in graded_contacts(drive) if where[drive.row(c.tick)]]
     users = [c for c in distinct_contacts(drive) if where[drive.row(c.tick)]]
     static = sum(not c.is_road_user for c in touches)
@@ -157,6 +160,7 @@ def _first_fatal(drive: Drive, here: Sequence[Crash], where: Mask) -> float | No
 
 
 def _lanes(drive: Drive, highway: frozenset[int], where: Mask) -> Metrics:
+    """Returns the metrics of lane markings crossed and of the lateral offset in `where`."""
     counted = where & drive.free
     crossed = [i for i in drive.log.invasions if counted[drive.row(i.tick)]]
     found = count_invasions(crossed, highway, drive.log.header.dt)
@@ -173,6 +177,7 @@ def _lanes(drive: Drive, highway: frozenset[int], where: Mask) -> Metrics:
 
 
 def _conflicts(drive: Drive, where: Mask) -> Metrics:
+    """Returns the metrics of time to collision, deceleration and gap in `where`."""
     seen, true = conflicts(drive, where), true_conflicts(drive, where)
     return Metrics(
         min_ttc_s=seen.min_ttc,
@@ -186,6 +191,7 @@ def _conflicts(drive: Drive, where: Mask) -> Metrics:
 
 
 def _radar(drive: Drive, where: Mask) -> Metrics:
+    """Returns the metrics of false and missed radar detections in `where`."""
     pre, lane, final = radar_levels(drive, where)
     return Metrics(
         radar_fpr_pct=lane.fpr_pct,
@@ -202,6 +208,7 @@ def _radar(drive: Drive, where: Mask) -> Metrics:
 
 
 def _distances(drive: Drive, where: Mask) -> Metrics:
+    """Returns the metrics of the measured distance and its dropouts in `where`."""
     errors = distance_errors(drive, where)
     dropout, dropout_present = dropout_pct(drive, where)
     return Metrics(
@@ -216,6 +223,7 @@ def _distances(drive: Drive, where: Mask) -> Metrics:
 
 
 def _driving(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
+    """Returns the metrics of speed, distance and rates in `where`; `here` are the crashes there."""
     counted = where & drive.free
     v = drive.v * KMH
     in_bend = counted & (np.abs(drive.place.curvature) > 1.0 / BEND_RADIUS)
@@ -237,19 +245,23 @@ def _driving(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
 
 
 def _distance_km(drive: Drive, where: Mask) -> float:
+    """Returns the distance in km driven in the ticks of `where`."""
     return float(drive.v[where].sum() * drive.log.header.dt / 1000.0)
 
 
 def _per_100_km(drive: Drive, where: Mask, events: int) -> float | None:
+    """Returns the events per 100 km driven in `where`; None without distance."""
     distance_km = _distance_km(drive, where)
     return 100.0 * events / distance_km if distance_km > 0.0 else None
 
 
 def _percentile(values: Floats, percent: float) -> float | None:
+    """Returns the percentile of the values; None without values."""
     return float(np.percentile(values, percent)) if values.size else None
 
 
 def _ticks(drive: Drive, where: Mask) -> Metrics:
+    """Returns the metrics of ticks counted and skipped in `where`, and of notices."""
     return Metrics(
         samples=int(np.count_nonzero(where & drive.sample)),
         skipped_supervised=int(np.count_nonzero(where & ~drive.free)),

@@ -89,6 +89,7 @@ def distance_errors(drive: Drive, where: Mask) -> Errors:
 
 
 def _inside(distance: Floats) -> Mask:
+    """Returns (n,) True where the distance in m lies within the MEASURED range, ends excluded."""
     return np.asarray((distance > MEASURED[0]) & (distance < MEASURED[1]), dtype=np.bool_)
 
 
@@ -110,4 +111,5 @@ def dropout_pct(drive: Drive, where: Mask) -> tuple[float | None, float | None]:
 
 
 def _share(part: Mask, whole: Mask) -> float | None:
+    """Returns how many % of the `whole` are also in `part`; None where the whole is empty."""
     return percent(int(np.count_nonzero(part & whole)), int(np.count_nonzero(whole)))

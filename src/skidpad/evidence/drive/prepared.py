@@ -146,6 +146,7 @@ def find_leads(log: RunLog, index: LaneIndex, place: LaneMatch, rule: LeadDefini
 
 
 def _same_ids(index: LaneIndex, a: LaneMatch, b: LaneMatch) -> Mask:
+    """Returns (n,) True where both matches lie on lanes of the same road and lane id."""
     road, lane_id = index.lanes.road, index.lanes.lane_id
     same = (road[a.lane] == road[b.lane]) & (lane_id[a.lane] == lane_id[b.lane])
     known: Mask = same & (a.lane >= 0) & (b.lane >= 0)
@@ -178,5 +179,6 @@ def _extent(log: RunLog, k: Ints, i: Ints, heading: Floats) -> tuple[Floats, Flo
 
 
 def _speed_along(log: RunLog, k: Ints, i: Ints, heading: Floats) -> Floats:
+    """Returns the speeds in m/s of actors `i` at ticks `k` along the headings in rad."""
     a = log.actors
     return np.asarray(a.vx[k, i] * np.cos(heading) + a.vy[k, i] * np.sin(heading), np.float64)

@@ -105,6 +105,7 @@ def distinct_contacts(drive: Drive) -> tuple[Contact, ...]:
 
 
 def _is_again(drive: Drive, before: Contact, contact: Contact) -> bool:
+    """Returns True when a contact soon follows the one before, without the ego moved in between."""
     soon = (contact.tick - before.tick) * drive.log.header.dt <= AGAIN
     return soon and not any(before.tick < r.tick <= contact.tick for r in drive.log.relocations)
 
@@ -151,5 +152,6 @@ def _usual_change(log: RunLog, row: int, actor: int, dt: float) -> Floats:
 
 
 def _velocity(log: RunLog, row: int, actor: int) -> Floats:
+    """Returns (2,) the actor's velocity in m/s at a row, world axes."""
     a = log.actors
     return np.array([a.vx[row, actor], a.vy[row, actor]], dtype=np.float64)

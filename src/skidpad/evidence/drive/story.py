@@ -220,6 +220,7 @@ class _Box(NamedTuple):
 
 
 def _box_of(log: RunLog, at: int, actor: int) -> _Box:
+    """Returns an actor's poses up to row `at` and half its length and width in m."""
     rows = slice(0, at + 1)
     x, y, yaw = (
         np.asarray(values[rows, actor], np.float64)
@@ -241,6 +242,7 @@ def _box_gap(log: RunLog, at: int, actor: int) -> tuple[Floats, Mask]:
 
 
 def _classify_arrival(drive: Drive, begin: int, way: _Way) -> Arrival:
+    """Returns how the lead came to be ahead of the ego at row `begin`."""
     if begin == 0:
         return Arrival.DRIVEN_UP
     if begin == way.put or not drive.free[begin]:
@@ -263,6 +265,7 @@ def _measure_sidestep(drive: Drive, row: int) -> float:
 
 
 def _find_first_report(way: _Way, begin: int) -> Sighting | None:
+    """Returns the first sighting in which the stack reports a vehicle from row `begin`; None if none."""
     seen = np.flatnonzero(way.drive.log.report.detected[begin : way.at + 1] == 1.0)
     return way.sighting(begin + int(seen[0])) if seen.size else None
 
@@ -341,6 +344,7 @@ def _find_push(drive: Drive, crash: Crash) -> Contact | None:
 
 
 def _seconds(drive: Drive, crash: Crash, contact: Contact) -> float:
+    """Returns the time in s from the contact to the crash; negative where the contact came after."""
     return (crash.tick - contact.tick) * drive.log.header.dt
 
 
@@ -358,6 +362,7 @@ def _list_later_contacts(drive: Drive, crash: Crash) -> tuple[tuple[float, Conta
 
 
 def _find_put_back(drive: Drive, crash: Crash) -> float | None:
+    """Returns the time in s from the crash to the ego's first move back in its recovery; None if none."""
     end = _end_of_recovery(drive, crash)
     if end is None:
         return None

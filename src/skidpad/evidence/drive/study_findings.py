@@ -25,6 +25,7 @@ def unequal_logs(table: pl.DataFrame) -> tuple[int, int]:
 
 
 def _rare(what: str, column: str, variant: str, limit: Amount) -> RateBelow:
+    """Returns the criterion that the events of `column` in a variant's runs stay below the limit."""
     arm = rows_of("variant", variant)
     return RateBelow(what=what, events=pl.col(column).sum(), limit=limit, where=arm.are)
 
@@ -49,6 +50,7 @@ def _noisy(kind: str, sizes: str) -> tuple[Finding, Finding]:
 
 
 def _without(mark: str, variant: str, what: str) -> Finding:
+    """Returns the finding that recoveries chain in the variant without one of the safeguards."""
     criteria: tuple[Criterion, ...] = (variants("chained", variant, "whole", COLLISIONS),)
     return Finding(
         f"F-30{mark}", f"Without {what} recoveries chain.",

@@ -213,4 +213,5 @@ def _touching_row(log: RunLog, i: int, j: int) -> int | None:
 
 
 def _largest(values: Any) -> float:
+    """Returns the largest absolute value; 0 for none."""
     return float(np.max(np.abs(values), initial=0.0))

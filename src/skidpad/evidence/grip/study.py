@@ -185,6 +185,7 @@ def delays(original: CellSeries, reduced: CellSeries) -> Floats:
 
 
 def _delay(a: Floats, b: Floats) -> float:
+    """Returns by how many s `b` lags `a`; nan if too short or where no shift halves the error."""
     a, b = a[~np.isnan(a)][::SHIFT_STEP], b[~np.isnan(b)][::SHIFT_STEP]
     reach = round(SHIFT_MAX / (DT * SHIFT_STEP))
     n = min(len(a), len(b))

@@ -81,11 +81,13 @@ def feature_row(readings: IndicatorReadings, risk: RiskMatrix, signals: SignalRe
 
 
 def _least(values: Floats) -> Floats:
+    """Returns the least value of each row, nan values left out."""
     least: Floats = np.fmin.reduce(values, axis=1)
     return least
 
 
 def _greatest(values: Floats) -> Floats:
+    """Returns the greatest value of each row, nan values left out."""
     greatest: Floats = np.fmax.reduce(values, axis=1)
     return greatest
 

@@ -188,6 +188,7 @@ def load_model(path: Path | None) -> Model:
 
 
 def _model(arrays: dict[str, Any]) -> Model:
+    """Returns the model in a file's arrays; raises FileError where its version or parts do not fit."""
     card = json.loads(arrays["card"].tobytes())
     known = {name: i for i, name in enumerate(FEATURE_NAMES)}
     if card["version"] not in KNOWN_VERSIONS or not set(card["features"]) <= set(known):

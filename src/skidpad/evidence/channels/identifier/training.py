@@ -172,6 +172,7 @@ def forest_of(machine: Any) -> Forest:
 
 
 def _card(drives: Sequence[TrainingDrive], routes: Sequence[str]) -> dict[str, Any]:
+    """Returns what a model was trained on: versions, features, recordings, true events, settings."""
     import sklearn
 
     return {

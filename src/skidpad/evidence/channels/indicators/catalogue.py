@@ -137,6 +137,7 @@ def load_thresholds(path: Path | None = None) -> dict[AnyIndicator, Threshold]:
 
 @cache
 def _own_thresholds() -> dict[Indicator, Threshold]:
+    """Returns the built-in threshold of each indicator."""
     data = _built_in("thresholds.yaml")
     table: dict[Indicator, Threshold] = decode_yaml(
         data, "thresholds.yaml", dict[Indicator, Threshold]
@@ -196,6 +197,7 @@ class IndicatorType:
 
 
 def _own_types() -> tuple[IndicatorType, ...]:
+    """Returns the built-in indicators as entries of the registry, in the order of Indicator."""
     table = built_in_thresholds()
     return tuple(
         IndicatorType(
@@ -239,10 +241,12 @@ def safety_case() -> SafetyCase:
 
 
 def _built_in(name: str) -> bytes:
+    """Returns the bytes of a file beside this module."""
     return files("skidpad.evidence.channels.indicators").joinpath(name).read_bytes()
 
 
 def _of_scope(scope: Scope) -> tuple[Indicator, ...]:
+    """Returns the built-in indicators of a scope, in the order of the file."""
     return tuple(i for i, threshold in _own_thresholds().items() if threshold.scope is scope)
 
 

@@ -73,6 +73,7 @@ class ChannelIndicators:
         }
 
     def _history_comfort(self, frame: ChannelFrame) -> float:
+        """Returns the comfort of the path driven up to the frame; nan with too few points."""
         settings = self.settings
         x, y, heading = frame.ego[:3].tolist()
         drop_repeat(self._poses, frame.t)
@@ -120,6 +121,7 @@ class ChannelIndicators:
         }
 
     def _path_agreement(self, frame: ChannelFrame) -> float:
+        """Returns the agreement of the plan with the past ones, weighted by age, and keeps it."""
         drop_repeat(self._plans, frame.t)
         scores = np.full(len(self._plans), np.nan)
         old = np.empty_like(self.ways)
@@ -131,6 +133,7 @@ class ChannelIndicators:
         return prediction.weighted_history(scores, self.settings.history_decay)
 
     def _motion_validation(self, frame: ChannelFrame) -> Values:
+        """Returns how well an earlier frame's predictions held in this one; empty where none is due."""
         drop_repeat(self._frames, frame.t)
         then = self._frame_to_validate(frame.t)
         self._frames.append(frame)

@@ -73,6 +73,7 @@ class PairIndicators:
         }
 
     def _ego(self, a: ChannelFrame, b: ChannelFrame) -> Values:
+        """Returns the values of the ego's location, orientation and shift between both channels."""
         score = similarity.location_similarity(a.ego, b.ego)
         self._locations.append(score)
         t = max(a.t, b.t)

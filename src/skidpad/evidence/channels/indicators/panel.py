@@ -83,5 +83,6 @@ class IndicatorPanel:
                     row[first + subject] = function(*frames)
 
     def _store_values(self, row: Floats, subject: int, values: Values) -> None:
+        """Writes the values of the subject of this number into a row of all indicators."""
         for indicator, value in values.items():
             row[self.layout.span[indicator].start + subject] = value

@@ -153,4 +153,5 @@ def ego_motion(cycles: Sequence[Cycle]) -> dict[str, Floats]:
 
 
 def _near(a: Span, b: Span) -> bool:
+    """Returns True when two spans are at most REACH s apart."""
     return a.t_start <= b.t_end + REACH and b.t_start <= a.t_end + REACH

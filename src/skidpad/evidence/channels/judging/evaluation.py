@@ -108,6 +108,7 @@ class Evaluation:
         }
 
     def _as_dict(self) -> dict[str, Any]:
+        """Returns the evaluation as plain data, as `evaluation.json` and the report have it."""
         truths = sorted({name for s in self.segments for name in s.truths})
         return {
             "segments": len(self.segments),
@@ -185,6 +186,7 @@ class Evaluation:
         return pl.DataFrame(rows, infer_schema_length=None)
 
     def _result(self, identifier: str, truth: str, tolerance: float) -> dict[str, Any]:
+        """Returns the scores of an identifier against a truth as plain data; `tolerance` is in s."""
         scores = self.scores(identifier, truth, tolerance)
         return {
             "rules": identifier,
@@ -197,6 +199,7 @@ class Evaluation:
 
 
 def _facts(s: Segment) -> dict[str, Any]:
+    """Returns a row of facts on a segment: route, seed, hours, night, counts by hazard and truth."""
     practical, sun = Profile.PRACTICAL.value, s.context.get("sun_altitude_deg")
     row: dict[str, Any] = {
         "name": s.name,
@@ -222,6 +225,7 @@ def _facts(s: Segment) -> dict[str, Any]:
 
 
 def _row(s: Score) -> dict[str, Any]:
+    """Returns a hazard's score as plain data; the median lead time in s is None without any."""
     total = s.total
     leads = sorted(total.lead_times)
     return {
@@ -257,6 +261,7 @@ def read_labels(path: Path) -> dict[str, list[Span]]:
 
 
 def _label(where: str, row: dict[str, Any]) -> Span:
+    """Returns the labelled span of a row; raises ConfigError with `where` if a column is not usable."""
     missing = [c for c in LABEL_COLUMNS if row.get(c) is None]
     if missing:
         raise ConfigError(f"{where}: lacks the columns {', '.join(missing)}")

@@ -88,6 +88,7 @@ class Observer:
         return out | self._violations(events) | self._causes(events)
 
     def _violations(self, events: Sequence[Event[Place]]) -> dict[str, float | None]:
+        """Returns the number of violation events of each indicator with a threshold, by column name."""
         counted = [e.key[0] for e in events]
         return {
             f"violations_{i.value}": float(counted.count(i))

@@ -164,6 +164,7 @@ def evaluated_from(t: Floats) -> float:
 
 
 def _settings(profile: Profile) -> MonitorSettings:
+    """Returns the monitor's settings for a profile with its default form, without worlds in records."""
     return MonitorSettings(
         indicators=IndicatorSettings(form=default_form(profile)), profile=profile, keep_worlds=False
     )
@@ -172,6 +173,7 @@ def _settings(profile: Profile) -> MonitorSettings:
 def _practical(
     channels: Sequence[str], cycles: Sequence[Cycle], begin: float, timer: Stopwatch | None
 ) -> tuple[_Pass, dict[HazardType, int], tuple[Span, ...]]:
+    """Returns what the practical rules gave: values per cycle, candidates by hazard, scored spans."""
     monitor = Monitor(channels, _settings(Profile.PRACTICAL))
     observer = Observer(monitor, ego_motion(cycles))
     signals, rows = [], []
@@ -204,6 +206,7 @@ def _places(spans: Iterable[Span]) -> list[Span]:
 
 
 def _in_order(spans: Iterable[Span]) -> tuple[Span, ...]:
+    """Returns the spans sorted by their start."""
     return tuple(sorted(spans, key=lambda s: s.t_start))
 
 
@@ -239,6 +242,7 @@ def _why_missed(identifier: str, missed: Span, signals: Signals) -> str:
 
 
 def _scored_spans(spans: Iterable[Span]) -> tuple[Span, ...]:
+    """Returns the spans of the hazards that are scored."""
     return tuple(s for s in spans if s.hazard in SCORED_HAZARDS)
 
 
@@ -259,4 +263,5 @@ def _apply_scaled(
 
 
 def _spans(hazards: Iterable[TrueHazard]) -> tuple[Span, ...]:
+    """Returns the spans of true hazards, without what they are about."""
     return tuple(Span(h.hazard, h.t_start, h.t_end) for h in hazards)

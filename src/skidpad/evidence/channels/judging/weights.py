@@ -36,6 +36,7 @@ class Weights(NamedTuple):
         return Span(hazard.hazard, hazard.t_start, hazard.t_end, weight=weight)
 
     def _mean(self, hazard: TrueHazard, column: int) -> float:
+        """Returns the mean of a column over the hazard's known drivers, 1 where none is known."""
         own = [self.drivers[a][column] for a in hazard.about if a in self.drivers]
         return sum(own) / len(own) if own else 1.0
 

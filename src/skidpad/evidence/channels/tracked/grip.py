@@ -57,6 +57,7 @@ class OwnGrip:
         return self.grip
 
     def _judge(self, t: float) -> None:
+        """Learns from the last speeds in m/s what grip they show at `t` s, or forgets a grip disproved."""
         rows = np.array(self.rows)
         a, ask, v = slope(rows[:, 0], rows[:, 1]), float(np.median(rows[:, 2])), rows[-1, 1]
         shown = limit_shown(v, a, ask)
@@ -70,11 +71,13 @@ class OwnGrip:
             self.grip = self.over_since = None
 
     def _learn(self, shown: float) -> None:
+        """Takes over a grip that was shown; one below the known grip moves it a part of the way."""
         known = self.grip
         self.grip = shown if known is None or shown > known else known + FADE * (shown - known)
 
 
 def _start(since: float | None, t: float) -> float:
+    """Returns `since`, or `t` where it is None."""
     return t if since is None else since
 
 

@@ -56,6 +56,7 @@ def greatest_leap(odometers: Sequence[Odometer]) -> float:
 
 
 def _own_leap(i: int, known: Sequence[dict[float, tuple[float, float]]]) -> float:
+    """Returns the largest move of channel `i` in m or, if less, its largest difference from another's."""
     own, rest = known[i], [*known[:i], *known[i + 1 :]]
     apart = [max(dist(own[t], other[t]) for t in own.keys() & other.keys()) for other in rest]
     return min([max(hypot(*move) for move in own.values()), *apart])

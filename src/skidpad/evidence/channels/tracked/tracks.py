@@ -137,6 +137,7 @@ class Lookout:
 
 
 def _sighting(frame: ChannelFrame, i: int, where: Placed) -> Sighting:
+    """Returns object `i` of a frame as a sighting at `where`, with its half sizes in m."""
     shape = frame.polygons[i, : frame.polygon_size[i]]
     half_length, half_width = np.abs(shape).max(axis=0, initial=0.0).tolist()
     x, y = frame.objects[i, :2].tolist()
@@ -170,6 +171,7 @@ class Tracks:
             del self.tracks[key]
 
     def _report(self, t: float, sighting: Sighting, seen: Seen) -> None:
+        """Updates or begins the track of an object on the path; leaves out one beside it or turned away."""
         s, offset, turn, v = sighting.where
         body, half_l, half_w = seen.body, sighting.half_length, sighting.half_width
         key = self._key(sighting)

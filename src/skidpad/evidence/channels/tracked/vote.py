@@ -116,6 +116,7 @@ class Tracked:
         return None
 
     def _follow(self, t: float, seen: Sequence[Seen | None]) -> None:
+        """Updates the tracks of each channel at `t` s; None: the channel is silent."""
         for tracks, one in zip(self.tracks, seen, strict=True):
             tracks.update(t, one)
 

@@ -80,11 +80,13 @@ class Corridor:
 
 
 def _direction(a: Floats, b: Floats, otherwise: Floats) -> Floats:
+    """Returns the unit vector from a to b; `otherwise` where they are less than 1 um apart."""
     d = np.hypot(*(b - a))
     out: Floats = (b - a) / d if d > 1e-6 else otherwise
     return out
 
 
 def _lengths(points: Floats) -> Floats:
+    """Returns (n - 1,) the lengths of the steps between n points, in m."""
     lengths: Floats = np.hypot(*np.diff(points, axis=0).T)
     return lengths

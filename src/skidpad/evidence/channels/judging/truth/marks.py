@@ -100,6 +100,7 @@ def merge_marks(marks: list[Mark], world: World) -> list[TrueHazard]:
 
 
 def _hazard(group: list[Mark], world: World) -> TrueHazard:
+    """Returns the true hazard that neighbouring marks make, from the first mark to the last."""
     kinds = {m.kind for m in group}
     return TrueHazard(
         group[0].hazard,

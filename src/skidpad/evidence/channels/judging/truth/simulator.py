@@ -82,6 +82,7 @@ def _mark_tailgating(
     frames: Sequence[ChannelFrame | None],
     spare: float,
 ) -> list[Mark]:
+    """Returns a mark per vehicle on the driven path whose clearance for braking is at most `spare` m."""
     near = _near(truth, spare)
     line, s_ego = path.around(k) if near.size else (None, 0.0)
     if line is None:
@@ -178,6 +179,7 @@ def _is_reported(actor: Floats, frames: Sequence[ChannelFrame | None], within: f
 
 
 def _position_errors(cycles: Sequence[Cycle], channels: Sequence[str]) -> list[Mark]:
+    """Returns the marks of jumps and drifts of each channel's position against the true one."""
     marks = []
     for c, name in enumerate(channels):
         rows = [

@@ -100,10 +100,12 @@ def _sweeps(cycle: Cycle, ego: ChannelFrame, trail: Trail, channels: Sequence[st
 
 
 def _object_name(channel: str, frame: ChannelFrame, i: int) -> str:
+    """Returns "CHANNEL ID" of an object, "" where it has no id."""
     return f"{channel} {int(frame.ids[i])}" if frame.ids[i] >= 0 else ""
 
 
 def _along(times: Floats, path_t: Floats, path: Floats) -> Floats:
+    """Returns (n, 2) the points of a path at `times`, linear between and constant beyond its ends."""
     return np.column_stack([np.interp(times, path_t, path[:, k]) for k in (0, 1)])
 
 
@@ -146,6 +148,7 @@ class _Sweep(NamedTuple):
 
 
 def _hulls(corners: Floats) -> NDArray[np.object_]:
+    """Returns a convex hull per row of corners (n, k, 2)."""
     owner = np.repeat(np.arange(len(corners)), corners.shape[1])
     hulls: NDArray[np.object_] = shapely.convex_hull(
         shapely.multipoints(corners.reshape(-1, 2), indices=owner)
@@ -163,4 +166,5 @@ def _meet(mine: _Sweep, theirs: _Sweep, near: NDArray[np.int64]) -> bool:
 
 
 def _radius(polygon: Floats) -> float:
+    """Returns the largest distance in m of a vertex from the origin; 0 for none."""
     return float(np.nan_to_num(np.hypot(*polygon.T)).max(initial=0.0))

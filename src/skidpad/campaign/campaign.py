@@ -207,6 +207,7 @@ class Campaign(Generic[T, K, M]):
         return [t for t in batch if cell_of(t.name) in still]
 
     def _drive(self, tasks: dict[str, T], out: Path, runner: Runner) -> Iterator[Entry[K, M]]:
+        """Drives the tasks by the runner and yields an entry of the ledger as each run ends."""
         here = fingerprint().short
         work = partial(self.recipe.drive, out)
         for finished in runner([Job(t.name, work, t, t.deadline_s) for t in tasks.values()]):
@@ -223,6 +224,7 @@ class Campaign(Generic[T, K, M]):
             )
 
     def _drive_task(self, task: T, finished: Finished) -> Driven[K, M | None]:
+        """Returns what a task's run gave; of one that failed, its key and error without metrics."""
         if finished.failure is None:
             driven: Driven[K, M | None] = finished.value
             return driven
@@ -278,4 +280,5 @@ def distinct_cells(
 
 
 def _text(plain: Any) -> bytes:
+    """Returns plain data as JSON bytes, keys in a fixed order."""
     return msgspec.json.encode(plain, order="deterministic")

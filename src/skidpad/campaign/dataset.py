@@ -86,6 +86,7 @@ class DatasetSink(Sink):
         )
 
     def _write(self, tick: int, images: Sequence[Any]) -> None:
+        """Writes the tick's image of each camera as PNG."""
         for camera, image in zip(CAMERAS, images, strict=True):
             good, coded = cv2.imencode(".png", image[:, :, ::-1])
             if not good:
@@ -139,6 +140,7 @@ def write_card(out: Path, every: int) -> Path:
 
 
 def _describe_mount(mount: Pose, camera: Any) -> dict[str, float]:
+    """Returns a camera's size in px, field of view in deg and place in m and rad."""
     return {
         "width_px": camera.width, "height_px": camera.height, "fov_deg": camera.fov_deg,
         "x_m": mount.x, "y_m": mount.y, "z_m": mount.z,

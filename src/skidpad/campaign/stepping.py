@@ -110,6 +110,7 @@ class Scenario:
         self._conditions: dict[tuple[str, str], bool] = {}
 
     def _at_wheel(self, driver: StackAtWheel) -> _Wheel:
+        """Return the wheel that the caller's command turns, around the driver."""
         self._wheel = _Wheel(driver)
         self._wheel.command = self._command
         return self._wheel

@@ -89,5 +89,6 @@ def found_again(run: RunSpec, folder: Path | None) -> RunSpec:
 
 
 def _on(run: RunSpec, map: str) -> RunSpec:
+    """Returns the run on another file of the map."""
     assert isinstance(run.course, (Roads, Route))
     return structs.replace(run, course=structs.replace(run.course, map=map))

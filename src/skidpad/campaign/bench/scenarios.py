@@ -91,19 +91,23 @@ def measure(seconds: float = SECONDS, repeats: int = REPEATS) -> list[ScenarioCo
 
 
 def _fast(what: str, once: Callable[[], float], repeats: int) -> ScenarioCost:
+    """Returns the median speed of a play, in multiples of real time, beside its target."""
     return ScenarioCost(what, _median(once, repeats), "times real time", PLAYED_TARGET, most=False)
 
 
 def _short(what: str, once: Callable[[], float], repeats: int, target: float) -> ScenarioCost:
+    """Returns the median of a duration in s beside its upper target."""
     return ScenarioCost(what, _median(once, repeats), "s", target, most=True)
 
 
 def _median(once: Callable[[], float], repeats: int) -> float:
+    """Returns the median of `repeats` results, after one that warms up."""
     once()
     return median(once() for _ in range(repeats))
 
 
 def _by_itself(file: Path, seconds: float) -> float:
+    """Returns how many times faster than real time a file plays by itself, in CPU time."""
     scenario = compile_scenario(file)
     begin = process_time_ns()
     play_ideal(scenario, seconds)
@@ -118,6 +122,7 @@ def _drive_spec(spec: RunSpec) -> float:
 
 
 def _checks(file: Path, count: int) -> float:
+    """Returns the CPU time in s of checking a file `count` times."""
     begin = process_time_ns()
     for _ in range(count):
         check(file).playable()
@@ -150,6 +155,7 @@ author="skidpad bench"/><CatalogLocations/><RoadNetwork><LogicFile filepath="str
 
 
 def _begin(name: str, lane: int, s: float) -> str:
+    """Returns the XML that puts an entity on road 1 at `s` m with 10 m/s."""
     return f"""<Private entityRef="{name}"><PrivateAction><TeleportAction><Position>
 <LanePosition roadId="1" laneId="{lane}" s="{s}"/></Position></TeleportAction></PrivateAction>
 <PrivateAction><LongitudinalAction><SpeedAction>{STEP}<SpeedActionTarget>
@@ -158,11 +164,13 @@ def _begin(name: str, lane: int, s: float) -> str:
 
 
 def _event(k: int, action: str) -> str:
+    """Returns the XML of an event with the action, started at 5 k s."""
     return f"""<Event name="e{k}" priority="parallel"><Action name="e{k}"><PrivateAction>{action}
 </PrivateAction></Action><StartTrigger>{_when(5.0 * k)}</StartTrigger></Event>"""
 
 
 def _when(t: float) -> str:
+    """Returns the XML of a condition that holds from `t` s of simulation on."""
     return f"""<ConditionGroup><Condition name="c" delay="0" conditionEdge="none"><ByValueCondition>
 <SimulationTimeCondition value="{t}" rule="greaterOrEqual"/></ByValueCondition></Condition>
 </ConditionGroup>"""

@@ -84,6 +84,7 @@ def background_world(asked: TrafficBench, weather: str, seed: int) -> World:
 
 
 def _drive(row: TrafficRow, world: World, seconds: float, km: float, watch: Watch) -> None:
+    """Steps the world for `seconds` s or until the row has `km` km; adds what happened to the row."""
     assert world.traffic is not None
     drivers = world.traffic.drivers.state
     before = drivers["change"].copy()
@@ -104,6 +105,7 @@ def _drive(row: TrafficRow, world: World, seconds: float, km: float, watch: Watc
 
 
 def _count(row: TrafficRow, touched: Iterable[int]) -> None:
+    """Adds the contacts to the row; an index below 0 is something static."""
     for other in touched:
         row.contacts += other >= 0
         row.static += other < 0

@@ -131,6 +131,7 @@ class Watch:
             self._close_stand(i)
 
     def _note_moves(self) -> None:
+        """Counts the vehicles that were moved on, and those of them near others in time."""
         moved = list(self.world.moved_on)
         if moved:
             close = np.minimum(self._times, times_to_neighbours(self.world))[moved] < CLOSE
@@ -140,6 +141,7 @@ class Watch:
             self._times = times_to_neighbours(self.world)
 
     def _note_stands(self) -> None:
+        """Adds the standing of each vehicle up, ends that of vehicles that move, keeps the longest."""
         w = self.world
         assert w.traffic is not None
         stands = w.states.present & (w.placed["speed"] < STANDING)
@@ -165,6 +167,7 @@ class Watch:
         self._circles = circles
 
     def _close_stand(self, i: int) -> None:
+        """Ends a vehicle's standing and keeps it with its commonest cause if it was LONG."""
         if self._stood[i] > LONG:
             cause = cause_name(Held(int(self._causes[i].argmax())))
             x, y = float(self._before.x[i]), float(self._before.y[i])
@@ -174,6 +177,7 @@ class Watch:
         self._causes[i] = 0
 
     def _note_headways(self) -> None:
+        """Keeps the headways in s of vehicles that have followed the same leader steadily."""
         w = self.world
         assert w.traffic is not None
         limit = w.traffic.net.point["limit"]
@@ -202,6 +206,7 @@ class Watch:
         return bool(held and wanted >= HELD_UP * v[j])
 
     def _note_follower(self, i: int, j: int, headway: float, fast: bool) -> None:
+        """Keeps a follower's headway in s; on fast roads also that from front to front."""
         if not fast:
             self.seen.followers_slow.append(headway)
             return
@@ -254,6 +259,7 @@ def overlaps(world: World) -> set[tuple[int, int]]:
 
 
 def _apart(boxes: list[tuple[float, float, float]], sizes: list[tuple[float, float]]) -> bool:
+    """Returns True when two boxes (x, y, yaw with half sizes, m) do not touch: a separating axis."""
     (x0, y0, _), (x1, y1, _) = boxes
     axes = [
         (np.cos(yaw + turn), np.sin(yaw + turn)) for _, _, yaw in boxes for turn in (0, np.pi / 2)

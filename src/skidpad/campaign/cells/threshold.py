@@ -81,6 +81,7 @@ def preset_of(share: float) -> str:
 
 
 def _ratio(name: str) -> float:
+    """Returns a weather's grip ratio by the statistical model, rounded to 4 digits."""
     return round(statistical_ratio(preset(name)), 4)
 
 
@@ -168,6 +169,7 @@ def _driven_by(template: RunSpec, driver: DriverSpec, seed: int) -> RunSpec:
 
 
 def _run(run: RunSpec, mode: ActorMode, start: Start, braking: float, share: float) -> RunSpec:
+    """Returns the run of a start, a braking of the lead in m/s² and a share of the reference grip."""
     nominal = {
         "EgoSpeed": start.v,
         "LeadSpeed": start.v,

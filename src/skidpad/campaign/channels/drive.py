@@ -167,6 +167,7 @@ class ChannelRecorder(Sink):
             listener.cycle_over(crew.cycle, self._t)
 
     def _say(self, item: Item, channel: int | None = None) -> None:
+        """Writes an item to the recording and gives it to the listeners; None: of no channel."""
         self.writer.add(item, channel)
         for listener in self.listeners:
             listener.hear(channel, item)
@@ -270,6 +271,7 @@ def weights_of(spec: RunSpec, table: ActorTable) -> dict[str, str]:
 
 
 def _about(spec: RunSpec, segment: Segment) -> dict[str, str]:
+    """Returns the context of a segment as words: route, map, seed, driver, weather."""
     course, crew = route_of(spec), crew_of(spec)
     return {
         "route": course.place,

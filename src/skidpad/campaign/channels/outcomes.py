@@ -86,6 +86,7 @@ class Referee:
         self._front = max(front, self._front)
 
     def _standing(self, v: float, truth: WorldTruth) -> None:
+        """Adds up the ego's standing; ends the drive as stalled where nothing explains it for so long."""
         if v >= V_STANDING:
             self.stood = 0.0
             return
@@ -97,6 +98,7 @@ class Referee:
             self.over, self.ended = True, Ending.STALLED
 
     def _red_ahead(self, truth: WorldTruth) -> bool:
+        """Returns True when a light that is not green lies within RED_REACH m ahead on the route."""
         here = self.at * STEP
         return any(
             line.kind is SignalKind.LIGHT

@@ -125,6 +125,7 @@ class StackPilot:
         )
 
     def _make_stack(self, setup: Setup, scene: Scene, v: float) -> Stack:
+        """Returns our stack for the actor, from the driver of its number and the conditions; `v` in m/s."""
         c, driver = self.conditions, numbered_driver(self.number)
         kind = govern(AdasStack, EnvelopeSettings(dt=setup.dt)) if driver.envelope else AdasStack
         v_cruise = self.v_cruise if isfinite(self.v_cruise) else max(v, 0.0) or V_UNKNOWN
@@ -143,11 +144,13 @@ def _limiting_weather(setup: Setup) -> Weather | None:
 
 
 def _usual_setup(dt: float) -> Setup:
+    """Returns the set-up of a usual ego with twelve sensors in clear weather; `dt` is in s."""
     ego = ActorSetup(name="", type=EGO_TYPE, place=Pose(0.0, 0.0))
     return Setup(map="", weather=find_weather(CLEAR), specs=twelve_sensors(), ego=ego, dt=dt)
 
 
 def _make_view(table: ActorTable, row: int, map: RoadMap, setup: Setup, seed: int) -> View:
+    """Returns the world as the actor in `row` sees it: itself first, with sensors of its own."""
     n = len(table)
     order = np.array([row, *(i for i in range(n) if i != row)])
     own = ActorTable(

@@ -149,6 +149,7 @@ def weather_of(environment: Environment, base: Weather, name: str) -> Weather:
 
 
 def _sky(e: Environment) -> dict[str, float]:
+    """Returns the weather fields of clouds in % and sun in deg that a file's environment changes."""
     found = {} if e.clouds is None else {"cloudiness": 100.0 * e.clouds}
     if e.sun_elevation_deg is not None:
         found["sun_altitude_deg"] = e.sun_elevation_deg
@@ -185,6 +186,7 @@ def _water(e: Environment) -> dict[str, float]:
 
 
 def _air(e: Environment) -> dict[str, float]:
+    """Returns the weather fields of fog and temperature that a file's environment changes."""
     found = {}
     if e.visual_range is not None:
         sight = min(max(e.visual_range, 1.0), V_CLEAR)

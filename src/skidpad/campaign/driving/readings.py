@@ -65,6 +65,7 @@ class ReadingsRecorder(Sink):
         return describe_row(self._sensors, self._rows[-1]) if self._rows else []
 
     def _describe_sensors(self) -> dict[str, RecordedSensor]:
+        """Returns the recorded sensors by id: further ones, added functions, and the envelope if any."""
         sensors = {
             id: RecordedSensor(id, kind.name, kind.title, kind.units)
             for id, kind in self._kinds.items()
@@ -80,4 +81,5 @@ class ReadingsRecorder(Sink):
 
 
 def _columns(id: str, numbers: Mapping[str, float]) -> dict[str, float]:
+    """Returns the finite numbers by column, `id`.NAME."""
     return {f"{id}.{name}": float(value) for name, value in numbers.items() if isfinite(value)}

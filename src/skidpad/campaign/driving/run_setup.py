@@ -166,6 +166,7 @@ def stage_of(spec: RunSpec) -> Stage:
 
 
 def _roads(spec: RunSpec, course: Roads) -> Stage:
+    """Returns the stage of a run on roads: map, traffic, supervisor and timer."""
     s = spec.settings.traffic
     file = road_file(course)
     map = load_map(file)
@@ -187,6 +188,7 @@ def _roads(spec: RunSpec, course: Roads) -> Stage:
 
 
 def _scenario(spec: RunSpec, course: Scenario) -> Stage:
+    """Returns the stage of a run of a scenario file, with its wind and friction."""
     compiled = load_scenario(course, _pilot_conditions(spec))
     modes: dict[str, ActorMode | None] = dict.fromkeys(compiled.entities, course.actors)
     modes[compiled.ego] = ActorMode.IDEAL if isinstance(spec.driver, Passenger) else None

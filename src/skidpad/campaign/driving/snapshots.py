@@ -55,6 +55,7 @@ class Snapshots(Sink):
 
 
 def _save(picture: Image.Image, path: Path) -> None:
+    """Writes the picture as PNG, compressed the same way each time."""
     picture.save(path, format="PNG", optimize=False, compress_level=3)
 
 

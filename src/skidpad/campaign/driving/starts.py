@@ -24,6 +24,7 @@ def start_of(map: RoadMap) -> LanePosition:
 
 
 def _published_start(map: RoadMap) -> LanePoint | None:
+    """Returns the published start on a known map; None for any other map."""
     if map.name not in PUBLISHED:
         return None
     x, y, lanes = PUBLISHED[map.name]

@@ -39,6 +39,7 @@ def read_surface(path: Path) -> tuple[SurfacePatch, ...]:
 
 
 def _patch(plain: Any, where: str) -> SurfacePatch:
+    """Return a patch of a surface from plain data; raises ConfigError with `where`."""
     try:
         return msgspec.convert(plain, SurfacePatch)
     except (msgspec.ValidationError, ConfigError) as error:

@@ -142,6 +142,7 @@ class Closely(Sink):
             self.pictures.append(path)
 
     def _trace(self, t: float, report: StackReport, mode: str) -> None:
+        """Appends a line to the trace when tier or status differ from those before; `t` is in s."""
         if (report.tier, report.status) == self._before:
             return
         self._before = (report.tier, report.status)

@@ -153,6 +153,7 @@ def drive(
 def _name_driver(
     stack: type[Stack] | str | int, options: dict[str, Any]
 ) -> tuple[DriverSpec, type[Stack] | None]:
+    """Returns the driver of a stack by class, name or number, and its class; None for one of ours."""
     if isinstance(stack, (str, int)):
         driver = describe_driver(stack, options)
         return driver, load_stack(driver.where) if isinstance(driver, StackDriver) else None
@@ -294,6 +295,7 @@ class OpenRun:
     def _drive(
         self, kind: type[Stack] | None, at_wheel: Callable[[StackAtWheel], Driver] | None
     ) -> Iterator[Moment]:
+        """Drives the run and yields each moment; a stack that fails ends it with a notice."""
         stage, backend = self.stage, self.backend
         try:
             driver = driver_of(self.spec, stage, kind)
@@ -318,6 +320,7 @@ class OpenRun:
             self._failed(failure)
 
     def _failed(self, failure: StackError) -> None:
+        """Keeps the stack's failure and notes it in the log at the present tick."""
         self.failure = failure
         self.log.log.notice(self.backend.truth().tick, NoticeSource.STACK, str(failure))
 

@@ -32,6 +32,7 @@ def read_segment(recording: Path) -> RunSpec:
 
 
 def _read_description(plain: dict[str, Any], path: Path) -> RunSpec:
+    """Returns the run that a folder's plain data describe; raises FileError where they do not."""
     try:
         return run_from_plain(plain, str(path))
     except FileError:

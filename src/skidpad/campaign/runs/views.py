@@ -64,6 +64,7 @@ def colours(image: CameraImage) -> Picture:
 
 
 def _draw_radar(picture: Picture, points: RadarPoints) -> None:
+    """Draws the radar points from above, closing ones in another colour."""
     left, top, width, height = RADAR_BOX
     x = left + width / 2.0 - points.range * np.sin(points.azimuth) * height / RADAR_SHOWN * 2.0
     y = top + height - points.range * np.cos(points.azimuth) * height / RADAR_SHOWN
@@ -74,6 +75,7 @@ def _draw_radar(picture: Picture, points: RadarPoints) -> None:
 
 
 def _draw_text(picture: Picture, moment: Moment, dt: float) -> None:
+    """Draws time, speed, commands, the stack's report and events as lines of text."""
     frame, truth = moment.frame, moment.truth
     left, top, _, _ = TEXT_BOX
     first = f"{frame.tick * dt:7.2f} s   {3.6 * frame.ego.speed:5.1f} km/h"
@@ -91,6 +93,7 @@ def _draw_text(picture: Picture, moment: Moment, dt: float) -> None:
 
 
 def _describe_report(report: StackReport, mode: str) -> str:
+    """Returns what is known of a stack's report as one line; the mode stands for the tier."""
     tier = report.tier.name.lower().replace("_", " ") if report.tier is not None else None
     shown: Mapping[str, Any] = {
         "tier": mode or tier,
@@ -115,4 +118,5 @@ def _describe_report(report: StackReport, mode: str) -> str:
 def _write(
     picture: Picture, text: str, x: int, y: int, ink: tuple[int, int, int], scale: float
 ) -> None:
+    """Writes a line of text with its left end at (x, y) px."""
     cv2.putText(picture, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, scale, ink, 1, cv2.LINE_AA)

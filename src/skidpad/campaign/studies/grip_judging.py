@@ -124,6 +124,7 @@ def judge_estimates(drives: Sequence[Estimates], dt: float = DT) -> GripJudgemen
 
 
 def _count_alarms(e: Estimates) -> int:
+    """Returns how often the estimate began to be far below the true grip; near ticks count once."""
     low = np.flatnonzero(e.is_judged & (e.value < ALARM * e.truth))
     return int((np.diff(low) > APART).sum() + 1) if len(low) else 0
 

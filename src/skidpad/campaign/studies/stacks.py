@@ -129,6 +129,7 @@ class Noisy(Changed):
         return super().tick(replace(frame, segments=seen))
 
     def _disturb_segments(self, id: str, segments: Segments, tick: int) -> Segments:
+        """Returns the segments with a depth error; without those out of range, and none in a missed tick."""
         factor = self._factor(id)
         keep = segments.depth <= self.noise.range_share * DEPTH_READ
         if self.noise.range_share >= 1.0:

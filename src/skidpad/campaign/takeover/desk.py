@@ -108,6 +108,7 @@ class Desk:
             self._take(one)
 
     def _take(self, one: Input) -> None:
+        """Takes over one input of the person; raises ConfigError for one that the course cannot follow."""
         match one:
             case Wheel():
                 self.handed_back = self.manual and not one.manual

@@ -51,6 +51,7 @@ class Hands:
             self.reverse, self.pressed = True, 0.0
 
     def _turn(self, pedals: Pedals, v: float) -> None:
+        """Turns the wheel by the pedals at `v` m/s: directly, or by keys at a limited rate."""
         if pedals.method is not Method.KEYBOARD:
             self.steer = pedals.steer
             return

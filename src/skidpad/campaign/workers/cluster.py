@@ -123,6 +123,7 @@ def run_on(
 
 
 def _collect(future: Any, job: Job) -> Finished:
+    """Returns how a job on the cluster ended; one whose worker was lost counts as crashed."""
     error = future.exception()
     if error is not None:
         return Finished(job, failure=Outcome.CRASHED, detail=f"the worker was lost: {error}")

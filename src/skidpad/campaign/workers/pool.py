@@ -127,6 +127,7 @@ def local(workers: int, warm_up: Callable[[], None] | None = None) -> Runner:
 
 
 def _warm(compile_all: Callable[[], None]) -> None:
+    """Compiles all kernels in a worker that ends with its parent."""
     die_with_parent()
     compile_all()
     sys.stdout.flush()

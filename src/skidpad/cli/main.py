@@ -54,6 +54,7 @@ app = typer.Typer(
 
 
 def _version(wanted: bool) -> None:
+    """Prints the version and ends the command where it is wanted."""
     if wanted:
         typer.echo(f"skidpad {skidpad.__version__}")
         raise typer.Exit
@@ -150,6 +151,7 @@ arrange_help(app)
 
 
 def _on_termination(number: int, frame: object) -> NoReturn:
+    """Ends the process with the exit code of the signal."""
     del frame
     raise SystemExit(128 + number)
 

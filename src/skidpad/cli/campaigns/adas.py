@@ -117,6 +117,7 @@ def report(
 
 
 def _reports() -> dict[str, Callable[[Path], object]]:
+    """Returns the function that writes the report of each kind of folder, by kind."""
     from skidpad.cli.channels.drive import totals
     from skidpad.cli.scenarios.expected import played_report
     from skidpad.report.grip.page import write_grip_report

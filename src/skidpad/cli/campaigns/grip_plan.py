@@ -32,6 +32,7 @@ def with_model(run: RunSpec, tuned: Tuned, model: str, esc: str = "off") -> RunS
 
 
 def _vary_run(ask: GripCross, run: RunSpec) -> Cross:
+    """Returns what the options vary; raises ConfigError where they do not go together."""
     climate = grip_weathers(ask.weather)
     if run.overlay and ask.four_cells:
         raise ConfigError("--four-cells drives with and without drops: leave --overlay away")
@@ -66,6 +67,7 @@ def split_words(text: str) -> list[str]:
 
 
 def _choices(option: str, text: str, kind: type[Choice]) -> list[Choice]:
+    """Returns the choices in an option's comma list; raises ConfigError for an unknown one."""
     allowed = [member.value for member in kind]
     return [kind(require_choice(option, part, allowed)) for part in split_words(text)]
 

@@ -163,6 +163,7 @@ def judge_one(task: _Task) -> Segment:
 
 
 def _judge_task(task: _Task) -> Segment:
+    """Returns one recording judged by all identifiers, with the monitor's times."""
     import time
 
     from skidpad.evidence.channels.judging.segments import judge
@@ -200,12 +201,14 @@ def _segments(tasks: list[_Task], workers: int) -> list[Segment]:
 
 
 def _report_segments(segments: Iterable[Segment]) -> Iterator[Segment]:
+    """Yields the segments on, and prints the name and cycles of each."""
     for segment in segments:
         typer.echo(f"{segment.name}: {segment.t.size} cycles")
         yield segment
 
 
 def _labels_of(path: Path, marked: dict[str, list[Span]]) -> tuple[Span, ...]:
+    """Returns the labels of a recording: those of all, and those of its own file."""
     return (*marked.get("", []), *marked.get(path.stem, []))
 
 
@@ -236,6 +239,7 @@ def _refuse_training_drives(path: Path, segments: list[Segment]) -> None:
 
 
 def _print_results(table: dict[str, object]) -> None:
+    """Prints found, false and missed hazards with precision and recall, for the tolerance of 1 s."""
     from skidpad.evidence.channels.matching import percent
 
     def ratio(row: dict[str, object], name: str) -> str:

@@ -88,6 +88,7 @@ def export(
 
 
 def _choose_ids(table: dict[str, T], ids: list[str] | None) -> list[T]:
+    """Returns the entries of these ids, of all where there are none; raises ConfigError if unknown."""
     from skidpad.core.errors import ConfigError
 
     unknown = [i for i in ids or [] if i not in table]

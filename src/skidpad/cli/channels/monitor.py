@@ -175,6 +175,7 @@ def _source(file: Path | None, mapping: Path | None, domain: int, wait: float) -
 
 
 def _rule(name: str) -> HazardType | AnyIndicator:
+    """Returns the hazard or indicator that --fail-if names; raises ConfigError for an unknown one."""
     from skidpad.core.errors import ConfigError
     from skidpad.core.vocabulary import HazardType
     from skidpad.evidence.channels.indicators.catalogue import Indicator, load_thresholds
@@ -191,6 +192,7 @@ def _rule(name: str) -> HazardType | AnyIndicator:
 
 
 def _events(found: Watched, rule: HazardType | AnyIndicator) -> int:
+    """Returns how often the hazard, or a violation of the indicator, was found."""
     from skidpad.core.vocabulary import HazardType
 
     if isinstance(rule, HazardType):
@@ -199,6 +201,7 @@ def _events(found: Watched, rule: HazardType | AnyIndicator) -> int:
 
 
 def _print(found: Watched, out: Path) -> None:
+    """Prints what a monitor found, what it lost, and where to look next."""
     from skidpad.core.wording import count_text
 
     summary = found.summary

@@ -247,6 +247,7 @@ def pool(workers: int) -> Iterator[Callable[[list[Job]], list[tuple[int, int]]]]
 
 
 def _finding(f: dict[str, Any]) -> str:
+    """Returns a finding on a roll-out as one line of text."""
     return (
         f"{f['decision']} after {f['drives']} drives, {f['mean']:+.2f} errors per drive, "
         f"p worse {f['p_worse']:.2g}, p no worse {f['p_no_worse']:.2g} ({f['reason']})"

@@ -77,6 +77,7 @@ class Watch:
             self._raise(row["cycle"], row["t"], Kind.HAZARD, row["hazard"].replace("_", " "))
 
     def _raise(self, k: int, t: float, kind: Kind, what: str) -> None:
+        """Raises an alert about cycle `k` at `t` s with the last known frame as its scene."""
         known = [frame for frame in self._seen if frame.t <= t + 1e-3] or list(self._seen)[:1]
         if not known:
             self.aboard.say(f"{what} at {t:.1f} s: no alert, as no pose was known")

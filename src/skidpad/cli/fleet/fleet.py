@@ -47,6 +47,7 @@ TokenFile = Annotated[Path, typer.Option(help="File that holds the vehicle's cre
 
 
 def _places(data: Path, database: str | None, blobs: str | None) -> Places:
+    """Returns where a fleet keeps its data; None: inside the folder `data`."""
     with fleet_extra():
         from skidpad.fleet.service import Places
     return Places(data=data, database=database, blobs=blobs)
@@ -383,6 +384,7 @@ def demo(
 
 
 def _stay(stay: bool) -> None:
+    """Waits until Ctrl-C, or not at all where `stay` is False."""
     if stay:
         typer.echo("Ctrl-C ends it")
         with suppress(KeyboardInterrupt):

@@ -74,6 +74,7 @@ def machine() -> str:
 
 
 def _tick(seconds: float, quiet: bool) -> dict[str, Any]:
+    """Returns the cost of a tick per configuration and weather in ms; prints it unless quiet."""
     from skidpad.campaign.bench.tick import tick_costs
 
     rows = []
@@ -89,6 +90,7 @@ def _tick(seconds: float, quiet: bool) -> dict[str, Any]:
 
 
 def _line(row: Row) -> str:
+    """Returns a row of tick costs in ms as two lines of text."""
     c = row.cost
     parts = ", ".join(f"{name} {ms:.2f}" for name, ms in sorted(c.parts.items()))
     real = 1000.0 * DT / c.mean
@@ -99,18 +101,21 @@ def _line(row: Row) -> str:
 
 
 def _sensors(quiet: bool) -> dict[str, Any]:
+    """Returns the cost of each sensor in ms per tick; prints it unless quiet."""
     from skidpad.sensors.bench import run
 
     return _plain(run(), "ms per tick, median", quiet)
 
 
 def _physics(quiet: bool) -> dict[str, Any]:
+    """Returns the cost of the physics in us per vehicle and tick; prints it unless quiet."""
     from skidpad.physics.bench import run
 
     return _plain(run(), "us per vehicle and tick, median", quiet)
 
 
 def _plain(figures: dict[str, float], unit: str, quiet: bool) -> dict[str, Any]:
+    """Returns figures with their unit as plain data; prints them unless quiet."""
     if not quiet:
         typer.echo(unit)
         for stage, value in figures.items():
@@ -119,6 +124,7 @@ def _plain(figures: dict[str, float], unit: str, quiet: bool) -> dict[str, Any]:
 
 
 def _matrix(seconds: float, run: bool, quiet: bool) -> dict[str, Any]:
+    """Returns the minutes that the matrix takes, driven or estimated; prints them unless quiet."""
     from skidpad.campaign.bench import matrix
 
     minutes = matrix.driven_minutes() if run else matrix.estimated_minutes(seconds)
@@ -158,6 +164,7 @@ def _describe_seen(seen: TrafficCounts) -> Iterator[str]:
 
 
 def _scenarios(seconds: float, quiet: bool) -> dict[str, Any]:
+    """Returns the cost of playing and checking scenario files; prints it unless quiet."""
     from skidpad.campaign.bench.scenarios import measure
 
     rows = measure(seconds)
@@ -169,6 +176,7 @@ def _scenarios(seconds: float, quiet: bool) -> dict[str, Any]:
 
 
 def _traffic(asked: TrafficBench, quiet: bool) -> dict[str, Any]:
+    """Returns the contacts and flow of background traffic by weather; prints them unless quiet."""
     from skidpad.campaign.bench.traffic import measure
 
     rows = []

@@ -20,11 +20,13 @@ SHOWN = ("rain_20", "rain_40", "rain_100", "snow", "icy_30")
 
 
 def _rain(w: float, p: float) -> float:
+    """Returns the statistical grip ratio for wetness `w` and deposits of rain `p`, both in %."""
     weather = Weather(wetness=w, precipitation_deposits=p)
     return friction_ratio(weather, GripModel.STATISTICAL)
 
 
 def _curves(axes: Any) -> None:
+    """Draws the statistical grip ratio over wetness and over ice thickness in %."""
     for p, style in ((0.0, "-"), (50.0, "--"), (100.0, ":")):
         axes.plot(PERCENT, [_rain(w, p) for w in PERCENT], style, label=f"rain, deposits {p:g} %")
     ice = [friction_ratio(Weather(ice_thickness=i), GripModel.STATISTICAL) for i in PERCENT]
@@ -36,6 +38,7 @@ def _curves(axes: Any) -> None:
 
 
 def _over_deposits(axes: Any) -> None:
+    """Draws the statistical grip ratio over the deposits of rain in %."""
     for w, style in ((0.0, "-"), (50.0, "--"), (100.0, ":")):
         axes.plot(PERCENT, [_rain(w, p) for p in PERCENT], style, label=f"wetness {w:g} %")
     axes.set(xlabel="deposits of rain, %", ylabel="ratio of dry grip", ylim=(0, 1.05))
@@ -54,6 +57,7 @@ def draw_surface(axes: Any) -> None:
 
 
 def _speeds(axes: Any, mu_ref: float) -> None:
+    """Draws the friction of the physical model over speed in km/h, beside measured values."""
     kmh = np.linspace(0.0, 130.0, 66)
     for name in SHOWN:
         params = grip_params(preset(name), GripModel.PHYSICAL, mu_ref)

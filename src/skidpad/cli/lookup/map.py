@@ -118,6 +118,7 @@ def _count(number: int, noun: str) -> str:
 
 
 def _facts(map: RoadMap, summary: MapSummary) -> list[str]:
+    """Returns the facts on a map as lines of text."""
     lengths = ", ".join(
         f"{kind.name.lower()} {length / 1000.0:.2f} km"
         for kind, length in summary.lane_length.items()
@@ -149,6 +150,7 @@ def _facts(map: RoadMap, summary: MapSummary) -> list[str]:
 
 
 def _bends(summary: MapSummary) -> list[str]:
+    """Returns a table of the tightest bends with the grip that they need, as lines of text."""
     if not summary.bends:
         return ["no bend tighter than R 300 outside junctions"]
     grips = "".join(f"  grip at {v:.0f} km/h" for v in SPEEDS_KMH)

@@ -117,6 +117,7 @@ def read_stack_settings(words: Iterable[str]) -> dict[str, bool | float | str | 
 
 
 def _plain_value(text: str) -> bool | float | str | None:
+    """Returns true, false, none and finite numbers in the text as values, any other text as it is."""
     words = {"true": True, "false": False, "none": None}
     if text.lower() in words:
         return words[text.lower()]

@@ -90,6 +90,7 @@ class CampaignOptions(Driving, frozen=True, kw_only=True):
 
     @contextmanager
     def _runner(self, campaign: Campaign[Any, Any, Any]) -> Iterator[Runner]:
+        """Yields the runner of the campaign: on this machine, or on the cluster where one is named."""
         from skidpad.campaign.workers.cluster import runner_of
         from skidpad.campaign.workers.pool import local
         from skidpad.core.errors import ConfigError
@@ -126,6 +127,7 @@ class Estimate(Struct, frozen=True, kw_only=True):
             self._print(part, f"{name}: ")
 
     def _print(self, campaign: Campaign[Any, Any, Any], name: str) -> None:
+        """Prints how many minutes the campaign would take, from runs that were measured."""
         from skidpad.core.wording import count_text
 
         found, workers = campaign.estimate(), 1 if campaign.alone else self.workers

@@ -51,6 +51,7 @@ def map_of(map: str, choice: BackendChoice) -> str:
 
 
 def _fetch(choice: BackendChoice, map: str, folder: Path) -> None:
+    """Fetches the map from the CARLA server into the folder; ends the command with 1 if that fails."""
     from skidpad.campaign.driving.backends import carla_options, keep_server
     from skidpad.simulation.carla.mapping import fetch_map
 

@@ -64,6 +64,7 @@ class Described(NamedTuple):
 
 
 def _describe_fields(kind: type[Struct]) -> dict[str, Described]:
+    """Returns the fields of a struct that have a description, by name."""
     hints = get_type_hints(kind, include_extras=True)
     found = {}
     for field in structs.fields(kind):
@@ -114,6 +115,7 @@ def _option(field: Described, panel: str | None) -> Any:
 
 
 def _flag(name: str) -> str:
+    """Returns the flag of an option from its field name."""
     return f"--{name.replace('_', '-')}"
 
 

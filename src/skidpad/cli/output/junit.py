@@ -32,6 +32,7 @@ def write_verdicts(
 
 
 def _cases(run: PlayRun, rules: Sequence[str]) -> list[tuple[str, list[tuple[str, str]]]]:
+    """Returns the JUnit cases of a run, one per rule: its name, and tag and text of failures."""
     by_rule = run.judged.failed or dict.fromkeys(rules, "") or {"played": ""}
     tag = TAGS.get(run.verdict)
     if tag is not None:
@@ -44,6 +45,7 @@ def _cases(run: PlayRun, rules: Sequence[str]) -> list[tuple[str, list[tuple[str
 
 
 def _write(path: Path, suite: str, cases: Sequence[tuple[str, list[tuple[str, str]]]]) -> None:
+    """Writes the cases as one JUnit test suite to the path."""
     from lxml import etree
 
     from skidpad.recording.files import write_bytes

@@ -72,6 +72,7 @@ def require_backend(run: Path, name: str) -> None:
 
 
 def _show(result: Rerun) -> None:
+    """Prints the trace, and where the film or the pictures are."""
     for line in result.trace:
         typer.echo(line)
     if result.film is not None:

@@ -105,11 +105,13 @@ def story(driver: str, shadow: str, share: float, partings: Sequence[Parting]) -
 
 
 def _before(event: Foresight, driver: str, shadow: str) -> str:
+    """Returns a line on a contact: how long before each of both had braked."""
     both = f"{driver} {_ahead(event.driver)}, {shadow} {_ahead(event.shadow)}"
     return f"contact at {event.t:.2f} s: {both}"
 
 
 def _ahead(seconds: float | None) -> str:
+    """Returns how many s before the contact it braked; None: not at all."""
     if seconds is None:
         return "did not brake"
     return f"braked {'at least ' if seconds > LONGEST else ''}{seconds:.2f} s before"

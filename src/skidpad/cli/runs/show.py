@@ -139,6 +139,7 @@ def vehicle_grips(run: Path, log: RunLog) -> list[tuple[str, ...]]:
 
 
 def _text(value: float | None) -> str:
+    """Returns a number as text with three decimals, whole ones without; "-" for None."""
     if value is None:
         return "-"
     return f"{value:g}" if isinstance(value, int) else f"{value:.3f}"

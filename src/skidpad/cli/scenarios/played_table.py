@@ -32,6 +32,7 @@ def played_text(played: Played, page: Path) -> str:
 
 
 def _line(cells: Sequence[str]) -> str:
+    """Return a row of the table as text, names fitted and numbers to the right."""
     names = [_fit(cell, width) for cell, width in zip(cells[:3], WIDTHS, strict=False)]
     numbers = [f"{cell:>{width}}" for cell, width in zip(cells[3:], WIDTHS[3:], strict=True)]
     return " ".join([*names, *numbers]).rstrip()
@@ -46,6 +47,7 @@ def _fit(text: str, width: int) -> str:
 
 
 def _cells(run: PlayRun) -> list[str]:
+    """Return the cells of a run: scenario, weather, verdict, gap in m, TTC in s, m/s², km/h."""
     hit = None if run.contact is None else kmh_from_mps(run.contact[2])
     numbers = [
         (run.least("min_gap_m"), ".1f"),
@@ -59,10 +61,12 @@ def _cells(run: PlayRun) -> list[str]:
 
 
 def _number(value: float, spec: str) -> str:
+    """Return a number in the format, ">BIG" from BIG on."""
     return format(value, spec) if value < BIG else f">{BIG}"
 
 
 def _reasons(runs: Sequence[PlayRun]) -> list[str]:
+    """Return the reasons of the first REASONS runs that have any, and how many more have."""
     told = [
         f"{run.verdict.value}: {run.scenario}: {'; '.join(run.judged.reasons)}"
         for run in runs

@@ -114,6 +114,7 @@ def search(
 def _drive(
     found: Search, how: Batches, known: Sequence[Trial], scene: Scene | None, *, has_exposure: bool
 ) -> None:
+    """Searches on from the known trials, with progress shown, and writes the findings."""
     from skidpad.search.failures import look_at_failures, write_findings, write_hazard
     from skidpad.search.loop import search as drive_search
 

@@ -119,6 +119,7 @@ def _template(
     scenario: Scenario,
     tuned: Tuned,
 ) -> RunSpec:
+    """Return the one run that a search varies; raises ConfigError for several weathers or grips."""
     from skidpad.cli.scenarios.play import play_runs, play_template
     from skidpad.core.errors import ConfigError
 

@@ -31,15 +31,18 @@ class Change(NamedTuple):
 
 
 def _in_weather(name: str) -> Callable[[RunSpec], RunSpec]:
+    """Returns the change of a run that puts it into the weather of this name."""
     return lambda run: structs.replace(run, weather=preset(name))
 
 
 def _with_stability(run: RunSpec) -> RunSpec:
+    """Returns the run with stability control in its vehicle."""
     world = replace(run.settings.world, esc=True)
     return structs.replace(run, settings=replace(run.settings, world=world))
 
 
 def _with_emergency_braking(run: RunSpec) -> RunSpec:
+    """Returns the run with emergency braking added; one whose driver is no stack of ours as it is."""
     if not isinstance(run.driver, AdasDriver):
         return run
     functions = run.driver.functions | {Function.AEB}
@@ -47,6 +50,7 @@ def _with_emergency_braking(run: RunSpec) -> RunSpec:
 
 
 def _in_envelope(run: RunSpec) -> RunSpec:
+    """Returns the run with the speed envelope over its driver."""
     return structs.replace(run, govern=Govern.ENVELOPE)
 
 

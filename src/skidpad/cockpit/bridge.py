@@ -104,6 +104,7 @@ class Bridge:
     # --- words
 
     def _obey(self, word: str, value: Any) -> None:
+        """Acts on a word of a tab; raises ConfigError for a word that does not exist."""
         simple: Mapping[str, Callable[[], Word]] = {
             "pause": lambda: Pause(not self.told.get("paused", False)),
             "play": lambda: Pause(False),
@@ -145,13 +146,16 @@ class Bridge:
             raise ConfigError(f"there is no word {word!r}")
 
     def _do(self, one: Input) -> None:
+        """Sends an input to the producer to carry out."""
         self.producer.say(Do(one))
 
     def _seat(self, name: str, otherwise: Any) -> Any:
+        """Returns a value of the driver's seat as last told; `otherwise` where it is absent or None."""
         value = self.told.get("seat", {}).get(name)
         return otherwise if value is None else value
 
     def _pedals(self, value: Mapping[str, Any]) -> None:
+        """Moves the pedals as a tab sends them; the dead man's switch learns whether any is pressed."""
         pedals = msgspec.convert(dict(value), Pedals)
         still = Pedals(method=pedals.method) == pedals
         self.dead_man.heard(not still)
@@ -164,16 +168,20 @@ class Bridge:
             self._do(pedals)
 
     def _release(self) -> None:
+        """Lets go of pedals and wheel, the method kept."""
         self._move(Pedals(method=self.pedals.method))
 
     def _show(self, main: View) -> None:
+        """Sets the main view and asks the producer for the views that are shown."""
         self.main = main
         self.producer.say(Show(main, tuple(sorted(self.hidden)), tuple(sorted(self.extras))))
 
     def _next_main(self) -> View:
+        """Returns the main view after the present one, the first where it is none of MAIN."""
         return MAIN[(MAIN.index(self.main) + 1) % len(MAIN)] if self.main in MAIN else MAIN[0]
 
     def _lamps(self, value: Any) -> Lamps:
+        """Returns the lamp switch of this value; None: the position after the present one."""
         if value is not None:
             return Lamps(LampSwitch(value))
         now = self._seat("lamps", "auto")
@@ -181,6 +189,7 @@ class Bridge:
         return Lamps(LAMP_ORDER[(at + 1) % len(LAMP_ORDER)])
 
     def _toggle(self, value: Any) -> Functions:
+        """Returns the functions that are on, with the given one switched."""
         own = {f.value for f in Function}  # those of packages have no switch
         on = {Function(name) for name in self._seat("functions", []) if name in own}
         return Functions(tuple(sorted(on ^ {Function(value)}, key=lambda f: f.value)))
@@ -202,6 +211,7 @@ class Bridge:
         return self._acting(find_preset(replace(now, name=name, title="", **fields)))
 
     def _present(self) -> Weather:
+        """Returns the weather that is outside now."""
         return self._sky().weather
 
     def _sky(self) -> Sky:
@@ -229,6 +239,7 @@ class Bridge:
         return wanted
 
     def _crowd(self, value: Any) -> Crowd:
+        """Returns the wish for so many vehicles; raises ConfigError where traffic cannot change."""
         seat = self.told.get("seat", {})
         if "crowd" in seat and seat["crowd"] is None:
             raise ConfigError("only on roads with background traffic can vehicles leave or come")

@@ -197,6 +197,7 @@ class ChannelSource:
         return Moment(frame, truth, Said(report, _mode(decision)), command, report, Action(command))
 
     def _states(self, k: int) -> ActorStates:
+        """Returns the actors' states at moment `k`, heights from the map, acceleration from speeds."""
         x, y, yaw, vx, vy = self._state[k].T.copy()
         before, after = max(k - 1, 0), min(k + 1, self.ticks - 1)
         both = self._present[before] & self._present[after]
@@ -271,6 +272,7 @@ class _Items:
 
 
 def _of_truth(one: TruthFrame) -> World:
+    """Returns the true world of a frame, the ego first."""
     keys = (EGO_KEY, *(("actor", int(i)) for i in one.ids))
     return World(
         one.t,
@@ -306,10 +308,12 @@ def _size(polygon: Floats) -> Floats:
 
 
 def _kind(label: int) -> ActorKind:
+    """Returns the kind of actor for a class label, a prop for an unknown one."""
     return KINDS.get(class_of(label), ActorKind.PROP)
 
 
 def _height(label: int) -> float:
+    """Returns the height in m for a class label, a car's for an unknown one."""
     return HEIGHT.get(class_of(label), CAR_HEIGHT)
 
 
@@ -320,6 +324,7 @@ def _paint(row: int) -> tuple[int, int, int]:
 
 
 def _mode(decision: Decision | None) -> str:
+    """Returns which channel drives and why as text, "" without a decision."""
     if decision is None:
         return ""
     return f"{decision.driving or 'nobody: minimal-risk stop'} drives ({decision.reason})"

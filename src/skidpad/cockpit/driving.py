@@ -133,6 +133,7 @@ class CockpitPacer(Sink):
         self.pacer.tick(DT / self.link.rate if self.link.rate > 0.0 else 0.0)
 
     def _count(self) -> None:
+        """Counts a tick and whether it was slow; updates the real time factor every WINDOW ticks."""
         now = self.clock()
         self.ticks += 1
         self.slow += SLOW * (now - self._last) > DT
@@ -142,6 +143,7 @@ class CockpitPacer(Sink):
             self._window = now
 
     def _stand(self, moment: Moment) -> None:
+        """Shows the moment while the run is paused, until it goes on, steps or ends."""
         self.again(moment)
         while self.link.paused and not self.link.ended and self.link.steps == 0:
             if self.link.pipe is None:

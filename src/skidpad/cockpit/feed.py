@@ -109,6 +109,7 @@ class Feed:
                 self._memory.unlink()
 
     def _slot(self, number: int) -> NDArray[np.uint8]:
+        """Returns the memory of a slot, numbers wrapping around."""
         first = HEAD + number % SLOTS * SLOT_BYTES
         slot: NDArray[np.uint8] = np.ndarray(
             SLOT_BYTES, dtype=np.uint8, buffer=self._memory.buf, offset=first
@@ -122,6 +123,7 @@ def _align_size(size: int) -> int:
 
 
 def _unpack(data: NDArray[np.uint8], length: int) -> Packet:
+    """Returns the packet in a slot; its planes are views of the memory, not copies."""
     head = msgspec.json.decode(data[:length].tobytes(), type=Head)
     views, at = {}, _align_size(length)
     for plane in head.planes:

@@ -119,6 +119,7 @@ def _other(companion: Companion, moment: Moment, view: View) -> Picture:
 
 
 def _inset(picture: Picture, small: dict[View, Picture]) -> None:
+    """Draws the small views into the top of the picture, centred, in place."""
     width = picture.shape[1]
     x = (width - round(sum(s for _, s in INSETS) * width) - 2 * MARGIN) // 2
     for view, share in INSETS:
@@ -135,6 +136,7 @@ def _inset(picture: Picture, small: dict[View, Picture]) -> None:
 def _say(
     picture: Picture, motion: dict[str, Any], stack: dict[str, Any], tick: int, events: list[str]
 ) -> None:
+    """Writes speed, grip, time, mode and events into the picture, in place."""
     height = picture.shape[0]
     _write(picture, f"{abs(motion['speed_kmh']):.0f} km/h", 16, height - 44, INK, 1.1, 2)
     mu = [v for v in motion["mu"] if v is not None]
@@ -146,12 +148,14 @@ def _say(
 def _write(
     picture: Picture, text: str, x: int, y: int, ink: tuple[int, int, int], size: float, bold: int
 ) -> None:
+    """Writes a line of text with a shadow at (x, y) px, in place."""
     for colour, shift in ((SHADOW, 1), (ink, 0)):
         at = (x + shift, y + shift)
         cv2.putText(picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, colour, bold, cv2.LINE_AA)
 
 
 def _mp4(pictures: Iterator[Picture], path: Path, dt: float) -> None:
+    """Writes the pictures as an MP4 film; raises OutputError where it cannot be opened."""
     writer: cv2.VideoWriter | None = None
     try:
         for picture in pictures:

@@ -17,6 +17,7 @@ from skidpad.stack.perception.radar import velocity_limit
 
 
 def _title(tier: Tier) -> str:
+    """Returns a tier's name in words."""
     return tier.name.replace("_", " ").capitalize().replace("Acc ", "ACC ")
 
 

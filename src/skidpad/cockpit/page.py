@@ -137,6 +137,7 @@ class Panel:
         self.say(word, value)
 
     def _real(self, name: str, seat: dict[str, Any]) -> Any:
+        """Returns what is really the case for a control, None where that is not known."""
         if name in SLIDERS:
             return seat.get("sky", {}).get(name)
         if name.startswith(PICTURE):
@@ -239,6 +240,7 @@ def function_switch(panel: Panel, name: str, title: str) -> None:
 
 
 def _has(names: list[str] | None, name: str) -> bool | None:
+    """Returns whether the name is among the names; None where those are not known."""
     return None if names is None else name in names
 
 
@@ -297,4 +299,5 @@ def crowd_slider(panel: Panel) -> None:
 
 
 def _known_name(name: str | None, names: list[str]) -> str | None:
+    """Returns the name where it is one of the names, else None."""
     return name if name in names else None

@@ -82,6 +82,7 @@ class Producer:
 
 
 def _work(job: Job, name: str, pipe: Connection, about: dict[str, Any]) -> None:
+    """Runs a job in its process and sends how it ended through the pipe: done, refused or failed."""
     for one in GROUP:  # the page's process hears it: the pipe says so, and the drive is kept
         signal.signal(one, signal.SIG_IGN)
     feed_name = name

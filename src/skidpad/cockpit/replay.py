@@ -157,6 +157,7 @@ class RecordedRun:
         return Moment(frame, truth, Said(report, mode), command, report, action)
 
     def _truth(self, k: int, tick: int) -> WorldTruth:
+        """Returns the true world of moment `k` from the log, with the events of its tick."""
         log = self.log
         a = log.actors
         n = len(log.table)
@@ -191,6 +192,7 @@ class RecordedRun:
         return pitch
 
     def _relocation(self, tick: int) -> Relocate | None:
+        """Returns the relocation of the ego in the tick; None where it was not moved."""
         for e in self.log.relocations:
             if e.tick == tick:
                 return Relocate(e.new, 0.0, Moved(e.reason, e.shift, e.old, e.new, True))
@@ -243,6 +245,7 @@ def seats_of(spec: RunSpec, inputs: tuple[Timed, ...]) -> list[Seat]:
 
 
 def _after(now: Seat, timed: Timed) -> Seat:
+    """Returns the seat after an input of a person."""
     one, tick = timed.input, timed.tick
     outside, manual, method = now.outside, now.manual, now.method
     functions, lamps = now.functions, now.lamps
@@ -277,5 +280,6 @@ def report_of(log: RunLog, k: int) -> StackReport:
 
 
 def _command(series: Any, k: int) -> VehicleCommand:
+    """Returns the vehicle command at moment `k` of a series."""
     throttle, brake, steer, handbrake, reverse = (float(v[k]) for v in series)
     return VehicleCommand(throttle, brake, steer, bool(handbrake), bool(reverse))

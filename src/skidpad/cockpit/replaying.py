@@ -137,6 +137,7 @@ class Replayer:
         return feed.taken >= feed.last or self.clock() - self._shown_at > TAKES_WITHIN
 
     def _from(self, k: int) -> None:
+        """Goes on from moment `k`, at the present time."""
         self.k = self._base = k
         self._since = self.clock()
 
@@ -147,6 +148,7 @@ class Replayer:
         self._shown_k, self._shown_at = self.k, self.clock()
 
     def _shown(self) -> Shown:
+        """Returns what is outside at the present moment and what the page is told of it."""
         seat, link = self.source.seat(self.k), self.link
         beam = seat.outside.beam
         told = {

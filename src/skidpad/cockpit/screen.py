@@ -112,6 +112,7 @@ class Screen(Sink):
         return view not in self.link.hidden and (view not in MAIN or view is View.TOP)
 
     def _describe_moment(self, moment: Moment, shown: Shown) -> dict[str, Any]:
+        """Returns what the page is told of a moment: motion, stack, radar, marks, events and views."""
         frame, marks = moment.frame, {}
         ego = moment.truth.states.pose(0)
         for view in {self.link.main, View.TOP} & {*MARKED, View.TOP}:

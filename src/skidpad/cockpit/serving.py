@@ -46,6 +46,7 @@ def _serve(
     say: Callable[[str], None],
     browser: bool,
 ) -> None:
+    """Serves the page until the producer ends or Ctrl-C; opens a browser if wanted."""
     bridge = Bridge(producer, about.pauses)
     with Server(application(bridge, about), place) as server:  # first, as a port may be in use
         producer.start()

@@ -131,6 +131,7 @@ def opening_tick(source: Source) -> int:
 
 
 def _speed_before(source: Source, tick: int) -> float:
+    """Returns the ego's speed in m/s one moment before the tick."""
     k = max(index_at(source, tick) - 1, 0)
     return source.moment(k).frame.ego.speed
 

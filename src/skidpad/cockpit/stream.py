@@ -42,6 +42,7 @@ class Stream:
             self.bridge.leave(self.tab)
 
     async def _send(self) -> None:
+        """Sends the newest picture as soon as the last is taken, until the producer ends."""
         waited = unasked = 0.0
         while True:
             await self._tell_role()
@@ -63,15 +64,18 @@ class Stream:
             unasked += POLL
 
     async def _tell_role(self) -> None:
+        """Tells the tab whether it drives, where that has changed."""
         role = self.bridge.may(self.tab)
         if role is not self.role:
             self.role = role
             await self._tell(drives=role, tabs=len(self.bridge.tabs))
 
     async def _tell(self, **what: Any) -> None:
+        """Sends the named values to the tab as JSON."""
         await self.socket.send_text(json.dumps(what))
 
     async def _receive(self) -> None:
+        """Takes the tab's messages in as they come, those that cannot be read left out."""
         while True:
             message = await self.socket.receive_text()
             self.bridge.tabs.come(self.tab)  # whatever it says: it is awake
@@ -79,6 +83,7 @@ class Stream:
                 await self._take(json.loads(message))
 
     async def _take(self, message: dict[str, Any]) -> None:
+        """Takes in one message: a picture acknowledged, a sign of life, or a word to act on."""
         if "ack" in message:
             self.taken = int(message["ack"])
             return
@@ -89,6 +94,7 @@ class Stream:
             await self._tell(wrong=wrong)
 
     async def _check(self) -> None:
+        """Has the bridge check its tabs every CHECK s."""
         while True:
             await asyncio.sleep(CHECK)
             self.bridge.check()

@@ -109,6 +109,7 @@ def has_crashed(line: Line) -> bool:
 
 
 def _cell(name: str, good: list[bool]) -> Cell:
+    """Returns a cell's share of good runs with its 95 % interval."""
     interval = clopper_pearson(sum(good), len(good))
     return Cell(name, len(good), sum(good), float(interval.low), float(interval.high))
 

@@ -116,6 +116,7 @@ class Link:
         return heard
 
     def _take(self, word: Word) -> None:
+        """Takes over one word of the page into the state of the link."""
         match word:
             case Do():
                 self.inputs.append(word.input)

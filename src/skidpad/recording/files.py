@@ -49,6 +49,7 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 
 def _fill(path: Path, content: bytes) -> None:
+    """Writes the bytes to the file."""
     path.write_bytes(content)
 
 
@@ -65,6 +66,7 @@ def write_secret(path: Path, content: bytes) -> None:
 
 
 def _fill_secret(path: Path, content: bytes) -> None:
+    """Writes the bytes to a new file that its owner alone may read."""
     with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
         file.write(content)
 
@@ -153,6 +155,7 @@ def content_hash(tables: Iterable[pl.DataFrame], text: bytes = b"") -> str:
 
 
 def _update(digest: hashlib._Hash, column: pl.Series) -> None:
+    """Adds a column's values and gaps to the digest, so that nan and null count alike in floats."""
     if isinstance(column.dtype, pl.Array):
         column = column.reshape((-1,)) if len(column) else column
         values = column.to_numpy()

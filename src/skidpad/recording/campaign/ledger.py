@@ -94,6 +94,7 @@ class Ledger(Generic[E]):
             raise
 
     def _check(self, identity: dict[str, Any], resume: bool) -> None:
+        """Raises OutputError where the folder is not free for this campaign, to begin or to resume."""
         state = folder_state(self.folder, identity)
         if state is FolderState.OTHER:
             raise OutputError(
@@ -287,6 +288,7 @@ def encode_identity(identity: dict[str, Any]) -> bytes:
 
 
 def _lock(file: int, folder: Path) -> None:
+    """Locks the open file against other processes; raises OutputError where one holds it."""
     try:
         if os.name == "nt":
             import msvcrt

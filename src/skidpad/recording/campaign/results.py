@@ -111,10 +111,12 @@ class Columns(Generic[K, M]):
 
 
 def _defaults(kind: type[Any]) -> dict[str, Any]:
+    """Returns the default values of a dataclass by field, those without left out."""
     return {f.name: f.default for f in fields(kind) if f.default is not MISSING}
 
 
 def _plain(kind: type[Any], row: Any) -> dict[str, Any]:
+    """Returns a row's values by the fields of `kind`; empty for None."""
     return {} if row is None else {f.name: getattr(row, f.name) for f in fields(kind)}
 
 

@@ -131,6 +131,7 @@ def padded_polygons(shapes: Iterable[Floats]) -> tuple[NDArray[np.int64], Floats
 
 
 def _flatten_polygons(polygons: Floats, size: NDArray[np.int64]) -> list[float]:
+    """Returns the used vertices of all polygons as one flat list x, y, ..."""
     used = np.arange(polygons.shape[1]) < size[:, None]
     flat: list[float] = polygons[used].ravel().tolist()
     return flat
@@ -139,6 +140,7 @@ def _flatten_polygons(polygons: Floats, size: NDArray[np.int64]) -> list[float]:
 def _split_polygons(
     size_field: Iterable[int], polygon_field: Iterable[float], n: int
 ) -> tuple[NDArray[np.int64], Floats]:
+    """Returns sizes (n,) and polygons (n, k, 2), nan beyond their size; raises FileError if wrong."""
     size = np.fromiter(size_field, np.int64)
     flat = _floats(polygon_field)
     if size.size != n or flat.size != 2 * int(size.sum()):
@@ -152,21 +154,25 @@ def _split_polygons(
 
 
 def _floats(values: Iterable[float]) -> Floats:
+    """Returns the values as an array of floats."""
     return np.fromiter(values, np.float64)
 
 
 def _rows(field: str, length: int, width: int) -> int:
+    """Returns how many rows of `width` numbers there are; raises FileError for a rest."""
     if length % width:
         raise FileError(f"{field}: {length} numbers are not rows of {width}")
     return length // width
 
 
 def _table(field: str, values: Iterable[float], width: int) -> Floats:
+    """Returns (n, width) the flat values as rows; raises FileError where they do not fill them."""
     flat = _floats(values)
     return flat.reshape(_rows(field, flat.size, width), width)
 
 
 def _ego(values: Iterable[float]) -> Floats:
+    """Returns (5,) the ego's state; raises FileError for another number of values."""
     ego = _floats(values)
     if ego.size != 5:
         raise FileError(f"ego: {ego.size} numbers, expected 5")
@@ -174,6 +180,7 @@ def _ego(values: Iterable[float]) -> Floats:
 
 
 def _labels(field: str, values: Iterable[int], n: int) -> NDArray[np.int64]:
+    """Returns (n,) the labels, -1 each where none are given; raises FileError for another number."""
     labels = np.fromiter(values, np.int64)
     if labels.size == 0:
         return np.full(n, -1, dtype=np.int64)

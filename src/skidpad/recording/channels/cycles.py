@@ -58,6 +58,7 @@ class _Clock:
 
     @staticmethod
     def _is_confirmed(state: _Newest, message: Message) -> bool:
+        """Returns True when the message comes at most MAX_GAP s after the doubtful one."""
         return state.doubtful is not None and 0.0 <= message.t - state.doubtful.t <= MAX_GAP
 
 
@@ -114,6 +115,7 @@ class _State:
         self.truth: TruthFrame | None = None
 
     def take(self, message: Message) -> None:
+        """Keeps the message as the newest frame, truth or decision."""
         item = message.item
         if isinstance(item, ChannelFrame) and message.channel is not None:
             self.frames[message.channel] = item
@@ -123,6 +125,7 @@ class _State:
             self.driving = self.channels.index(item.driving)
 
     def cycle(self, k: int, t: float) -> Cycle:
+        """Returns cycle `k` at `t` s; frames and truth older than MAX_AGE are None."""
         fresh = []
         for name, frame in zip(self.channels, self.frames, strict=True):
             if frame is not None and t - frame.t > MAX_AGE + SAME_TIME:

@@ -85,6 +85,7 @@ def read_indicators(folder: Path) -> pl.DataFrame:
 
 
 def _threshold_in(column: Column, upper: bool) -> float:
+    """Returns the column's threshold on that side, an infinite one where it has none."""
     if column.threshold is None or column.upper is not upper:
         return np.inf if upper else -np.inf
     return column.threshold
@@ -93,5 +94,6 @@ def _threshold_in(column: Column, upper: bool) -> float:
 def _repeat_values(
     values: Sequence[str | float | None], n: int, dtype: pl.DataType | None = None
 ) -> pl.Series:
+    """Returns the values in their order, repeated n times."""
     base = pl.Series(list(values), dtype=dtype or pl.String())
     return base.gather(np.tile(np.arange(len(values), dtype=np.uint32), n))

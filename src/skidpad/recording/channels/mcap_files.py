@@ -117,12 +117,14 @@ class ChannelWriter:
         self._flushed_at = -float("inf")
 
     def _schema(self, message: str) -> int:
+        """Registers the schema of a message and returns its id."""
         descriptors = pb.DESCRIPTOR.serialized_pb
         # a FileDescriptorSet with one file: field 1, length-delimited
         data = b"\x0a" + _varint(len(descriptors)) + descriptors
         return int(self._writer.register_schema(f"skidpad.{message}", "protobuf", data))
 
     def _topic(self, topic: str, schema: int) -> int:
+        """Registers a topic with its schema's id and returns the id of the topic."""
         return int(self._writer.register_channel(topic, "protobuf", schema))
 
     def add(self, item: Item, channel: int | None = None) -> None:
@@ -154,6 +156,7 @@ class ChannelWriter:
         self._add(self._context, context.t, codec.message_from_context(context))
 
     def _add(self, topic: int, t: float, message: Any) -> None:
+        """Writes a message at `t` s; raises ConfigError for a time outside [0, 1.8e10) s."""
         if not 0.0 <= t < 1.8e10:  # MCAP stores unsigned nanoseconds
             raise ConfigError(f"time of a channel message must be in [0, 1.8e10) s, got {t!r}")
         stamp = round(t * NS)
@@ -218,6 +221,7 @@ class McapRecording:
             yield Message(channel, item.t, item)
 
     def _item(self, schema: str, data: bytes) -> Item | None:
+        """Returns the item in a message's bytes; None, counted as a loss, if foreign or malformed."""
         reader = _READERS.get(schema)
         if reader is None:
             self.losses.foreign += 1
@@ -229,6 +233,7 @@ class McapRecording:
             return None
 
     def _scan(self) -> tuple[TopicInfo, ...]:
+        """Returns each topic with its schema, count, first and last time in s; reads the whole file."""
         seen: dict[str, tuple[str, int, float, float]] = {}
         for topic, schema, record in self._records(self.losses):
             t = record.log_time / NS
@@ -242,6 +247,7 @@ class McapRecording:
         return sorted(topics, key=lambda topic: (rank.get(topic, len(rank)), topic))
 
     def _records(self, losses: Losses) -> Iterator[tuple[str, str, mcap.records.Message]]:
+        """Yields topic, schema and message of each record; counts in `losses` what cannot be read."""
         self._declared: list[str] = []
         schemas: dict[int, str] = {}
         channels: dict[int, tuple[str, str]] = {}
@@ -260,6 +266,7 @@ class McapRecording:
                     yield (*channels[inner.channel_id], inner)
 
     def _top_level(self, losses: Losses) -> Iterator[Any]:
+        """Yields the records of the file, chunks whole; a damaged rest counts as cut."""
         try:
             stream = self.path.open("rb")
         except OSError as error:
@@ -295,6 +302,7 @@ def _open_chunk(record: Any, losses: Losses) -> Sequence[Any]:
 
 
 def _names(text: str) -> list[str]:
+    """Returns the names in a JSON list; empty for anything else."""
     try:
         names = json.loads(text)
     except ValueError:
@@ -303,6 +311,7 @@ def _names(text: str) -> list[str]:
 
 
 def _varint(value: int) -> bytes:
+    """Returns a number as a protobuf varint."""
     out = bytearray()
     while value > 0x7F:
         out.append(value & 0x7F | 0x80)

@@ -40,6 +40,7 @@ def write_lamps_of(moving: Any, log: RunLog, k: int, i: int, changes: Sequence[L
 
 
 def _write_switched(state: Any, found: Mapping[Lamp, LampChange], t: float) -> None:
+    """Writes the lamps that a file switches at `t` s into an OSI vehicle's light state."""
     for lamp, change in found.items():
         lit = change.is_lit(t)
         for field in GENERIC.get(lamp, ()):
@@ -55,10 +56,12 @@ def _write_switched(state: Any, found: Mapping[Lamp, LampChange], t: float) -> N
 
 
 def _generic(state: Any, lit: bool) -> Any:
+    """Returns OSI's value of a lamp that is on or off."""
     word = "ON" if lit else "OFF"
     return state.GenericLightState.Value(f"GENERIC_LIGHT_STATE_{word}")
 
 
 def _brake(state: Any, lit: bool) -> Any:
+    """Returns OSI's value of brake lamps that are on or off."""
     word = "NORMAL" if lit else "OFF"
     return state.BrakeLightState.Value(f"BRAKE_LIGHT_STATE_{word}")

@@ -151,6 +151,7 @@ class _Assembler:
         )
 
     def _plan(self, t: float, ego: Floats) -> Floats:
+        """Returns the plan at `t` s in the world, times from now; empty where it is old or absent."""
         if self.topics.plan is None or self.plan is None or t - self.plan[0] > PLAN_FRESH:
             return np.zeros((0, 3))
         stamp, plan = self.plan
@@ -206,6 +207,7 @@ class RosRecording:
                 raise FileError(f"{path}: {topics.ego.topic} must be of type {ODOMETRY}")
 
     def _reader(self) -> Any:
+        """Returns the open bag; raises MissingExtra, ConfigError or FileError where that fails."""
         try:
             from rosbags.highlevel import AnyReader, AnyReaderError
             from rosbags.typesys import Stores, get_typestore
@@ -265,6 +267,7 @@ class _Opened:
 
 
 def _roles(mapping: Mapping) -> dict[str, list[tuple[int, str]]]:
+    """Returns channel index and role of each part, by topic."""
     roles: dict[str, list[tuple[int, str]]] = {}
     for c, topics in enumerate(mapping.channels.values()):
         for role in ("objects", "plan", "ego"):
@@ -313,6 +316,7 @@ def _plan(content: Any, topic: PlanTopic) -> Floats:
 
 
 def _objects(content: Any, kind: str) -> RosObjects:
+    """Returns the objects of a message; raises FileError for a kind that is not read."""
     reader = OBJECT_READERS.get(kind)
     if reader is None:
         raise FileError(f"objects of type {kind} are not read; {', '.join(OBJECT_READERS)} are")

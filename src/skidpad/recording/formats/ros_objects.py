@@ -64,6 +64,7 @@ def empty_objects() -> RosObjects:
 
 
 def _table(rows: list[_Row]) -> RosObjects:
+    """Returns rows of objects as arrays, predictions resampled to the first one's time step."""
     n = len(rows)
     size, polygons = padded_polygons(row.shape for row in rows)
     steps = [row.step for row in rows if len(row.path) and row.step > 0.0]
@@ -94,6 +95,7 @@ def yaw_of(q: Any) -> float:
 
 
 def _box(length: float, width: float) -> Floats:
+    """Returns (4, 2) the corners of a box in m around its centre."""
     corners = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
     return corners * (length / 2.0, width / 2.0)
 

@@ -145,6 +145,7 @@ def decode_record(text: str) -> HazardRecord:
 
 
 def _record(row: dict[str, Any]) -> HazardRecord:
+    """Returns the record of a decoded row; raises an error where a field does not fit."""
     objects = tuple(
         InvolvedObject(str(o["channel"]), _optional_int(o["id"]), float(o["x"]), float(o["y"]))
         for o in row["objects"]
@@ -169,6 +170,7 @@ def _record(row: dict[str, Any]) -> HazardRecord:
 
 
 def _time(row: dict[str, Any], name: str) -> float:
+    """Returns a time in s of a row; raises FileError outside [0, LATEST]."""
     t = float(row[name])
     if not 0.0 <= t <= LATEST:
         raise FileError(f"{name} must be between 0 and {LATEST:g} s, got {t:g}")
@@ -179,6 +181,7 @@ _FIELDS = tuple(HazardRecord.__dataclass_fields__)
 
 
 def _optional_int(value: Any) -> int | None:
+    """Returns the value as an int; None stays None."""
     return None if value is None else int(value)
 
 
@@ -206,6 +209,7 @@ def read_hazards(folder: Path) -> Iterator[HazardRecord]:
 
 
 def _records(stream: Iterator[str]) -> Iterator[HazardRecord]:
+    """Yields the records of a text; raises FileError for a wrong first line or one too long."""
     if next(stream, "").rstrip("\n") != HEADER:
         raise FileError(f"its first line must be {HEADER!r}")
     lines: list[str] = []

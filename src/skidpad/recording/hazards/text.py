@@ -74,6 +74,7 @@ def encode_worlds(worlds: Sequence[Cycle], n_channels: int) -> list[str]:
 
 
 def _encode_frame(c: int, channel: Channel, frame: ChannelFrame, now: int) -> list[str]:
+    """Returns the lines of a channel's frame at `now` ms, and updates the channel's state."""
     lines = []
     shape = _flat(frame.ego_polygon, 100)
     if _has_moved(shape, channel.ego_shape):
@@ -95,6 +96,7 @@ def _encode_frame(c: int, channel: Channel, frame: ChannelFrame, now: int) -> li
 def _encode_objects(
     c: int, channel: Channel, frame: ChannelFrame, slots: list[int], dt: int
 ) -> list[str]:
+    """Returns the lines of a frame's objects; `dt` ms have gone since the channel's last."""
     lines = []
     row: Numbers = []
     poses, shapes = _poses(frame.objects), _shapes(frame)
@@ -119,6 +121,7 @@ def _encode_objects(
 
 
 def _encode_paths(c: int, channel: Channel, frame: ChannelFrame, slots: list[int]) -> list[str]:
+    """Returns the lines of plan and predictions; a straight rest of a prediction is left out."""
     plan: Numbers = []
     t = _curvature(_flat(frame.plan[:, 2], 1000))
     x = _curvature(_flat(frame.plan[:, 0], 100))
@@ -165,6 +168,7 @@ def _assign_slots(channel: Channel, frame: ChannelFrame) -> list[int]:
 
 
 def _nearest_slot(free: dict[int, Object], pose: Pose) -> int | None:
+    """Returns the free slot nearest to the pose, within 3 m and without an id; None if none."""
     best, best_square = None, 300**2
     x, y = pose[0], pose[1]
     if x is None or y is None:
@@ -179,6 +183,7 @@ def _nearest_slot(free: dict[int, Object], pose: Pose) -> int | None:
 
 
 def _scale_to_integer(value: float, scale: int) -> int | None:
+    """Returns the value times the scale, rounded; None where it is nan or too large."""
     number = value * scale
     return round(number) if abs(number) < NUMBER_LIMIT else None  # also NaN
 
@@ -208,6 +213,7 @@ def _shapes(frame: ChannelFrame) -> list[Numbers]:
 
 
 def _has_moved(shape: Numbers, known: Numbers) -> bool:
+    """Returns True when a shape differs from the known one by more than SHAPE_TOLERANCE."""
     if shape == known:
         return False
     if len(shape) != len(known):
@@ -225,6 +231,7 @@ def moved_on(pose: Pose, dt_ms: int) -> Pose:
 
 
 def _differences(values: Numbers, base: Numbers) -> Numbers:
+    """Returns the values less the base, None where a value is absent."""
     return [None if v is None else v - (b or 0) for v, b in zip(values, base, strict=True)]
 
 
@@ -243,4 +250,5 @@ def _curvature(values: Numbers, before: int | None = None) -> Numbers:
 
 
 def _line(kind: str, c: int, numbers: Numbers) -> str:
+    """Returns a line of text: kind, channel and numbers, "~" for None."""
     return " ".join([kind, str(c), *("~" if v is None else str(v) for v in numbers)])

@@ -53,6 +53,7 @@ class _Decoder:
         self.drafts: dict[int, _Draft] = {}
 
     def line(self, line: str) -> None:
+        """Takes in one line; raises FileError where it does not fit."""
         kind, *tokens = line.split(" ")
         numbers = [_number(token) for token in tokens if token]
         if kind == "W":
@@ -70,6 +71,7 @@ class _Decoder:
         self._channel_line(kind, c, numbers)
 
     def _channel_line(self, kind: str, c: int, numbers: Numbers) -> None:
+        """Takes in the numbers of one kind of line of channel `c`."""
         channel = self.channels[c]
         if kind == "E":
             channel.ego_shape = _even(numbers)
@@ -89,6 +91,7 @@ class _Decoder:
             raise FileError(f"unknown kind {kind[:20]!r}")
 
     def _ego(self, c: int, channel: Channel, numbers: Numbers) -> None:
+        """Moves the channel's ego on and begins its draft of this cycle."""
         age, *pose = numbers
         if len(pose) != 5 or self.now is None:
             raise FileError("an ego has an age and five numbers")
@@ -98,12 +101,14 @@ class _Decoder:
         self.drafts[c] = _Draft(self.now - _whole(age), channel.ego)
 
     def _object(self, channel: Channel, numbers: Numbers) -> None:
+        """Keeps shape, id and label of the object in a slot."""
         slot, id_, label = (_whole(v) for v in numbers[:3])
         known = channel.slots.get(slot)
         pose: Pose = known.pose if known else [0] * 5
         channel.slots[slot] = Object(id_, label, _even(numbers[3:]), pose)
 
     def _objects(self, c: int, channel: Channel, numbers: Numbers) -> None:
+        """Moves the listed objects on and adds them to the channel's draft."""
         if len(numbers) % 6:
             raise FileError("objects have six numbers each")
         draft = self.drafts[c]
@@ -114,6 +119,7 @@ class _Decoder:
             draft.slots.append(slot)
 
     def _plan(self, c: int, numbers: Numbers) -> None:
+        """Keeps the plan of the channel's draft, (n, 3) x, y in m and time in s."""
         if len(numbers) % 3:
             raise FileError("a plan has three numbers per point")
         t, x, y = (_sum_differences(numbers[k::3]) for k in range(3))
@@ -122,6 +128,7 @@ class _Decoder:
         ).reshape(-1, 3)
 
     def _prediction(self, c: int, channel: Channel, numbers: Numbers) -> None:
+        """Keeps the prediction of a slot, (p, 2) in m, missing points straight on."""
         slot, p = _whole(numbers[0]), len(channel.times)
         path = numbers[1:]
         if len(path) > 2 * p or len(path) % 2:
@@ -136,6 +143,7 @@ class _Decoder:
         )
 
     def _end_cycle(self) -> None:
+        """Ends the cycle begun before, if any, with the frames drafted."""
         if self.now is None:
             return
         frames = tuple(
@@ -146,6 +154,7 @@ class _Decoder:
         self.drafts = {}
 
     def _frame(self, channel: Channel, draft: _Draft) -> ChannelFrame:
+        """Returns the channel's frame from its draft, in m, s and rad."""
         known = [channel.slots[slot] for slot in draft.slots]
         size, polygons = padded_polygons(_metric(o.shape, 100).reshape(-1, 2) for o in known)
         times = _metric(channel.times, 1000) if draft.predictions else np.zeros(0)
@@ -174,6 +183,7 @@ class _Decoder:
 
 
 def _sums(values: Numbers, base: Numbers) -> Numbers:
+    """Returns the values plus the base, None where a value is absent."""
     return [None if v is None else v + (b or 0) for v, b in zip(values, base, strict=True)]
 
 
@@ -195,6 +205,7 @@ def _sum_differences(values: Numbers, before: int | None = None) -> Numbers:
 
 
 def _number(token: str) -> int | None:
+    """Returns the token's integer, None for "~", which stands for an absent number."""
     if token == "~":
         return None
     if len(token) > 20:
@@ -206,22 +217,26 @@ def _number(token: str) -> int | None:
 
 
 def _whole(value: int | None) -> int:
+    """Returns the number; raises FileError where it is absent."""
     if value is None:
         raise FileError("a count or time is missing")
     return value
 
 
 def _even(numbers: Numbers) -> Numbers:
+    """Returns the numbers of a shape; raises FileError unless they are at most 64 pairs."""
     if len(numbers) % 2 or len(numbers) > 128:
         raise FileError("a shape has at most 64 vertices of x and y")
     return numbers
 
 
 def _metric(numbers: Numbers, scale: int) -> Floats:
+    """Returns the numbers divided by the scale, nan where absent."""
     return np.array([np.nan if v is None else v / scale for v in numbers], dtype=np.float64)
 
 
 def _state(pose: Pose) -> Floats:
+    """Returns (5,) x, y in m, heading in rad and velocity in m/s, nan where absent."""
     x, y, heading, vx, vy = pose
     scaled = _metric([x, y, vx, vy], 100)
     angle = np.nan if heading is None else heading / 1000

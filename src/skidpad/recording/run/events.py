@@ -121,5 +121,6 @@ def decode_events(text: bytes, name: str = "events.jsonl") -> tuple[Event, ...]:
 
 
 def _plain(event: Event) -> dict[str, Any]:
+    """Returns an event's fields by name."""
     assert is_dataclass(event)
     return asdict(event)

@@ -94,6 +94,7 @@ def read_lamps(folder: Path) -> tuple[LampChange, ...]:
 
 
 def _change(row: Mapping[str, str]) -> LampChange:
+    """Returns the change of a lamp in a row of CSV; raises ValueError where it does not fit."""
     on, off = float(row["on"]), float(row["off"])
     if not on + off > 0.0:
         raise ValueError(f"on and off must be positive, got {on:g} and {off:g}")

@@ -75,11 +75,13 @@ def tick_table(log: RunLog) -> pl.DataFrame:
 
 
 def _make_series(name: str, values: NDArray[np.float64]) -> pl.Series:
+    """Returns a column of a tick table with the type that its name has, nan as null."""
     column = pl.Series(name, np.ascontiguousarray(values), nan_to_null=True)
     return pl.Series(name, column.cast(_kind(name)))
 
 
 def _kind(name: str) -> type[pl.Boolean | pl.Int32 | pl.Float64]:
+    """Returns the type of a tick table's column of this name."""
     return pl.Boolean if name in BOOLEANS else pl.Int32 if name in INTEGERS else pl.Float64
 
 
@@ -93,6 +95,7 @@ def log_hash(log: RunLog) -> str:
 
 
 def _hash(log: RunLog, table: pl.DataFrame) -> str:
+    """Returns the content hash of a log: its ticks, drive and events."""
     head = _describe_log(log)
     header = head.pop("header")
     drive = {**head, "weathers": len(log.weathers), "map": header.map_hash, "dt": header.dt}
@@ -157,6 +160,7 @@ def read_log(folder: Path) -> RunLog:
 
 
 def _log(table: pl.DataFrame, head: _Kept, events: tuple[Event, ...]) -> RunLog:
+    """Returns the log of a tick table, its head and its events; raises ValueError if wrong."""
     actors = _table_from(head.actors)
     n = len(actors)
     return RunLog(
@@ -180,6 +184,7 @@ def _log(table: pl.DataFrame, head: _Kept, events: tuple[Event, ...]) -> RunLog:
 def _whole(
     table: pl.DataFrame, name: str, kind: type[pl.Int64 | pl.UInt8] = pl.UInt8
 ) -> NDArray[np.int64]:
+    """Returns (n,) a column of whole numbers; raises ValueError for another type or gaps."""
     if table.schema.get(name) != kind or table[name].null_count():
         raise ValueError(f"column {name} must hold whole numbers ({kind}) and none absent")
     values: NDArray[np.int64] = table[name].cast(pl.Int64).to_numpy()
@@ -189,6 +194,7 @@ def _whole(
 def _matrix(
     table: pl.DataFrame, name: str, width: int, kind: type[pl.Float32 | pl.UInt8]
 ) -> NDArray[Any]:
+    """Returns (n, width) a column of arrays; raises ValueError for another type."""
     if table.schema.get(name) != pl.Array(kind, width):
         raise ValueError(f"column {name} must hold {width} numbers ({kind}) per tick")
     values: NDArray[Any] = table[name].to_numpy()
@@ -196,6 +202,7 @@ def _matrix(
 
 
 def _series(table: pl.DataFrame, prefix: str, kind: type[S]) -> S:
+    """Returns the columns with the prefix as a series, nulls as nan; raises ValueError if wrong."""
     names = [prefix + name for name in kind._fields]
     for name in names:
         if (found := table.schema.get(name)) != _kind(name):
@@ -205,6 +212,7 @@ def _series(table: pl.DataFrame, prefix: str, kind: type[S]) -> S:
 
 
 def _describe_log(log: RunLog) -> dict[str, Any]:
+    """Returns the head of a log as plain data: schema, header, weathers and actors."""
     t = log.table
     return {
         "schema": SCHEMA_VERSION,
@@ -223,6 +231,7 @@ def _describe_log(log: RunLog) -> dict[str, Any]:
 
 
 def _table_from(head: _Actors) -> ActorTable:
+    """Returns the table of actors of a head; raises ValueError for columns of unlike length."""
     if len({len(getattr(head, name)) for name in head.__struct_fields__}) != 1:
         raise ValueError("the columns of actors differ in length")
     return ActorTable(

@@ -119,4 +119,5 @@ def summarise_readings(readings: SensorReadings) -> list[ReadingSummary]:
 
 
 def _number(value: object) -> float | None:
+    """Returns a number as a float; None for anything else."""
     return float(value) if isinstance(value, (int, float)) else None

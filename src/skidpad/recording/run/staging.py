@@ -59,6 +59,7 @@ def read_staging(folder: Path) -> Staging | None:
 
 
 def _read(path: Path, kind: type[S]) -> S | None:
+    """Return the decoded file; None where it is absent; raises FileError where it is damaged."""
     if not path.is_file():
         return None
     try:

@@ -154,12 +154,14 @@ class TickLog:
         )
 
     def _note_lights(self, truth: WorldTruth) -> None:
+        """Keeps a light change for each signal whose state differs from the tick before."""
         for signal, state in truth.lights.items():
             if self._lights.get(signal) != state:
                 self._events.append(LightChange(truth.tick, signal, state))
         self._lights = dict(truth.lights)
 
     def _grow(self) -> None:
+        """Makes the arrays longer, by at least 64 ticks."""
         more = max(64, (GROWTH - 1) * len(self._tick))
         self._tick = np.concatenate([self._tick, np.zeros((more, 3), np.int64)])
         self._row = np.concatenate([self._row, np.full((more, N_ROW), np.nan)])

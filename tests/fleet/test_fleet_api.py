@@ -150,6 +150,9 @@ def test_a_scenario_is_made_when_a_stakeholder_asks_in_their_own_fleet(lite):
     root = etree.fromstring(archive.read(scenario))
     assert root.find(".//LogicFile").get("filepath") == road
     assert len(root.findall(".//ScenarioObject")) == 4  # two egos, one object in each world
+    assert all(one.compress_size < one.file_size for one in archive.infolist())
+    again = lite.post("axle", f"/api/v1/hazards/{hazard}/scenario")
+    assert again.content == answer.content  # whenever it is asked for
 
 
 def test_bombs_are_not_unpacked():

@@ -77,8 +77,10 @@ def export_scenario(fleet: Fleet, who: Principal, hazard: str) -> bytes:
 
 
 def _zip_files(files: tuple[Path, Path]) -> bytes:
+    """Return a .zip of the files under their names, compressed and with one fixed date."""
     buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(buffer, "w") as archive:
         for file in files:
-            archive.writestr(zipfile.ZipInfo(file.name), file.read_bytes())
+            entry = zipfile.ZipInfo(file.name)  # with the date of 1980, whenever it is made
+            archive.writestr(entry, file.read_bytes(), zipfile.ZIP_DEFLATED)
     return buffer.getvalue()

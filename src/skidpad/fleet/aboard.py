@@ -131,6 +131,7 @@ class Aboard:
             self._judge(one)
 
     def _judge(self, one: Sent) -> None:
+        """Takes an order by its signature, counts it if obeyed, and queues the word of that for the fleet."""
         verdict = self.receiver.receive(one.order, one.signature)
         what = json.loads(one.order) if verdict in TOLD else {}
         self.say(f"an order{' to ' + what['what'] if what else ''}: {verdict.value}")

@@ -114,6 +114,7 @@ def hazards_of(content: bytes, limits: Limits) -> list[Found]:
 
 
 def _records(content: bytes, start: int, limits: Limits) -> Iterator[Found]:
+    """Yields the records of a batch from byte `start`; refuses one without end, too long or too many."""
     number = 0
     while start < len(content):
         end = content.find(END, start)
@@ -130,6 +131,7 @@ def _records(content: bytes, start: int, limits: Limits) -> Iterator[Found]:
 
 
 def _record(text: bytes, start: int, number: int) -> Found:
+    """Returns the record in `text`, the batch's `number`th, at byte `start`; refuses a wrong head."""
     line = text[: text.find(b"\n")]
     if not line.startswith(b"H "):
         raise Refused(422, f"record {number} does not begin with a head")
@@ -145,6 +147,7 @@ def _record(text: bytes, start: int, number: int) -> Found:
 
 
 def _check(head: Head, number: int) -> None:
+    """Refuses a head with numbers or words beyond the limits."""
     numbers = [head.t_start, head.t_end, head.t_worst, *head.extremes.values()]
     numbers += [v for o in head.objects for v in (o.x, o.y)]
     if not all(abs(v) <= NUMBER_MAX for v in numbers):
@@ -214,6 +217,7 @@ def weather_class(words: dict[str, str]) -> str:
 
 
 def _light(words: dict[str, str]) -> str:
+    """Returns the class of light of a drive's context: by the sun's altitude, or unknown."""
     sun = _number(words, "sun_altitude_deg")
     if sun is None:
         return "light unknown"
@@ -221,6 +225,7 @@ def _light(words: dict[str, str]) -> str:
 
 
 def _wet(words: dict[str, str]) -> str:
+    """Returns the class of rain of a drive's context: by its precipitation, or unknown."""
     rain = _number(words, "precipitation")
     if rain is None:
         return "rain unknown"
@@ -228,6 +233,7 @@ def _wet(words: dict[str, str]) -> str:
 
 
 def _number(words: dict[str, Any], name: str) -> float | None:
+    """Returns the number under a name; None where it is absent, no number or not finite."""
     try:
         value = float(words[name])
     except (KeyError, ValueError):

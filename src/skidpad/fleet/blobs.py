@@ -49,6 +49,7 @@ class Blobs:
         return self._read(name, start, start + size)
 
     def _read(self, name: str, start: int | None, end: int | None) -> bytes:
+        """Returns the blob's bytes from `start` to `end`; None: to its own begin or end."""
         try:
             content: Any = self._fs.cat_file(self._path(name), start=start, end=end)
         except FileNotFoundError as error:
@@ -56,6 +57,7 @@ class Blobs:
         return bytes(content)
 
     def _path(self, name: str) -> str:
+        """Returns where a blob is stored; raises FileError unless its name has 64 hexadecimal digits."""
         if len(name) != 64 or not DIGITS.issuperset(name):
             raise FileError("a blob's name is 64 hexadecimal digits")
         return f"{self._root}/{name[:2]}/{name}"

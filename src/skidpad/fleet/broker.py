@@ -72,6 +72,7 @@ def properties(**values: Any) -> Any:
 
 
 def _properties(packet: str, **values: Any) -> Any:
+    """Returns MQTT 5 properties for a type of packet, such as "CONNECT", with these values."""
     from paho.mqtt.packettypes import PacketTypes
     from paho.mqtt.properties import Properties
 

@@ -42,10 +42,12 @@ def make_certificates(folder: Path, hosts: Sequence[str]) -> list[Path]:
 
 
 def _name(common: str) -> x509.Name:
+    """Returns an X.509 name with this common name alone."""
     return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common)])
 
 
 def _host(host: str) -> x509.GeneralName:
+    """Returns a host as an IP address where it is one, else as a DNS name."""
     try:
         return x509.IPAddress(ipaddress.ip_address(host))
     except ValueError:
@@ -53,6 +55,7 @@ def _host(host: str) -> x509.GeneralName:
 
 
 def _usage(signs: bool) -> x509.KeyUsage:
+    """Returns the key usage of a certificate that signs others, or of one that does not."""
     return x509.KeyUsage(
         digital_signature=not signs, content_commitment=False, key_encipherment=False,
         data_encipherment=False, key_agreement=False, key_cert_sign=signs, crl_sign=signs,
@@ -63,6 +66,7 @@ def _usage(signs: bool) -> x509.KeyUsage:
 def _builder(
     subject: x509.Name, issuer: x509.Name, key: ec.EllipticCurvePrivateKey
 ) -> x509.CertificateBuilder:
+    """Returns a certificate begun with subject, issuer, public key, number and validity."""
     now = datetime.now(timezone.utc)
     return (
         x509.CertificateBuilder()
@@ -77,14 +81,17 @@ def _builder(
 
 
 def _sign(builder: x509.CertificateBuilder, key: ec.EllipticCurvePrivateKey) -> x509.Certificate:
+    """Returns the certificate signed by the key with SHA-256."""
     return builder.sign(key, hashes.SHA256())
 
 
 def _pem(certificate: x509.Certificate) -> bytes:
+    """Returns the certificate as PEM."""
     return certificate.public_bytes(serialization.Encoding.PEM)
 
 
 def _secret(key: ec.EllipticCurvePrivateKey) -> bytes:
+    """Returns the private key as PEM, not encrypted."""
     return key.private_bytes(
         serialization.Encoding.PEM,
         serialization.PrivateFormat.PKCS8,

@@ -83,6 +83,7 @@ def hazard_batches(folder: Path) -> Iterator[bytes]:
 
 
 def _join_batch(batch: list[bytes]) -> bytes:
+    """Returns the bytes of a batch: the header line, then the records."""
     return HEADER.encode() + b"\n" + b"".join(batch)
 
 

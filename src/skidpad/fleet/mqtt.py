@@ -57,6 +57,7 @@ class BatchListener:
         self._loop.close()
 
     def _run(self) -> None:
+        """Runs the listener's loop until it is cancelled; runs in a thread."""
         assert self._main is not None
         try:
             self._loop.run_until_complete(self._main)
@@ -64,6 +65,7 @@ class BatchListener:
             return
 
     async def _listen(self) -> None:
+        """Connects to the broker and answers its batches; after a failure tries again in AGAIN_S s."""
         failures = (library().MqttError, OSError, TimeoutError)
         while True:
             try:
@@ -79,6 +81,7 @@ class BatchListener:
             await asyncio.sleep(AGAIN_S)
 
     async def _serve(self, client: Any) -> None:
+        """Answers each message in a task of its own, at most AT_ONCE at the same time."""
         free, tasks = asyncio.Semaphore(AT_ONCE), set()
         async for message in client.messages:
             await free.acquire()
@@ -88,6 +91,7 @@ class BatchListener:
             task.add_done_callback(lambda _: free.release())
 
     async def _answer(self, client: Any, message: Any) -> None:
+        """Takes a message's batch and publishes the answer; none where its response topic is not allowed."""
         where = str(getattr(message.properties, "ResponseTopic", ""))
         status, content = await self._take_message(message)
         if not re.fullmatch(ANSWER, where):  # else anybody could have the fleet publish anywhere

@@ -35,6 +35,7 @@ class Rounds:
             self._thread.join()
 
     def _run(self) -> None:
+        """Does the work every `pause_s` s or when woken until ended; logs a round that fails."""
         while not self.ended.is_set():
             try:
                 self.work()

@@ -100,6 +100,7 @@ class Spool:
 
 
 def _read(path: Path) -> Waiting:
+    """Returns the batch that waits in a file; raises FileError where it is none."""
     content = path.read_bytes()
     line, _, body = content.partition(b"\n")
     try:

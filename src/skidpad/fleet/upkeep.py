@@ -65,6 +65,7 @@ class Upkeep:
             ]
 
     def _due(self, who: Principal) -> bool:
+        """Returns True when new hazards came since the last analysis and that is REST_S s ago."""
         with self.fleet.engine.connect() as connection:
             last = connection.execute(
                 select(analyses.c.at).where(own(who)).order_by(analyses.c.at.desc()).limit(1)

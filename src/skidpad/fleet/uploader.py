@@ -76,6 +76,7 @@ def mqtt_poster(
 async def _through(
     broker: Broker, batch: Waiting, told: dict[str, str], timeout_s: float
 ) -> dict[str, Any]:
+    """Sends a batch over MQTT and returns the fleet's answer, awaited for `timeout_s` s."""
     where = f"{ANSWERS}/{new_id()}"
     async with connect_to(broker, timeout_s) as client:
         await client.subscribe(where, qos=1)
@@ -141,6 +142,7 @@ def rounds(
 
 
 def _detail(answer: httpx.Response) -> Any:
+    """Returns why a request was refused: the answer's detail, or its status."""
     try:
         return answer.json()["detail"]
     except (ValueError, KeyError, TypeError):

@@ -84,6 +84,7 @@ class Warehouse:
 
     @property
     def _database(self) -> duckdb.DuckDBPyConnection:
+        """Returns the connection to the warehouse's file, opened on first use."""
         if self._opened is None:
             try:
                 opened = duckdb.connect(str(self.path))

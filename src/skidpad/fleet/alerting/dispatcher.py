@@ -81,6 +81,7 @@ class Dispatcher:
                 self._send(alert, relay)
 
     def _send(self, alert: Alert, relay: Relay) -> None:
+        """Sends an alert by one relay and adds an event of whether it was relayed or failed, and why."""
         what, reason = What.RELAYED, ""
         try:
             relay.send(alert.plain())

@@ -168,6 +168,7 @@ def alerts_since(connection: Connection, at: float) -> list[Alert]:
 
 
 def _with_events(connection: Connection, rows: Any) -> list[Alert]:
+    """Returns an alert with all its events per row, asked for in chunks of 500 ids."""
     found: dict[str, list[Event]] = {row.id: [] for row in rows}
     ids = list(found)
     for first in range(0, len(ids), 500):

@@ -66,6 +66,7 @@ class Signer:
 
 
 def _write_secret(path: Path, key: Ed25519PrivateKey) -> None:
+    """Writes the private key as PEM to a new file that its owner alone may read."""
     content = key.private_bytes(
         serialization.Encoding.PEM,
         serialization.PrivateFormat.PKCS8,

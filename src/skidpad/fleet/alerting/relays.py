@@ -92,6 +92,7 @@ class Mqtt:
             raise BackendError(f"mqtt: {error}") from error
 
     async def _publish(self, alert: dict[str, Any]) -> None:
+        """Publishes the alert on its operator's topic, at least once (QoS 1)."""
         async with connect_to(self.broker, self.timeout_s) as client:
             topic = f"skidpad/{alert['operator']}/alerts"
             await client.publish(topic, json.dumps(alert), qos=1)

@@ -43,6 +43,7 @@ async def raise_alert(
 def _keep(
     fleet: Fleet, who: Principal, key: str, alert: AlertText, vehicle_time: float | None
 ) -> dict[str, Any]:
+    """Keeps a vehicle's alert and has it pushed on; returns its id and whether it was known."""
     vehicle = str(who.vehicle)
     operator, manufacturer = owners_of(fleet, vehicle)
     owned = {"vehicle": vehicle, "operator": operator, "manufacturer": manufacturer}

@@ -59,6 +59,7 @@ def add_api(app: FastAPI, fleet: Fleet) -> None:
 
 
 async def _answer_refusal(request: Request, error: Exception) -> JSONResponse:
+    """Returns the JSON answer of a refusal, status 500 for any other error."""
     del request
     status = error.status if isinstance(error, Refused) else 500
     headers = {401: {"WWW-Authenticate": "Bearer"}, 429: {"Retry-After": "1"}}.get(status)

@@ -52,6 +52,7 @@ class ReleaseText(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def _bytes(text: str) -> bytes:
+    """Returns the bytes of base64 text; refuses with 422 what is not base64."""
     try:
         return base64.b64decode(text, validate=True)
     except (binascii.Error, ValueError) as error:
@@ -59,6 +60,7 @@ def _bytes(text: str) -> bytes:
 
 
 def _parse_body(body: bytes, type: Any) -> Any:
+    """Returns a JSON body as a value of the type; refuses with 422 what cannot be read as one."""
     try:
         return msgspec.json.decode(body, type=type)
     except (msgspec.MsgspecError, ValueError, RecursionError) as error:

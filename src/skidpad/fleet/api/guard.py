@@ -34,6 +34,7 @@ class Guard:
         return who
 
     def _look_up(self, token: str) -> Principal:
+        """Returns the principal of a credential, known for REMEMBERED_S s; refuses others with 401."""
         name, now = token_hash(token), self.fleet.clock()
         known = self._known.get(name)
         if known is not None and 0.0 <= now - known[0] < REMEMBERED_S:

@@ -102,6 +102,7 @@ def list_events(request: Request, who: Reader, subject: str) -> list[dict[str, A
 
 
 def _plain(one: Work) -> dict[str, Any]:
+    """Return an entry of the work list as plain data; None where place or precision is unknown."""
     risk, precision = one.mean_risk, one.precision
     return {
         "subject": one.subject,

@@ -17,6 +17,7 @@ router = APIRouter(prefix="/api/v1/updates", tags=["updates"])
 
 
 def _repository(request: Request, who: Principal) -> Repository:
+    """Returns the repository of updates of the maker of the principal's vehicle."""
     fleet = fleet_of(request)
     return fleet.repository(owners_of(fleet, str(who.vehicle))[1])
 

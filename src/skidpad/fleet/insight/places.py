@@ -111,6 +111,7 @@ def pdf(rows: Sequence[PlaceRow]) -> bytes:
 
 
 def _summary(rows: Sequence[PlaceRow]) -> str:
+    """Returns a sentence with the numbers of hazards and places of the rows."""
     there = len({(row.map, row.x, row.y) for row in rows})
     return (
         f"{sum(row.count for row in rows)} hazards at {there} places of {CELL:g} m; places that "
@@ -119,4 +120,5 @@ def _summary(rows: Sequence[PlaceRow]) -> str:
 
 
 def _text(value: Any) -> str:
+    """Returns a value as text for a table: numbers short, words without underscores."""
     return f"{value:g}" if isinstance(value, float) else str(value).replace("_", " ")

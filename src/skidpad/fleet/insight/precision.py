@@ -40,6 +40,7 @@ def measured_precision(rules: str, hazard: str) -> Precision | None:
 
 @cache
 def _table() -> dict[str, dict[str, Precision]]:
+    """Returns the measured precision by rule profile and hazard type, from precision.yaml."""
     source = files("skidpad.fleet.insight").joinpath("precision.yaml")
     table: dict[str, dict[str, Precision]] = decode_yaml(
         source.read_bytes(), source.name, dict[str, dict[str, Precision]]

@@ -43,11 +43,13 @@ def export(fleet: Fleet) -> list[dict[str, Any]]:
 
 
 def _decode(text: str) -> list[dict[str, Any]]:
+    """Returns the rows of a published export from its JSON text."""
     rows: list[dict[str, Any]] = json.loads(text)["rows"]
     return rows
 
 
 def _publish_due(fleet: Fleet) -> None:
+    """Publishes the rows of each hour that ended at least DELAY s ago and was not published yet."""
     now = fleet.clock()
     last = floor((now - DELAY) / HOUR)  # hours before this one have ended a day ago
     with fleet.engine.begin() as connection:

@@ -92,6 +92,7 @@ def _batches(fleet: Fleet, since: float, after: str) -> Sequence[Any]:
 
 
 def _table(fleet: Fleet, row: Any) -> pl.DataFrame:
+    """Returns the indicator rows of a stored batch as a table with its owners and time of receipt."""
     body = unpack(fleet.blobs.part(row.pack, row.start, row.size), fleet.limits)
     found: list[IndicatorRow] = rows_of(body, fleet.limits)
     plain = [msgspec.structs.asdict(one) | {"indicator": one.indicator.value} for one in found]
@@ -115,6 +116,7 @@ _RIGHT: dict[Role, str | None] = {
 
 
 def _trend(m: Moments, days: int) -> Trend:
+    """Returns the trend of an indicator in one slot of `days` days."""
     return Trend(
         indicator=m.indicator,
         at=m.slot * days * DAY,
@@ -175,6 +177,7 @@ def alarm_rates(connection: Connection, who: Principal) -> list[AlarmRate]:
 
 
 def _newest_rules(connection: Connection, who: Principal, type_: str) -> str:
+    """Returns the rule profile of the newest hazard of this type that the principal may see."""
     head = connection.execute(
         select(hazards.c.head)
         .where(visible(who, hazards), hazards.c.type == type_)

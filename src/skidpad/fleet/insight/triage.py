@@ -97,5 +97,6 @@ def reopen(
 def _record_standing(
     connection: Connection, key: str, standing: Standing, by: tuple[str, float], note: str
 ) -> None:
+    """Add an event with a recurring hazard's new state, owner, release and note."""
     detail = {"owner": standing.owner, "release": standing.release, "note": note}
     add_event(connection, (KIND, key), standing.state.value, by, **detail)

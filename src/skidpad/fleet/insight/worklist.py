@@ -177,6 +177,7 @@ def _first_drives(connection: Connection, who: Principal) -> dict[str, float]:
 
 
 def _locate(locate: Locate, cluster: dict[str, Any]) -> Locality | None:
+    """Returns what lies at a cluster's place; None where the cluster has no map."""
     if "map" not in cluster:
         return None
     return locate(cluster["map"], cluster["x"], cluster["y"])
@@ -194,10 +195,12 @@ def _matches(one: Work, wanted: WorkFilter) -> bool:
 
 
 def _age(alarm: Alarm) -> tuple[float, str]:
+    """Returns the key that sorts alarms by time, then id."""
     return alarm.at, alarm.id
 
 
 def _is_wanted(alarm: Alarm, wanted: WorkFilter) -> bool:
+    """Returns True when an alarm passes all filters that are set; None: no filter."""
     return (
         wanted.weather in (None, alarm.weather)
         and wanted.release in (None, alarm.release)
@@ -207,6 +210,7 @@ def _is_wanted(alarm: Alarm, wanted: WorkFilter) -> bool:
 
 
 def _read_alarms(connection: Connection, who: Principal, ids: Sequence[str]) -> dict[str, Alarm]:
+    """Returns the alarms of these hazards by id, as far as the principal may see them."""
     there = (drives.c.vehicle == hazards.c.vehicle) & (drives.c.drive == hazards.c.drive)
     query = select(
         hazards.c.id, hazards.c.at, hazards.c.head, hazards.c.weather, drives.c.release

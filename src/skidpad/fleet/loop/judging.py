@@ -46,6 +46,7 @@ def errors_of(
 def _errors(
     cycles: Sequence[Cycle], channels: Sequence[str], settings: MonitorSettings, true: list[Span]
 ) -> Errors:
+    """Returns a monitor's false and missed hazards in the cycles, and the kinds that it found."""
     monitor = Monitor(channels, settings)
     for cycle in cycles:
         monitor.update(cycle)

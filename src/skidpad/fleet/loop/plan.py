@@ -100,5 +100,6 @@ def choose_vehicles(release: str, vehicles: Iterable[str], share: float) -> froz
 
 
 def _rank(release: str, vehicle: str) -> int:
+    """Returns a number that orders vehicles for a release, always the same and as if drawn."""
     word = hashlib.sha256(f"{release}/{vehicle}".encode()).digest()
     return int.from_bytes(word[:8], "big")

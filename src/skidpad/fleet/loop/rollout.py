@@ -177,6 +177,7 @@ def _take(connection: Connection, release: str, number: int, at: float) -> None:
 def _conclude(
     connection: Connection, one: Rollout, finding: Finding, by: tuple[str, float]
 ) -> None:
+    """Adds the event of a finding that reverts, completes or advances a roll-out; none otherwise."""
     subject = (SUBJECT, one.row.id)
     if finding.decision is Decision.REVERT:
         add_event(connection, subject, REVERTED, by, reason=finding.reason, to=one.row.before)

@@ -211,6 +211,7 @@ def series_of(record: HazardRecord) -> Floats:
 
 
 def _scale_value(value: float, by: float, neutral: float) -> float:
+    """Returns a value divided by `by` and cut to 0..1, `neutral` for nan."""
     return neutral if np.isnan(value) else float(np.clip(value / by, 0.0, 1.0))
 
 

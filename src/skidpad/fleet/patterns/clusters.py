@@ -109,6 +109,7 @@ def find_clusters(cases: Sequence[Case], settings: ClusterSettings = STANDARD) -
 
 
 def _order(case: Case) -> tuple[str, str]:
+    """Returns the key that sorts cases by digest, then id."""
     return case.digest, case.id
 
 
@@ -128,12 +129,14 @@ def _dense(group: list[Case], settings: ClusterSettings) -> list[list[Case]]:
 
 
 def _features(case: Case, settings: ClusterSettings) -> Floats:
+    """Returns the features of a case: place over the reach, and min, max and mean of each series."""
     place = np.array([case.x, case.y]) / settings.reach
     s = case.series
     return np.concatenate([place, s.min(axis=0), s.max(axis=0), s.mean(axis=0)])
 
 
 def _labels(features: Floats, settings: ClusterSettings) -> list[int]:
+    """Returns the cluster of each row of features, -1: of none."""
     if len(features) < 2 * settings.least:  # too few to have a density: one group, or none
         return [0 if len(features) >= settings.least else -1] * len(features)
     try:

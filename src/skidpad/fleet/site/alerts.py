@@ -72,6 +72,7 @@ def open_text(n: int) -> str:
 
 
 def _card(fleet: Fleet, lines: MapLines, ui: Any, who: Principal, alert: Alert) -> None:
+    """Adds the card of an alert to the page: scene, state and, while it is open, its buttons."""
     id, scene = alert.row.id, msgspec.json.decode(alert.row.scene, type=Scene)
     with ui.element("div").classes("card"):
         state = "closed" if alert.closed else f"level {alert.level}"
@@ -93,9 +94,11 @@ def _card(fleet: Fleet, lines: MapLines, ui: Any, who: Principal, alert: Alert) 
 
 
 def _answering(fleet: Fleet, ui: Any, who: Principal, alert: str, what: What) -> Any:
+    """Returns what a click on an answer does."""
     return lambda: say(ui, lambda: click_answer(fleet, who.id, alert, what), what.value)
 
 
 def _ordering(fleet: Fleet, ui: Any, who: Principal, alert: str, order: Order) -> Any:
+    """Returns what a click on an order does."""
     told = f"{order.value} ordered, good for 2 s"
     return lambda: say(ui, lambda: click_order(fleet, who.id, alert, order), told)

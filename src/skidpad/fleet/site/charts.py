@@ -70,4 +70,5 @@ def _data(points: Sequence[tuple[float, float, float, float]]) -> str:
 
 
 def _points(points: Sequence[tuple[float, float]]) -> str:
+    """Returns points as the text of an SVG attribute, one decimal."""
     return " ".join(f"{x:.1f},{y:.1f}" for x, y in points)

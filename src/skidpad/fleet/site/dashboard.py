@@ -126,6 +126,7 @@ def _parts(ui: Any, found: Overview) -> None:
 
 
 def _trends(ui: Any, found: list[Trend]) -> None:
+    """Adds the trends of the worst SHOWN indicators to the page, a chart each."""
     by_name: dict[str, list[Trend]] = {}
     for trend in found:
         by_name.setdefault(trend.indicator, []).append(trend)
@@ -145,6 +146,7 @@ def _trends(ui: Any, found: list[Trend]) -> None:
 
 
 def _map(ui: Any, found: Overview) -> None:
+    """Adds a map per road network with the newest hazards and the clusters to the page."""
     with ui.element("section"):
         ui.label("Where").classes("h2")
         for name, roads in found.roads.items():

@@ -115,6 +115,7 @@ def replay_legend(record: HazardRecord) -> str:
 
 
 def _roads(lines: Sequence[Line]) -> str:
+    """Returns SVG polylines of at most LINES_MAX lines of roads."""
     return "".join(
         f'<polyline points="{_points(line)}" fill="none" stroke="#39434f" stroke-width="3"/>'
         for line in lines[:LINES_MAX]
@@ -122,6 +123,7 @@ def _roads(lines: Sequence[Line]) -> str:
 
 
 def _points(line: Line) -> str:
+    """Returns points in m as the text of an SVG attribute, y pointing down."""
     return " ".join(f"{x:.1f},{-y:.1f}" for x, y in line)
 
 
@@ -166,6 +168,7 @@ def scene_legend() -> str:
 
 
 def _body(o: Body, colour: str) -> str:
+    """Returns the SVG polygon of a body's box, in m with y down."""
     c, s = cos(o.heading), sin(o.heading)
     corners = [
         (o.x + i * o.length / 2 * c - j * o.width / 2 * s, o.y + i * o.length / 2 * s + j * o.width / 2 * c)
@@ -230,6 +233,7 @@ def moment_text(record: HazardRecord, k: int) -> str:
 
 
 def _frame(frame: ChannelFrame, colour: str) -> str:
+    """Returns the SVG of a frame: plan, objects and ego in one colour."""
     plan = [(float(p[0]), float(p[1])) for p in frame.plan if isfinite(p[0]) and isfinite(p[1])]
     path = (
         f'<polyline points="{_points(plan)}" fill="none" stroke="{colour}" stroke-dasharray="2 2"/>'
@@ -242,6 +246,7 @@ def _frame(frame: ChannelFrame, colour: str) -> str:
 
 
 def _shape(pose: list[float], corners: list[list[float]], colour: str, opacity: str) -> str:
+    """Returns the SVG polygon of corners around a pose (x, y, heading); "" where not finite."""
     x, y, h = pose
     c, s = cos(h), sin(h)
     world = [(x + px * c - py * s, y + px * s + py * c) for px, py in corners]

@@ -117,6 +117,7 @@ def effect_text(one: Rollout) -> str:
 
 
 def _release(ui: Any, one: Rollout, reason: str) -> None:
+    """Adds the card of a release to the page: state, effect and events so far."""
     with ui.element("div").classes("card"):
         state = one.ended or f"stage {one.stage + 1} of {len(one.plan.stages)}"
         ui.label(f"{reason}: {state}")
@@ -135,4 +136,5 @@ def _release(ui: Any, one: Rollout, reason: str) -> None:
 
 
 def _number(value: Any) -> str:
+    """Returns a float with three digits as text, "" for anything else."""
     return f"{value:.3g}" if isinstance(value, float) else ""

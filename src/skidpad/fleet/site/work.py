@@ -72,6 +72,7 @@ def work_of(fleet: Fleet, who: Principal, request: Request) -> WorkPage:
 
 
 def _words(values: Any) -> list[str]:
+    """Return the different values that are not empty, sorted."""
     return sorted({v for v in values if v})
 
 
@@ -92,6 +93,8 @@ def draw_work(ui: Any, found: WorkPage) -> None:
 
 
 def _navigate(ui: Any, chosen: dict[str, str], name: str) -> Callable[[Any], None]:
+    """Return what a change of the filter `name` does: it opens the list anew with it."""
+
     def change(event: Any) -> None:
         ui.navigate.to("/work?" + urlencode(chosen | {name: event.value}))
 
@@ -99,6 +102,7 @@ def _navigate(ui: Any, chosen: dict[str, str], name: str) -> Callable[[Any], Non
 
 
 def _card(ui: Any, found: WorkPage, rank: int, one: Work) -> None:
+    """Add the card of a recurring hazard to the page, with what the principal may do."""
     with ui.element("div").classes("card"):
         ui.label(f"{rank}. {work_title(one)}")
         ui.label(work_text(one)).classes("dim")
@@ -113,6 +117,8 @@ def _card(ui: Any, found: WorkPage, rank: int, one: Work) -> None:
 
 
 def _export(ui: Any, found: WorkPage, hazard: str) -> Callable[[], Any]:
+    """Return what a click on a scenario's button does: it downloads a .zip, or shows an error."""
+
     async def click() -> None:
         try:
             content = await run_in_threadpool(click_export, found.fleet, found.who.id, hazard)
@@ -125,6 +131,7 @@ def _export(ui: Any, found: WorkPage, hazard: str) -> Callable[[], Any]:
 
 
 def _triage(ui: Any, found: WorkPage, one: Work) -> None:
+    """Add the fields for state, owner and release of a recurring hazard to the page."""
     with ui.element("nav"):
         state = ui.select([s.value for s in SETTABLE], value=State.OPEN.value, label="new state")
         state.style("min-width:120px")

@@ -73,6 +73,7 @@ def add_vehicle(
 def _add(
     connection: Connection, tenant: str, role: Role, name: str, vehicle: str | None, at: float
 ) -> Account:
+    """Adds a principal to the tenant, with a credential from `at` on; `vehicle` None: not a vehicle."""
     principal = Principal(new_id(), tenant, role, name, vehicle)
     connection.execute(
         principals.insert(),
@@ -106,6 +107,7 @@ def principal_by_id(connection: Connection, id: str, at: float) -> Principal | N
 
 
 def _principal(connection: Connection, which: ColumnElement[bool], at: float) -> Principal | None:
+    """Returns the principal of a credential that is valid at `at`; None where there is none."""
     ended = select(events.c.number).where(
         events.c.subject == credentials.c.id, events.c.what == ENDED
     )

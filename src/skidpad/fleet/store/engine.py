@@ -51,10 +51,12 @@ def migrate(engine: Engine) -> None:
 
 
 def _first_line(error: Exception) -> str:
+    """Returns the first line of an error's text."""
     return str(error).splitlines()[0]
 
 
 def _durable(connection: Any, record: Any) -> None:
+    """Sets SQLite up for durable commits on a new connection."""
     del record
     cursor = connection.cursor()
     for pragma in (

@@ -87,6 +87,7 @@ class Intake:
         self._thread.join()
 
     def _run(self) -> None:
+        """Commits queued batches in groups until None comes; runs in a thread."""
         while True:
             first = self._queue.get()
             if first is None:
@@ -105,6 +106,7 @@ class Intake:
                 return
 
     def _commit(self, group: list[tuple[Batch, Future[Receipt]]]) -> None:
+        """Writes a group and answers each batch; a group that fails is written one by one."""
         try:
             receipts = self._write([batch for batch, _ in group])
         except Exception as error:  # becomes the answer of the request that it came of
@@ -122,6 +124,7 @@ class Intake:
                 future.set_result(receipt)
 
     def _write(self, group: list[Batch]) -> list[Receipt | Refused]:
+        """Stores the group as one pack and its facts in one transaction; returns an answer per batch."""
         pack = self.blobs.put(b"".join(batch.body for batch in group))
         starts = [0]
         for batch in group:
@@ -135,6 +138,7 @@ class Intake:
     def _write_one(
         self, connection: Connection, batch: Batch, pack: str, start: int
     ) -> Receipt | Refused:
+        """Writes a batch at `start` of a pack unless known; returns its receipt, or a refusal of its key."""
         body = digest(batch.body)
         about = {"vehicle": batch.vehicle, "key": batch.key}
         known = connection.execute(BY_KEY, about).first()
@@ -182,6 +186,7 @@ class Intake:
 
 
 def _answer_to(error: Exception) -> Exception:
+    """Returns the refusal that a database error stands for; any other error as it is."""
     if isinstance(error, IntegrityError):
         return Refused(409, MEANWHILE)
     if isinstance(error, DataError):
@@ -190,6 +195,7 @@ def _answer_to(error: Exception) -> Exception:
 
 
 def _hazard_row(found: Found) -> dict[str, Any]:
+    """Returns the columns of a record for the table of hazards."""
     head = found.head
     return {
         "id": new_id(), "start": found.start, "size": found.size, "digest": found.digest,
@@ -210,6 +216,7 @@ def _known_records(connection: Connection, batch: Batch) -> dict[str, str]:
 
 
 def _ids(connection: Connection, batch: Batch) -> tuple[str, ...]:
+    """Returns the stored ids of a batch's records, in their order."""
     known = _known_records(connection, batch)
     return tuple(known[found.digest] for found in batch.found)
 

@@ -55,6 +55,7 @@ def hazard_row(connection: Connection, who: Principal, hazard: str) -> dict[str,
 
 
 def _plain(row: Any) -> dict[str, Any]:
+    """Returns a row of hazards as plain data with its head decoded."""
     names = (
         "id", "operator", "manufacturer", "vehicle", "drive", "type", "map", "weather", "x", "y",
         "t_start", "t_end", "vehicle_time", "at",

@@ -25,14 +25,17 @@ SEQUENCE = BigInteger().with_variant(Integer, "sqlite")  # SQLite counts up only
 
 
 def _id() -> Column[str]:
+    """Returns the column of a table's own id."""
     return Column("id", ID, primary_key=True)
 
 
 def _time(name: str = "at") -> Column[float]:
+    """Returns a column for a time in s that is always there."""
     return Column(name, Double, nullable=False)
 
 
 def _to(name: str, target: str, *, null: bool = False) -> Column[str]:
+    """Returns a column that refers to the id of the table `target`."""
     return Column(name, ID, ForeignKey(f"{target}.id"), nullable=null)
 
 
@@ -88,6 +91,7 @@ OWNERS = ("operator", "manufacturer")
 
 
 def _owner_columns() -> list[Column[str]]:
+    """Returns the columns of the operator, manufacturer and vehicle that own a row."""
     return [_to("operator", "tenants"), _to("manufacturer", "tenants"), _to("vehicle", "vehicles")]
 
 

@@ -35,6 +35,7 @@ class _Fetcher(FetcherInterface):
         self._stream = stream
 
     def _fetch(self, url: str) -> Iterator[bytes]:
+        """Yields a download in parts as sent; raises DownloadError where the server does not give it."""
         try:
             with self._stream(url) as answer:
                 if answer.status_code != 200:
@@ -78,22 +79,24 @@ class UpdateClient:
             ) from error
 
     @property
-    def _trusted_root(self) -> Path:
+    def _trusted_time(self) -> Path:
+        """Returns the file that keeps the latest signed time that the vehicle has seen."""
         return self.folder / "trusted_time"
 
     def _check_clock(self) -> None:
         """A clock set back would let expired metadata pass."""
-        trusted = float(self._trusted_root.read_text()) if self._trusted_root.exists() else 0.0
+        trusted = float(self._trusted_time.read_text()) if self._trusted_time.exists() else 0.0
         if self.clock() + SKEW_S < trusted:
             raise UpdateRefused(
                 f"the clock is {trusted - self.clock():.0f} s behind the last signed time it saw"
             )
 
     def _note_time(self) -> None:
+        """Keeps the signed time of the timestamp, unless a later one is known, and checks the clock."""
         stamp: Metadata[Timestamp] = Metadata.from_bytes(
             (self.folder / "metadata" / "timestamp.json").read_bytes()
         )
         signed = float(stamp.signed.unrecognized_fields.get(SIGNED_AT, 0.0))
-        before = float(self._trusted_root.read_text()) if self._trusted_root.exists() else 0.0
-        write_bytes(self._trusted_root, repr(max(before, signed)).encode())
+        before = float(self._trusted_time.read_text()) if self._trusted_time.exists() else 0.0
+        write_bytes(self._trusted_time, repr(max(before, signed)).encode())
         self._check_clock()

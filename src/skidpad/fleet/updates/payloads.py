@@ -33,6 +33,7 @@ SUFFIX = {PayloadKind.RULES: "yaml", PayloadKind.THRESHOLDS: "yaml", PayloadKind
 
 
 def _rule_settings(path: Path) -> dict[str, Any]:
+    """Returns a monitor's settings from a file of rules: profile, rules and indicators."""
     profile, rules = load_only_rules(path)
     indicators = IndicatorSettings(form=default_form(profile))
     return {"profile": profile, "rules": rules, "indicators": indicators}

@@ -95,6 +95,7 @@ class Repository:
         return self.payload(f"{current.signed.targets[name].hashes['sha256']}.{name}")
 
     def _publish(self, targets: bytes) -> None:
+        """Writes the list of updates, with a new snapshot and timestamp for it."""
         listed: Metadata[Targets] = Metadata.from_bytes(targets)
         self._write(f"{listed.signed.version}.targets.json", targets)
         version = listed.signed.version
@@ -110,7 +111,7 @@ class Repository:
 
     def _stamp(self, version: int | None = None) -> None:
         """Sign the timestamp anew, and a snapshot that is about to expire."""
-        now, old = self.clock(), self._sign_timestamp()
+        now, old = self.clock(), self._read_timestamp()
         version = version or (old.signed.snapshot_meta.version if old else 1)
         path = self.folder / "metadata" / f"{version}.snapshot.json"
         snapshot: Metadata[Snapshot] = Metadata.from_bytes(path.read_bytes())
@@ -128,20 +129,24 @@ class Repository:
         self._sign(Metadata(stamp), "timestamp.json")
 
     def _sign(self, metadata: Metadata[Any], name: str) -> None:
+        """Signs metadata by the online key and writes them under the name."""
         metadata.sign(load_key(self._online))
         self._write(name, metadata.to_bytes())
 
-    def _sign_timestamp(self) -> Metadata[Timestamp] | None:
+    def _read_timestamp(self) -> Metadata[Timestamp] | None:
+        """Returns the timestamp that is served now; None before the first."""
         path = self.folder / "metadata" / "timestamp.json"
         return Metadata.from_bytes(path.read_bytes()) if path.exists() else None
 
     def _age(self) -> float:
-        stamp = self._sign_timestamp()
+        """Returns the age of the served timestamp in s; 0 where there is none."""
+        stamp = self._read_timestamp()
         signed = stamp.signed.unrecognized_fields[SIGNED_AT] if stamp else self.clock()
         return self.clock() - float(signed)
 
     def _version(self, role: str, of: str) -> int:
-        stamp = self._sign_timestamp()
+        """Returns the version of `of` in the served snapshot; `role` names the metadata to read."""
+        stamp = self._read_timestamp()
         if stamp is None:
             raise absent()
         name = f"{stamp.signed.snapshot_meta.version}.{role}.json"
@@ -149,6 +154,7 @@ class Repository:
         return snapshot.signed.meta[of].version
 
     def _root(self) -> Metadata[Root]:
+        """Returns the newest root metadata; raises FileError where there are none."""
         names = (self.folder / "metadata").glob("*.root.json")
         newest = max(names, key=lambda path: int(path.name.split(".")[0]), default=None)
         if newest is None:
@@ -156,9 +162,11 @@ class Repository:
         return Metadata.from_bytes(newest.read_bytes())
 
     def _write(self, name: str, content: bytes) -> None:
+        """Writes a file of the metadata whole or not at all."""
         write_bytes(self.folder / "metadata" / name, content)
 
     def _read(self, part: str, name: str) -> bytes:
+        """Returns the bytes of a file in `part`; refuses names that are not plain and absent files."""
         if not name.replace("-", "").replace(".", "").isalnum() or ".." in name:
             raise absent()
         try:

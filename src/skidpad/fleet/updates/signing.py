@@ -104,6 +104,7 @@ def add_target(
 
 
 def _sign_metadata(metadata: Metadata[Any], signers: Sequence[CryptoSigner]) -> bytes:
+    """Returns the metadata as bytes, with the signature of each signer added."""
     for signer in signers:
         metadata.sign(signer, append=True)
     return metadata.to_bytes()

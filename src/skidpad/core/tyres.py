@@ -38,7 +38,7 @@ class Tyres(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
 @cache
 def known_tyres() -> dict[str, Tyres]:
-    """All tyres by name, sorted."""
+    """Returns the tyres by name, each kind with each tread depth, kinds sorted."""
     from skidpad.core.reading import decode_yaml  # YAML comes with it, which --help does not need
 
     where = resources.files("skidpad.core").joinpath("tyres.yaml")

@@ -122,7 +122,7 @@ class GripBelief:
 
     @property
     def grips(self) -> Floats:
-        """(n,) probabilities of the grips in GRIP, all stiffnesses together."""
+        """Returns (n,) the probability of each of the n grips in GRIP, summed over stiffnesses."""
         marginal: Floats = self.p.sum(axis=1)
         return marginal
 

@@ -44,7 +44,10 @@ def parse_expectation(text: str) -> Expectation:
 
 
 def run_values(log: RunLog, found: Iterable[Pair] | None = None) -> dict[str, float]:
-    """The numbers by name, over the pairs of the ego; inf or 0 where there never was a conflict."""
+    """Returns the values of NAMES: collisions, duration, and each extreme over the ego's pairs.
+
+    found: the pairs, None: of the log. Without a conflict a least value is inf and a greatest one 0.
+    """
     known = list(pairs(log) if found is None else found)
     seconds = float(log.t[-1] - log.t[0]) if len(log) else 0.0
     values = {"collisions": float(len(log.contacts)), "duration_s": seconds}

@@ -351,7 +351,7 @@ def runs_with_text(rate: Rate, unit: str = "run") -> str:
 
 
 def rate_remark(rate: Rate, unit: str = "run") -> str:
-    """What stands beside a rate and its limits: why there are none, or that counts vary too much."""
+    """Returns why a rate has no limits or that its counts vary too much, else "" (`unit`: "run", ...)."""
     if rate.interval is None:
         return runs_with_text(rate, unit)
     if rate.exceeds_assumption:

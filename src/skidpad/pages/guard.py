@@ -165,7 +165,7 @@ def _set_cookie(door: Door, id: str) -> str:
 
 
 def _with_headers(send: Send) -> Send:
-    """What every answer says."""
+    """Returns a `send` that adds HEADERS to the start of each response that lacks them."""
 
     async def sending(message: MutableMapping[str, Any]) -> None:
         if message["type"] == "http.response.start":

@@ -166,7 +166,7 @@ class RoadMap:
         return self.ahead(point, -distance)
 
     def all_ahead(self, point: LanePoint, distance: float) -> list[LanePoint]:
-        """Every place that lies `distance` m further, one per branch."""
+        """Returns the places `distance` m further on, one per lane reached; empty at a dead end."""
         found: dict[int, LanePoint] = {}
         seen = set()
         frontier = [(point.lane, point.s + distance)]

@@ -348,7 +348,7 @@ class Scene:
         self.story.append(Happening(self.t, path, move.value))
 
     def observe(self, truth: WorldTruth) -> None:
-        """Take over positions and velocities of a tick."""
+        """Takes over time, lights, contacts and each actor's motion of a tick."""
         self.t, self.lights, self.truth = truth.tick * self.dt, truth.lights, truth
         s = truth.states
         x, y, z, yaw = s.x.tolist(), s.y.tolist(), s.z.tolist(), s.yaw.tolist()

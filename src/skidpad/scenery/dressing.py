@@ -47,7 +47,7 @@ def _dress_fully(map: RoadMap) -> RoadMap:
 
 
 def things_of(map: RoadMap) -> list[Thing]:
-    """Returns what stands beside the roads of a map; the same for the same content."""
+    """Returns the things to put beside the roads, clear of what is there; the same for the same content."""
     seed = int(map.content_hash[:15], 16)
     sides = sides_of(map.samples, map.lanes)
     found: list[Thing] = []

@@ -47,7 +47,7 @@ def carla_options(choice: BackendChoice, watchdog: float | None = None) -> Carla
 
 
 def make_backend(choice: BackendChoice, watchdog: float | None = None) -> Backend:
-    """A fresh backend. watchdog: s without a tick after which this process ends; None: never."""
+    """Returns a backend, not reset yet; this process ends `watchdog` s after its last tick (None: never)."""
     made: Backend = BACKENDS.get(choice.backend).make(choice, watchdog)
     return made
 

@@ -113,7 +113,7 @@ def drive_one(out: Path, cell: RunSpec, *, keep: bool = False) -> Driven[GripKey
 
 
 def grip_key(cell: RunSpec, outcome: Outcome, log_hash: str | None = None) -> GripKey:
-    """The identifying columns of a cell's row."""
+    """Returns the identifying columns of a cell's row; log_hash None: it left no log."""
     return GripKey(
         scenario=scenario_of(cell).title,
         weather=cell.weather.name,

@@ -93,7 +93,7 @@ def _worst_known(row: list[float]) -> float:
 
 @inner_kernel
 def printed_risk(ttc: float, pet: float) -> float:
-    """Returns the risk of a time to collision and a PET in s (inf: none), as the source prints it (C-094)."""
+    """Returns the risk in [0, 1] of a time to collision and a PET in s (inf: none), as printed in C-094."""
     return max(1.0 - ttc / HORIZON, 1.0 - pet / PET_SAFE, 0.0)
 
 

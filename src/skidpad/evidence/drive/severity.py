@@ -111,7 +111,7 @@ def _is_again(drive: Drive, before: Contact, contact: Contact) -> bool:
 
 
 def grade(drive: Drive, contact: ContactEvent) -> Contact:
-    """Returns one contact with its delta-v."""
+    """Returns a contact with the larger delta-v of those involved in m/s, None where one is unknown."""
     log, row, i = drive.log, drive.row(contact.tick), contact.actor
     changes = [speed_change(log, row, actor) for actor in ((0,) if i < 0 else (0, i))]
     known = [change for change in changes if change is not None]

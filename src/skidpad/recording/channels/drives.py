@@ -89,7 +89,7 @@ class DriveRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def read_record(path: Path) -> DriveRecord | None:
-    """A record; None when there is none, or something else."""
+    """Returns the record in a file; None where the file is absent or is not such a record."""
     try:
         return msgspec.json.decode(path.read_bytes(), type=DriveRecord)
     except (*UNUSABLE, OSError):

@@ -225,7 +225,7 @@ def _has_moved(shape: Numbers, known: Numbers) -> bool:
 
 
 def moved_on(pose: Pose, dt_ms: int) -> Pose:
-    """The pose after `dt_ms` at its own velocity; a value that is not a number counts as 0."""
+    """Returns the pose (cm, mrad, cm/s) `dt_ms` ms later at its own velocity; None counts as 0."""
     x, y, heading, vx, vy = (v or 0 for v in pose)
     return [x + vx * dt_ms // 1000, y + vy * dt_ms // 1000, heading, vx, vy]
 

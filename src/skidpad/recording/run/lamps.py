@@ -68,7 +68,7 @@ def newest(changes: Iterable[LampChange], t: float) -> Mapping[tuple[str, Lamp],
 
 
 def write_lamps(folder: Path, changes: Sequence[LampChange]) -> None:
-    """Writes the changes of a run that has any."""
+    """Writes the lamp changes of a run to `lamps.csv` in its folder; no file where there are none."""
     if not changes:
         return
     text = io.StringIO()

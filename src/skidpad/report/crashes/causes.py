@@ -106,7 +106,7 @@ def _describe_arrival(story: Story) -> str:
 
 
 def _describe_lead(story: Story) -> str:
-    """What the other did that had been ahead for long."""
+    """Returns a clause on what the lead of long standing did: slowed, stood or drove on."""
     crash, slowed = story.crash, story.slowed
     if slowed is not None and crash.v_other is not None:
         return (

@@ -137,7 +137,7 @@ def draw_bars(axes: Axes, groups: Sequence[str], series: Sequence[Series], y_lab
 
 
 def _mark_cut_bars(axes: Axes, series: Sequence[Series], groups: int, width: float) -> None:
-    """An arrow at the upper edge where an interval goes on."""
+    """Draws an arrow at the upper edge over each bar whose interval goes on beyond it."""
     top = axes.get_ylim()[1]
     cut = [
         (g + (k - (len(series) - 1) / 2) * width, top)
@@ -204,7 +204,7 @@ def _keep_points_apart(axes: Axes, series: Sequence[Series], origin: float | Non
 
 
 def _mark_cut_points(axes: Axes, heights: Sequence[float], one: Series, ink: str) -> None:
-    """An arrow at the edge where an interval goes on."""
+    """Draws an arrow at the left or right edge, at each height whose interval goes on beyond it."""
     left, right = axes.get_xlim()
     for y, low, high in zip(heights, one.low, one.high, strict=False):
         for mark, edge, end in (("<", left, low), (">", right, high)):

@@ -85,7 +85,7 @@ class Played:
 
 
 def load_played(out: Path) -> Played:
-    """Return the judged runs of a folder, of one run or of a campaign."""
+    """Return the judged runs of a folder, of one run or many; files that cannot be played are errors."""
     judging = read_judging(out)
     rules = [parse_expectation(text) for text in judging.expect]
     runs = [*_runs(out, rules)]

@@ -159,7 +159,7 @@ class LaneChange:
         return self.offset if now is None or network.forward(now) else -self.offset
 
     def target(self, scene: Scene) -> int | None:
-        """Id of the lane to go to; None where the reference is on no lane."""
+        """Returns the OpenDRIVE id of the lane to go to; None where the other entity is on no lane."""
         if self.other is None:
             return self.value
         place = scene.actors[self.other].place(scene.network)

@@ -45,7 +45,7 @@ class Value:
     value: str
 
     def probe(self) -> Probe:
-        """Returns the value as it is now."""
+        """Returns a probe of the value as it is when asked."""
         return self._holds
 
     def _holds(self, scene: Scene) -> bool:

@@ -68,7 +68,7 @@ class TimedTrack:
 
     @property
     def v_end(self) -> float:
-        """Speed on its last stretch, m/s."""
+        """Returns the speed in m/s at the end of the line, kept beyond it."""
         assert self.line.t is not None
         return self.line.speed_at(self.line.t[-1]) / self.scale
 

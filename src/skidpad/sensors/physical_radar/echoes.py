@@ -174,7 +174,7 @@ def _deposit(
 
 @inner_kernel
 def lobe_section(side: int, azimuth: float, zenith: float) -> float:
-    """Radar cross section in m^2 of a side of a vehicle; both angles in deg, azimuth from its front."""
+    """Returns the radar cross section in m^2 of a side (FRONT, ...); deg, azimuth 0 at the front."""
     turn = abs((azimuth - LOBES[side, 0] + 180.0) % 360.0 - 180.0)
     most = LOBES[side, 5]
     across = min(12.0 * (turn / LOBES[side, 1]) ** 2, most)

@@ -217,7 +217,7 @@ class Episode:
         return replace(feet, z=ground, roll=0.0, pitch=0.0)
 
     def _embody(self, actor: Actor, feet: Pose) -> None:
-        """Let it enter the moving world."""
+        """Gives the actor a body in the moving world, with its feet at the pose `feet`."""
         if actor.family is Family.VEHICLE:
             vehicle = self.vehicles.add(actor.id, actor.blueprint, feet)
             vehicle.sticky = actor.attributes["sticky_control"].lower() == "true"

@@ -82,7 +82,7 @@ def _start(since: float | None, t: float) -> float:
 
 
 def planned_acceleration(frame: ChannelFrame) -> float | None:
-    """Returns the m/s^2 with which a plan begins; None: it is too short to say."""
+    """Returns the m/s^2 with which a plan begins; None where it is too short or its times do not rise."""
     plan = frame.plan[PLAN_POINTS]
     if len(plan) < 4:
         return None

@@ -132,7 +132,7 @@ def _cause_table(names: list[str]) -> list[Block]:
 
 
 def _times(segments: pl.DataFrame) -> list[Block]:
-    """Mean processor time of every module per route, with the tail and the greatest of the total."""
+    """Returns the table of module times in ms per route: means, 99.9 % and greatest of the total."""
     modules = [
         c.removesuffix(MEAN)
         for c, kind in segments.schema.items()

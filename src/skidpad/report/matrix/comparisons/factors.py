@@ -70,7 +70,7 @@ def _mean(matrix: Matrix, level: Level) -> Quantity:
 
 
 def _figure(matrix: Matrix, levels: list[Level]) -> list[Block]:
-    """Crashes against the cruise target, a curve per set of functions that had several."""
+    """Returns a figure of crashes per run over cruise target, a curve per set of functions; or nothing."""
     found = []
     for functions in sorted({functions for functions, _ in levels}):
         targets = [cruise for f, cruise in levels if f == functions]

@@ -143,7 +143,7 @@ class ActorTable:
         return actor
 
     def find(self, id: Any) -> Actor | None:
-        """The actor with this id, alive or dead; None when it is not remembered."""
+        """Returns the actor with this id, alive or dead; None if unknown, CallError if no integer."""
         wire.integer(id, "actor id")
         return self.alive.get(id) or self.dead.get(id)
 

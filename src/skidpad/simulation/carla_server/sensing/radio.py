@@ -148,7 +148,7 @@ def knife_edge(box: Box, a: Vector, b: Vector, wavelength: float) -> float:
 
 
 def free_space(radio: Radio, distance: float) -> float:
-    """Returns the path loss in free space in dB (Friis)."""
+    """Returns the loss in dB over `distance` m in free space, without antenna gains (Friis)."""
     return 20.0 * log10(4.0 * pi * distance / radio.wavelength)
 
 

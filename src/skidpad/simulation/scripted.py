@@ -6,14 +6,14 @@ succeeds. On every backend, as it only sees poses and velocities.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import atan, cos, hypot, sin
 from typing import NamedTuple
+
+from msgspec import Struct
 
 from skidpad.core.constants import G
 from skidpad.core.errors import ConfigError
 from skidpad.core.jit import Held, hold, kernel
-from skidpad.core.slots import fill_slots
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import ActorKind
 from skidpad.physics.types import VehicleType, vehicle_type, vehicle_types
@@ -29,9 +29,7 @@ HOLD_BRAKE = 0.6
 LOOK_BACK, LOOK_BACK_TIME = 5.0, 1.5  # m at least, and s, over which a reversing driver corrects
 
 
-@fill_slots
-@dataclass(frozen=True, slots=True)
-class Demand:
+class Demand(Struct, frozen=True):
     """What a scenario asks of an actor in a tick, relative to a point of its path."""
 
     v: float  # m/s
@@ -43,9 +41,7 @@ class Demand:
     reverse: bool = False  # the actor shall go backwards
 
 
-@fill_slots
-@dataclass(frozen=True, slots=True)
-class Motion:
+class Motion(Struct, frozen=True):
     """State of an actor as its driver knows it."""
 
     x: float

@@ -69,8 +69,9 @@ class Group:
 
     def advance(self, dt: float) -> bool:
         """Time passes; True when a lamp changed."""
-        for light in self.lights():
-            light.elapsed += dt
+        for phase in self.phases:
+            for light in phase:
+                light.elapsed += dt
         if self.frozen:
             return False
         phase = self.phases[self.turn]

@@ -7,9 +7,10 @@ import pytest
 from core.test_refcounts import counts_references
 from runs import adas_run
 from skidpad.campaign.runs.run import run
+from skidpad.recording.run import ticks
 from skidpad.sensors.object_level import objects
 from skidpad.simulation import recovery
-from skidpad.simulation.world import step
+from skidpad.simulation.world import feel, step
 from skidpad.stack.perception import radar
 
 
@@ -21,7 +22,15 @@ def drive() -> None:
 
 @pytest.mark.parametrize(
     "compiled",
-    [step.advance, objects.look, objects.listen, objects.feel_slope, radar.retain],
+    [
+        step.advance,
+        feel.feel_motion,
+        objects.look,
+        objects.listen,
+        objects.feel_slope,
+        radar.retain,
+        ticks.copy_actors,
+    ],
     ids=lambda compiled: compiled.py_func.__name__,
 )
 def test_a_kernel_of_the_tick_counts_nothing(compiled: object) -> None:

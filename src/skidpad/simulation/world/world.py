@@ -219,7 +219,8 @@ class World:
     def let_drive(self, traffic: Traffic) -> None:
         """Lets actors have drivers from now on."""
         self.traffic = traffic
-        self._arrange(self.members)
+        if self.members:  # else the first ones to enter come to it
+            self._arrange(self.members)
 
     # --- control from outside
 

@@ -33,7 +33,7 @@ from skidpad.simulation.world.traffic.occupancy import occupancy
 from skidpad.simulation.world.traffic.outlook import desired_speed
 from skidpad.simulation.world.traffic.pack import RADIUS, UNSEEN, Pack
 from skidpad.simulation.world.traffic.path import PATH, begin, straight_path
-from skidpad.simulation.world.traffic.places import FreePlaces
+from skidpad.simulation.world.traffic.places import FreePlaces, find_candidates
 from skidpad.simulation.world.traffic.priority import CONFLICT, ENTRY, ZEBRA, bake_priority
 from skidpad.simulation.world.traffic.spacing import (
     LEAST_TIME,
@@ -59,6 +59,12 @@ Claimed = Callable[[], Places]  # of `claims`, made at the first call
 def network_of(map: RoadMap) -> Network:
     """The drivers' view of a map, made once per process."""
     return network(map.samples, map.lanes, map.signals)
+
+
+@lru_cache(maxsize=8)
+def candidates_of(map: RoadMap) -> NDArray[np.intp]:
+    """Where vehicles can be put on a map, found once per process."""
+    return find_candidates(map, network_of(map))
 
 
 @lru_cache(maxsize=8)
@@ -118,7 +124,9 @@ class Traffic:
         self.net, self.setup, self.seed, self.care = network_of(map), setup, seed, care
         self.drivers, self.occupancy = drivers(0), occupancy(0, 0)
         self.streets = streets_of(map)
-        self.places = FreePlaces(map, self.net, stream(seed, "traffic", "places"))
+        self.places = FreePlaces(
+            map, self.net, candidates_of(map), stream(seed, "traffic", "places")
+        )
         self.row: dict[int, int] = {}  # by id
         self._way = np.full(PATH, -1, dtype=np.int32)  # room for a way through the map
         self.waiting: list[int] = []  # ids of those who enter when there is room

@@ -18,25 +18,29 @@ MAX_CURVE = 1.0 / 150.0  # 1/m: nobody is put into a tight bend
 TRIES = 60
 
 
+def find_candidates(map: RoadMap, net: Network) -> NDArray[np.intp]:
+    """Returns the samples of a map at which a vehicle can be put, if there is room."""
+    drivable = (
+        (net.lane["kind"] == LaneKind.DRIVING) & (map.lanes.junction < 0) & (net.lane["ahead"] >= 0)
+    )
+    fits = (
+        drivable[map.samples.lane]
+        & (net.point["s"] > EDGE)
+        & (net.point["s"] < net.lane["length"][map.samples.lane] - EDGE)
+        & (np.abs(net.point["curvature"]) < MAX_CURVE)
+    )
+    return np.flatnonzero(fits)
+
+
 class FreePlaces:
     """Draws samples of driving lanes at which a vehicle can be put."""
 
-    def __init__(self, map: RoadMap, net: Network, rng: np.random.Generator) -> None:
+    def __init__(
+        self, map: RoadMap, net: Network, candidates: NDArray[np.intp], rng: np.random.Generator
+    ) -> None:
+        """candidates: of `find_candidates`."""
         self.lane, self.z = map.samples.lane, map.samples.z
-        drivable = (
-            (net.lane["kind"] == LaneKind.DRIVING)
-            & (map.lanes.junction < 0)
-            & (net.lane["ahead"] >= 0)
-        )
-        fits = (
-            drivable[self.lane]
-            & (net.point["s"] > EDGE)
-            & (net.point["s"] < net.lane["length"][self.lane] - EDGE)
-            & (np.abs(net.point["curvature"]) < MAX_CURVE)
-        )
-        self.candidates: NDArray[np.intp] = np.flatnonzero(fits)
-        self.net = net
-        self.rng = rng
+        self.candidates, self.net, self.rng = candidates, net, rng
 
     def draw(
         self,

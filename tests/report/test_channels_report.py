@@ -15,6 +15,7 @@ from skidpad.evidence.channels.monitor import MonitorSettings
 from skidpad.evidence.channels.timing import MODULES
 from skidpad.live.watch import Timer, watch
 from skidpad.recording.hazards.records import read_hazards
+from skidpad.recording.hazards.searched import add_search
 from skidpad.report.channels.data import load_drive
 from skidpad.report.channels.figures import risk, timing
 from skidpad.report.channels.page import drive_page, write_drive_report
@@ -42,6 +43,16 @@ def test_the_page_holds_every_part_and_needs_no_network(folder):
     assert not re.search(r'(src|href)="(?!#|data:)|url\(', text.replace("url(#", ""))
     assert 'class="worlds"' in text
     assert "Ego tailgated at" in text
+
+
+def test_what_a_search_around_a_hazard_came_to_stands_on_its_card(folder):
+    one = next(read_hazards(folder))
+    add_search(folder, one.id, ["It would have been a crash with OthersPace 1.1 instead of 1."])
+    assert "crash with OthersPace 1.1" in write_drive_report(folder).read_text()
+    (folder / "searches.json").write_text('{"h1": 3}')
+    with pytest.raises(InputError, match=r"searches\.json"):
+        load_drive(folder)
+    (folder / "searches.json").unlink()
 
 
 @pytest.mark.req("C-033", "C-104")

@@ -11,6 +11,7 @@ from skidpad.core.vocabulary import HazardType
 from skidpad.recording.campaign.searches import read_hazard, read_search, read_trials
 from skidpad.recording.channels.cycles import cycles
 from skidpad.recording.hazards.records import HazardRecord, HazardWriter, encode_record
+from skidpad.recording.hazards.searched import read_searches
 from skidpad.scenarios.export.hazard_export import export_hazard
 from skidpad.search.hazard import prepare_scene
 
@@ -78,6 +79,8 @@ def test_the_scene_is_as_recorded_and_a_change_of_half_a_second_makes_it_a_crash
     assert "h0001 (crossing_object): as recorded the least gap was" in text
     assert "It would have been a crash with" in text
     assert "times as likely as the likeliest ones" in text
+    (sentence, crash, likely) = read_searches(out.parent / "monitor")["h0001"]
+    assert all(told in text for told in (sentence, crash, likely))
     assert "The hazard" in (out / "report.html").read_text(encoding="utf-8")
 
 

@@ -8,7 +8,7 @@ fast the others go through their ways.
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import atan2, cos, hypot, sin
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -56,6 +56,7 @@ class Scene:
         varied: the same with parameters, in which the ego is driven.
         variables: what varies, and how.
         values: of the parameters as they were recorded.
+        monitored: the monitor's folder that holds the hazard, and its id there; None: it is no such one.
     """
 
     title: str
@@ -63,6 +64,7 @@ class Scene:
     varied: Path
     variables: tuple[Variable, ...]
     values: dict[str, float]
+    monitored: tuple[Path, str] | None = None
 
 
 def prepare_scene(source: Path, id: str | None, out: Path) -> Scene:
@@ -92,7 +94,11 @@ def prepare_scene(source: Path, id: str | None, out: Path) -> Scene:
         write_bytes(road, known.read_bytes())
     else:
         _centre_lane(road)
-    return _write_scene(exported, f"{record.id} ({record.type.value})", folder, known is not None)
+    scene = _write_scene(exported, f"{record.id} ({record.type.value})", folder, known is not None)
+    if source.is_file() and source.name != TEXT_FILE:
+        return scene
+    kept = source if source.is_dir() else source.parent
+    return replace(scene, monitored=(kept, record.id))
 
 
 def choose_record(source: Path, id: str | None) -> HazardRecord:

@@ -109,6 +109,23 @@ def search(
     from skidpad.report.search import write_search_report
 
     typer.echo(write_search_report(how.out))
+    if scene is not None and scene.monitored is not None:
+        _tell_monitor(how.out, *scene.monitored)
+
+
+def _tell_monitor(out: Path, folder: Path, id: str) -> None:
+    """Add what was found to the page of the hazard, where the monitor's folder has one."""
+    from skidpad.recording.campaign.searches import read_hazard
+    from skidpad.recording.channels.monitored import SUMMARY
+    from skidpad.recording.hazards.searched import add_search
+    from skidpad.report.channels.page import write_drive_report
+    from skidpad.report.search import hazard_sentences
+
+    hazard = read_hazard(out)
+    assert hazard is not None
+    add_search(folder, id, hazard_sentences(hazard))
+    if (folder / SUMMARY).is_file():
+        typer.echo(f"hazard: {write_drive_report(folder)}")
 
 
 def _drive(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from skidpad.evidence.channels.timing import TIMES
 from skidpad.recording.channels.indicators import read_indicators
 from skidpad.recording.channels.monitored import SUMMARY, read_summary, read_timing
 from skidpad.recording.hazards.records import HazardRecord, read_hazards
+from skidpad.recording.hazards.searched import Searches, read_searches
 
 Floats = NDArray[np.float64]
 
@@ -48,6 +49,7 @@ class MonitoredDrive:
     records: tuple[HazardRecord, ...]
     timing: pl.DataFrame | None
     thresholds: dict[AnyIndicator, Threshold]
+    searches: Searches = field(default_factory=dict)
 
     @property
     def channels(self) -> Sequence[str]:
@@ -126,4 +128,5 @@ def load_drive(folder: Path) -> MonitoredDrive:
         records=tuple(read_hazards(folder)),
         timing=read_timing(folder, TIMES),
         thresholds=load_thresholds(),
+        searches=read_searches(folder),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -181,7 +182,9 @@ def _hazards(drive: MonitoredDrive) -> list[Block]:
         records = [r for r in drive.records if r.type is hazard]
         if records:
             records.sort(key=_severity)
-            cards = [hazard_card(r, r.id in drawn) for r in records[:CARDS]]
+            cards = [
+                hazard_card(r, r.id in drawn, drive.searches.get(r.id, ())) for r in records[:CARDS]
+            ]
             blocks.append(Cards(tables.NAMES[hazard], cards, open=records[0].id in drawn))
             if len(records) > CARDS:
                 left = len(records) - CARDS
@@ -202,8 +205,11 @@ def _severity(record: HazardRecord) -> tuple[bool, float]:
     return _candidate(record.type.value), record.extremes.get("safety_score", 1.0)
 
 
-def hazard_card(record: HazardRecord, drawn: bool) -> Card:
-    """Draws what was found, which objects are involved, and the worlds as the channels saw them."""
+def hazard_card(record: HazardRecord, drawn: bool, searched: Sequence[str] = ()) -> Card:
+    """Draws what was found, which objects are involved, and the worlds as the channels saw them.
+
+    searched: sentences of a search around the hazard.
+    """
     duration = record.t_end - record.t_start
     facts = [
         ("rule fired", f"{record.count} cycles in {duration:.1f} s"),
@@ -220,6 +226,7 @@ def hazard_card(record: HazardRecord, drawn: bool) -> Card:
         chain.append("No objects were paired between the channels, so their agreement is assumed.")
     if "cut" in record.flags:
         chain.append("The record is cut: the drive or the record's limit ended it.")
+    chain += searched
     return Card(
         title=f"{tables.NAMES[record.type]} at {record.t_start:.1f} s",
         subtitle=f"{record.id}, rules {record.profile}",

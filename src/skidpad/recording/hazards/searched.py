@@ -1,0 +1,33 @@
+"""What searches around the hazards of a drive came to: `searches.json` in a monitor's folder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from skidpad.core.reading import decode_json, read_bytes
+from skidpad.recording.files import write_bytes
+
+SEARCHES = "searches.json"
+Searches = dict[str, tuple[str, ...]]  # sentences by the hazard's id
+
+
+def read_searches(folder: Path) -> Searches:
+    """Return what is known of each hazard that was searched; {} where none was.
+
+    Raises:
+        FileError: the file is damaged.
+    """
+    path = folder / SEARCHES
+    if not path.is_file():
+        return {}
+    found: Searches = decode_json(read_bytes(path, SEARCHES), str(path), Searches)
+    return found
+
+
+def add_search(folder: Path, id: str, sentences: Sequence[str]) -> None:
+    """Add what a search around a hazard came to; it replaces an earlier one."""
+    found = read_searches(folder) | {id: tuple(sentences)}
+    write_bytes(folder / SEARCHES, msgspec.json.format(msgspec.json.encode(found)))

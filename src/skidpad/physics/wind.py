@@ -10,7 +10,7 @@ Assumptions: that scaling, the side area as 0.8 of length times height, the 2 m^
 
 Gusts are a Gauss-Markov process along and across the wind: Dryden's first-order filter (MIL-STD-8785C)
 with a length of 50 m and an intensity that the run says, one for all vehicles: assumptions.
-Valid: mean wind to 30 m/s, vehicles that roll on four wheels. Roll is not modelled.
+Valid: mean wind to 30 m/s, vehicles that roll on four wheels. It acts at the centre of gravity.
 """
 
 from __future__ import annotations

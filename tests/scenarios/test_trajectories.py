@@ -21,6 +21,7 @@ from tests.scenarios.files import (
     to,
     told,
 )
+from tests.scenarios.oracle.actions import timing
 
 from skidpad.core.errors import InputError
 from skidpad.core.geometry import wrap_angle
@@ -131,6 +132,27 @@ def test_a_spline_of_order_two_is_its_polygon(tmp_path):
     rows = rows_of(tmp_path, follow(f'<Nurbs order="2">{points}{knots}</Nurbs>'), end=6.0)
     assert rows[40].x == pytest.approx(210.0, abs=0.02)
     assert rows[80].y == pytest.approx(-1.75 - 3.5 * 10.0 / hypot(20.0, 3.5), abs=0.02)
+
+
+def timed_spline(*times):
+    points = "".join(
+        f'<ControlPoint time="{t}"><Position>{world(x, -1.75)}</Position></ControlPoint>'
+        for x, t in zip((200, 220, 240), times, strict=True)
+    )
+    knots = "".join(f'<Knot value="{k}"/>' for k in (0, 0, 0, 1, 1, 1))
+    return follow(f'<Nurbs order="3">{points}{knots}</Nurbs>', timing())
+
+
+def test_time_is_a_dimension_of_the_control_points_of_a_spline(tmp_path):
+    """Half of a parabola: x = 220 m where t = 0.25 * 0 + 0.5 * 3 + 0.25 * 4 s, 1 s after the begin."""
+    rows = rows_of(tmp_path, timed_spline(0, 3, 4), end=6.0)
+    assert rows[70].x == pytest.approx(220.0, abs=0.1)
+    assert rows[100].x == pytest.approx(240.0, abs=0.1)
+
+
+def test_times_of_control_points_must_not_fall(tmp_path):
+    with pytest.raises(InputError, match="the times of its control points must not fall"):
+        rows_of(tmp_path, timed_spline(0, 5, 4), end=1.0)
 
 
 @pytest.mark.parametrize(

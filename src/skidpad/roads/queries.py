@@ -226,6 +226,10 @@ class RoadMap:
         value = float(entries.sample(self.held, point.lane, point.s)[8])
         return None if value != value else value
 
+    def bank(self, point: LanePoint) -> float:
+        """Returns how far the road leans to the right at a place of a lane, rad."""
+        return float(entries.sample(self.held, point.lane, point.s)[7])
+
     def on_lane(self, road: int, lane_id: int, s_road: float) -> LanePoint:
         """OpenDRIVE coordinates to a place; ConfigError when there is no such lane."""
         lanes = ((self.lanes.road == road) & (self.lanes.lane_id == lane_id)).nonzero()[0]

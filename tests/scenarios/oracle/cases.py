@@ -38,7 +38,7 @@ from tests.scenarios.oracle.actions import (
     timing,
 )
 from tests.scenarios.oracle.conditions import conditions
-from tests.scenarios.oracle.ends import at_once, backwards, without_road
+from tests.scenarios.oracle.ends import at_once, at_the_same_time, backwards, without_road
 from tests.scenarios.oracle.everywhere import everywhere
 from tests.scenarios.oracle.pairs import pairs
 from tests.scenarios.oracle.settings import BEGIN, NORTH, SETTINGS, WEST, Case, case, moving, turned
@@ -94,6 +94,8 @@ def actions() -> Iterator[Case]:
         "lane_change", "on_foot", lane_change('<AbsoluteTargetLane value="-2"/>', "linear", 7)
     )
     yield case("lane_offset", "on_foot", lane_offset(0.4, a=0.1))
+    for name in ("lane_offset", "lane_change_relative", "lane_offset_step"):
+        yield case(name, "banked", ACTIONS[name])
     yield case("profile", "straight", profile((14, 2), (6, 4)))
     yield case("profile_jerk_up", "straight", smooth_profile(18, up=2, down=3))
     yield case("profile_jerk_down", "curve", smooth_profile(4, up=1, down=2))
@@ -276,6 +278,7 @@ def trajectories() -> Iterator[Case]:
     yield from backwards()
     yield from without_road()
     yield from at_once()
+    yield from at_the_same_time()
     yield case(
         "track_speed",
         "straight",

@@ -65,3 +65,15 @@ def without_road() -> Iterator[Case]:
             "stories": "",
         }
         yield Case(f"track_no_road_{name}", "straight", parts, 8.0)
+
+
+def at_the_same_time() -> Iterator[Case]:
+    """A change of speed and a line that end in one step: the entity goes on at the last speed."""
+    line = private(trajectory((150.0, -1.75), (173.75, -1.75)))
+    both = f'{line}</Action><Action name="v">{private(speed(to(14), "linear", 2))}'
+    parts = {
+        "entities": vehicle("ego") + vehicle("other"),
+        "init": moving("ego", on_lane(-2, 100), 12) + moving("other", on_lane(-1, 140), 10),
+        "stories": story(event("e", both, time(0.975))),
+    }
+    yield Case("track_end_with_speed_straight", "straight", parts, 6.0)

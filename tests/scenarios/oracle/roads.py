@@ -22,15 +22,17 @@ def road(
     id: int = 1,
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
     heights: str = '<elevation s="0" a="0" b="0" c="0" d="0"/>',
+    banks: str = "",
 ) -> str:
     """A road of one or two pieces, a line before an arc; the arc begins where the line ends."""
     x, y, heading = start
     plan, s = "", 0.0
+    lateral = f"<lateralProfile>{banks}</lateralProfile>" if banks else "<lateralProfile/>"
     for length, shape in pieces:
         plan += f'<geometry s="{s}" x="{x}" y="{y}" hdg="{heading}" length="{length}">{shape}</geometry>'
         x, s = x + length, s + length
     return f"""<road name="" length="{s}" id="{id}" junction="-1"><link/><planView>{plan}</planView>
-<elevationProfile>{heights}</elevationProfile><lateralProfile/><lanes><laneSection s="0">
+<elevationProfile>{heights}</elevationProfile>{lateral}<lanes><laneSection s="0">
 <left>{LEFT}</left><center><lane id="0" type="none" level="false"/></center><right>{RIGHT}</right>
 </laneSection></lanes></road>"""
 
@@ -110,6 +112,9 @@ ROADS = {
     "void": VOID,
     "curve": network(road((100.0, LINE), (300.0, ARC.format(1 / 120)))),
     "hill": network(road((800.0, LINE), heights=RISE)),
+    "banked": network(
+        road((600.0, LINE), banks='<superelevation s="0" a="0.5" b="0" c="0" d="0"/>')
+    ),
     "fork": fork(),
     "cross": network(road((600.0, LINE)), road((400.0, LINE), id=2, start=(200.0, -200.0, pi / 2))),
 }

@@ -76,6 +76,12 @@ SETTINGS: dict[str, tuple[str, bool, str, str]] = {
         moving("ego", on_lane(-2, 60), 12),
         moving("other", on_lane(-1, 90), 10),
     ),
+    "banked": (
+        "banked",
+        False,
+        moving("ego", on_lane(-2, 60), 12),
+        moving("other", on_lane(-1, 90, 1.3), 10),
+    ),
     "oncoming": (
         "straight",
         False,

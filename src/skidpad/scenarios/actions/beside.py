@@ -75,12 +75,12 @@ class LateralDistance:
         return self.distance + 0.5 * (actor.entity.box.width + other.entity.box.width)
 
 
-def reference_pose(other: Actor) -> Pose:
+def reference_pose(scene: Scene, other: Actor) -> Pose:
     """Returns where an entity is, with what actions of this step have moved it aside so far."""
     guide = other.guide
     if not other.placed_by_file or other.track is not None or guide.base is None:
         return other.pose
-    return replace(guide.base.pose.moved(left=guide.offset), yaw=other.pose.yaw)
+    return replace(scene.network.aside(guide.base, guide.offset), yaw=other.pose.yaw)
 
 
 class DistanceKept:
@@ -143,13 +143,13 @@ class DistanceKept:
     def _end(self, scene: Scene, base: LanePoint) -> float:
         """The offset at which the distance is kept, m; the sides are those of the other entity."""
         action, here = self.action, self.actor.guide.offset
-        other = reference_pose(scene.actors[action.other])
+        other = reference_pose(scene, scene.actors[action.other])
         size = action.size(scene, self.actor)
         near, left = scene.network.abreast(base, other.x, other.y)
         if not action.straight:
             along = 1.0 if cos(near.heading - other.yaw) >= 0.0 else -1.0
             return left + self.sign * along * size
-        at = base.pose.moved(left=here)
+        at = scene.network.aside(base, here)
         _, now = between(other, at.x, at.y)
         c = cos(base.heading - other.yaw)
         return here if abs(c) < ASKEW else here + (self.sign * size - now) / c

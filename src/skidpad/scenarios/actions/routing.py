@@ -267,6 +267,8 @@ def go_on_after_track(actor: Actor, network: Network) -> None:
     v, actor.v_after_track = actor.v_after_track, None
     if v is None or actor.track is None:
         return
+    if not actor.track.timed:
+        v = actor.guide.v  # which an action of this step may have changed since the end was reached
     actor.follow_road(network, v)
     if network.stand_in:
         actor.guide = Guide(network, Place(actor.pose), v)

@@ -207,7 +207,10 @@ def _integrate(
 def nurbs(
     order: int, points: Sequence[Vertex], weights: Sequence[float], knots: Sequence[float]
 ) -> list[Vertex]:
-    """Points of a rational B-spline; time runs evenly along it where its ends have times."""
+    """Points of a rational B-spline; time is a dimension of it where every point has one.
+
+    It runs evenly along the spline where only the ends have times.
+    """
     from scipy.interpolate import BSpline  # 20 MB that only a file with splines needs
 
     degree, n = order - 1, len(points)
@@ -224,8 +227,12 @@ def nurbs(
     t0, t1 = points[0].time, points[-1].time
     if t0 is None or t1 is None or t1 <= t0:
         return [Vertex(x, y, z) for x, y, z in xyz.tolist()]
-    s = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(xyz[:, :2], axis=0).T))))
-    t = t0 + (t1 - t0) * s / max(float(s[-1]), NEAR)
+    times = [p.time for p in points if p.time is not None]
+    if len(times) == n:
+        t = BSpline(np.array(knots), w * times, degree)(u) / rows[:, 3]
+    else:
+        s = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(xyz[:, :2], axis=0).T))))
+        t = t0 + (t1 - t0) * s / max(float(s[-1]), NEAR)
     return [
         Vertex(x, y, z, None, when)
         for (x, y, z), when in zip(xyz.tolist(), t.tolist(), strict=True)

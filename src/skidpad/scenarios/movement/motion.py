@@ -115,7 +115,7 @@ class Guide:
         target = self.network.beside(self.base, lane_id)
         if target is None:
             return None
-        old = self.base.pose.moved(left=self.offset)
+        old = self.network.aside(self.base, self.offset)
         point, left = self.network.abreast(target, old.x, old.y)
         if cos(point.heading - self.base.heading) < 0.0:
             self.along, self.offset_rate = -self.along, -self.offset_rate
@@ -128,7 +128,7 @@ class Guide:
             return None
         sense = self.along if self.v >= 0.0 else -self.along
         further = self.network.ahead(self.base, sense * way, self.roads)
-        return None if further is None else further.pose.moved(left=offset)
+        return None if further is None else self.network.aside(further, offset)
 
     def demand(self, motion: Motion) -> Demand:
         """Goes on by one step, and returns what a driver has to do in it."""
@@ -203,7 +203,7 @@ class Guide:
     def _current_pose(self) -> Pose:
         """Returns the pose in the world at the lateral offset, with the yaw turned for a change of offset."""
         assert self.base is not None
-        pose = self.base.pose.moved(left=self.offset)
+        pose = self.network.aside(self.base, self.offset)
         turn = self.turn
         if self.offset_rate and abs(self.v) > SLOW:
             drift = 0.0 if self.adds_offset else self.offset_rate

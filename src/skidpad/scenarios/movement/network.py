@@ -72,17 +72,37 @@ class Network:
     def place_of(self, pose: Pose) -> Place:
         """A pose with the lane under it: a driving lane where there is one, else any."""
         for driving in (True, False):
-            point = self.map.project(pose.x, pose.y, pose.z, driving=driving)
+            point = self._project(pose, driving)
             if point is not None and abs(point.offset) <= 0.5 * point.width + ON_LANE:
                 return Place(replace(pose, z=point.z), point)
-        return Place(pose, self.map.project(pose.x, pose.y, pose.z))
+        return Place(pose, self._project(pose, True))
+
+    def _project(self, pose: Pose, driving: bool) -> LanePoint | None:
+        """Returns the nearest lane's point, with the offset across the road, banked as it is."""
+        point = self.map.project(pose.x, pose.y, pose.z, driving=driving)
+        if point is None or not self.is_banked:
+            return point
+        return replace(point, offset=point.offset / self.lean(point))
+
+    @cached_property
+    def is_banked(self) -> bool:
+        """Tells whether any lane of the map is banked."""
+        return bool(np.any(self.map.samples.bank))
+
+    def lean(self, point: LanePoint) -> float:
+        """Returns how long a metre across the road is, seen from above."""
+        return cos(self.map.bank(point)) if self.is_banked else 1.0
+
+    def aside(self, point: LanePoint, left: float) -> Pose:
+        """Returns the pose `left` m beside a lane's centre, measured across the road."""
+        return point.pose.moved(left=left * self.lean(point))
 
     def on_lane(self, road: int, lane: int, s: float, offset: float) -> Place:
         """Returns a place on a lane, `offset` m to the left of increasing s; ConfigError where none is."""
         point = self.map.on_lane(road, lane, s)
         left = offset if self.forward(point) else -offset
         point = replace(point, offset=left)
-        return Place(point.pose.moved(left=left), point)
+        return Place(self.aside(point, left), point)
 
     def within(self, road: int, lane: int, s: float) -> float:
         """Returns s, or the nearest end of the lane where the lane does not reach to s, as esmini does."""
@@ -115,7 +135,7 @@ class Network:
         s = self.map.s_road(point)
         at = road_place(self.roads[point.road], s, 0.0)
         dx, dy = pose.x - at.x, pose.y - at.y
-        t = dy * cos(at.heading) - dx * sin(at.heading)
+        t = (dy * cos(at.heading) - dx * sin(at.heading)) / self.lean(point)
         return RoadCoordinates(point.road, s, t, wrap_angle(pose.yaw - at.heading))
 
     def is_void(self, point: LanePoint) -> bool:
@@ -180,7 +200,7 @@ class Network:
                 break
             near = further
         dx, dy = x - near.x, y - near.y
-        return near, dy * cos(near.heading) - dx * sin(near.heading)
+        return near, (dy * cos(near.heading) - dx * sin(near.heading)) / self.lean(near)
 
     def ahead(self, point: LanePoint, distance: float, roads: tuple[int, ...]) -> LanePoint | None:
         """The place further along; at forks towards the given roads, else straight on."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
-from math import pi
+from math import cos, pi
 from typing import Protocol
 
 from skidpad.core.errors import ConfigError
@@ -154,7 +154,7 @@ class RelativeLane:
         aligned = network.forward(point)
         left = self.offset if (aligned or self.along_lane) else -self.offset
         base = point.heading if (aligned or self.along_lane) else point.heading + pi
-        spot = point.pose.moved(left=left)
+        spot = network.aside(point, left)
         pose = replace(spot, yaw=self.facing.turned(wrap_angle(base)))
         return Place(pose, replace(point, offset=left))
 
@@ -192,7 +192,8 @@ class RelativeObject:
         """Returns the place as seen from the entity's present pose."""
         pose = scene.actors[self.other].pose
         if self.own_axes:
-            moved = pose.moved(forward=self.dx, left=self.dy)
+            roll = scene.network.slopes(pose)[1] if scene.network.is_banked else 0.0
+            moved = pose.moved(forward=self.dx, left=self.dy * cos(roll))
         else:
             moved = replace(pose, x=pose.x + self.dx, y=pose.y + self.dy)
         return scene.network.place_of(replace(moved, yaw=self.facing.turned(pose.yaw)))

@@ -96,10 +96,10 @@ class OnRoute:
             there = network.on_road(point.road, network.map.s_road(point), self.offset).pose
             _, left = between(point.pose, there.x, there.y)
             there = replace(there, yaw=self.facing.turned(point.heading))
-            return Place(there, replace(point, offset=left))
+            return Place(there, replace(point, offset=left / network.lean(point)))
         point = network.beside(point, self.lane_id) or point
         left = self.offset if network.forward(point) else -self.offset
-        pose = point.pose.moved(left=left)
+        pose = network.aside(point, left)
         pose = replace(pose, yaw=self.facing.turned(pose.yaw))
         return Place(pose, replace(point, offset=left))
 

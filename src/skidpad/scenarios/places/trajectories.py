@@ -71,9 +71,10 @@ def compile_trajectory(node: Node, ctx: Context) -> Trajectory:
 
 
 def _check_times(shape: Node, times: Sequence[float | None]) -> None:
-    """Vertices stand in the order of their times."""
+    """Vertices or control points stand in the order of their times."""
     if any(a is not None and b is not None and b < a for a, b in pairwise(times)):
-        raise shape.error("the times of its vertices must not fall")
+        what = "control points" if shape.tag == "Nurbs" else "vertices"
+        raise shape.error(f"the times of its {what} must not fall")
 
 
 def _polyline(shape: Node) -> tuple[list[Node], Shape]:
@@ -184,6 +185,7 @@ def _nurbs(shape: Node) -> tuple[list[Node], Shape]:
     order = shape.whole("order")
     nodes = list(shape.children("ControlPoint"))
     times = [n.number("time") if n.has("time") else None for n in nodes]
+    _check_times(shape, times)
     weights = [n.number("weight", 1.0) for n in nodes]
     knots = [k.number("value") for k in shape.children("Knot")]
     if order < 2 or len(nodes) < order:

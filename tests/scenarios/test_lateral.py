@@ -19,6 +19,7 @@ from tests.scenarios.files import (
     to,
     told,
 )
+from tests.scenarios.oracle.roads import network, road
 
 
 def lane_change(target, shape="sinusoidal", value=4, dimension="time", offset=0.0):
@@ -52,6 +53,17 @@ def test_the_way_of_a_lane_change_is_as_long_as_the_speed_says(tmp_path, shape):
     assert rows[-1].y == pytest.approx(-5.25, abs=1e-3)
     assert way(rows) == pytest.approx(10.0 * 9.0, abs=0.02)
     assert rows[-1].x < 120.0 + 90.0 - 0.2  # the way aside is no way ahead
+
+
+def test_no_step_beside_a_lane_is_longer_than_the_speed_says_where_a_bend_begins(tmp_path):
+    """10 m/s, 3 m outside the centre of a lane that turns with a radius of 12 m from s = 100 m on."""
+    bend = network(road((100.0, "<line/>"), (18.0, '<arc curvature="0.0833333"/>')))
+    (tmp_path / "bend.xodr").write_text(bend, encoding="utf-8")
+    begins = at("ego", -2, 10) + init("other", teleport(on_lane(-1, 89.6, -3.0)), speed(to(10)))
+    parts = {"road": '<LogicFile filepath="bend.xodr"/>', "init": begins, "end": 2.0}
+    rows = told(tmp_path, **parts).of("other")
+    steps = [hypot(b.x - a.x, b.y - a.y) for a, b in itertools.pairwise(rows)]
+    assert max(steps) == pytest.approx(0.5, rel=0.02)
 
 
 @pytest.mark.osc("AbsoluteTargetLane")

@@ -227,6 +227,8 @@ class Actor:
         """The word to the backend for the step from t to t + dt."""
         if self.word is not None:
             word, self.word = self.word, None
+            if word.place is not None and self.placed_by_file:
+                word = replace(word, speed=self.guide.v)  # which this step may have set since
             if self.appears and self.placed_by_file:
                 word = replace(self._place_command(t + dt, dt), present=True)
             self.appears = False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from math import atan2, cos, pi, sin, sqrt
+from math import atan2, cos, hypot, pi, sin, sqrt
 
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.roads.queries import LanePoint
@@ -13,6 +13,7 @@ from skidpad.simulation.scripted import Demand, Motion
 
 SLOW = 1e-6  # m/s, nothing moves
 STEEPEST_TURN = pi / 2.0 - 1e-3  # rad, of an actor against its lane while it goes sideways
+CHANGED = 1e-3  # of that length in a step, beyond which it is measured
 SQUEEZED = 0.1  # least length of a path beside a bend's inner side, per length of the lane
 
 
@@ -164,10 +165,20 @@ class Guide:
         drift = 0.0 if self.adds_offset else abs(self.offset_rate) * dt
         sideways = min(drift + abs(aside), abs(way))
         forward = sqrt(way * way - sideways * sideways)
-        squeezed = max(1.0 - self.base.curvature * self.offset, SQUEEZED)
-        distance = self.along * ((forward if way >= 0.0 else -forward) + leap) / squeezed
-        self._move(distance)
+        self._move(self._along_lane(self.along * ((forward if way >= 0.0 else -forward) + leap)))
         return self._current_pose()
+
+    def _along_lane(self, way: float) -> float:
+        """Returns how far along the lane so many m beside it lead; where the bend changes, as measured."""
+        assert self.base is not None
+        bend, offset = self.base.curvature, self.offset
+        distance = way / max(1.0 - bend * offset, SQUEEZED)
+        further = self.network.ahead(self.base, distance, self.roads) if offset else None
+        if further is None or abs((further.curvature - bend) * offset) < CHANGED:
+            return distance
+        here, there = (self.network.aside(p, offset) for p in (self.base, further))
+        moved = hypot(there.x - here.x, there.y - here.y)
+        return distance * abs(way) / moved if moved > 0.0 else distance
 
     def _move(self, distance: float) -> None:
         """Moves the base point by a distance in m along the roads; at the end of the road it stops."""

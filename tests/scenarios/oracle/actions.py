@@ -21,6 +21,16 @@ def profile(*entries: tuple[float, float], other: str = "") -> str:
     )
 
 
+def round_profile(*entries: tuple[float, float]) -> str:
+    """Speeds with the times between them, followed within limits of jerk."""
+    rows = "".join(f'<SpeedProfileEntry speed="{v}" time="{t}"/>' for v, t in entries)
+    bounds = """<DynamicConstraints maxAcceleration="5" maxDeceleration="8" maxSpeed="60"
+maxAccelerationRate="4" maxDecelerationRate="3"/>"""
+    return longitudinal(
+        f'<SpeedProfileAction followingMode="follow">{bounds}{rows}</SpeedProfileAction>'
+    )
+
+
 def smooth_profile(*entries: float, up: float, down: float) -> str:
     """Speeds one after the other without times, followed within limits of jerk, m/s^3."""
     rows = "".join(f'<SpeedProfileEntry speed="{v}"/>' for v in entries)

@@ -33,6 +33,7 @@ from tests.scenarios.oracle.actions import (
     limits,
     profile,
     relative,
+    round_profile,
     shape_of,
     smooth_profile,
     timing,
@@ -99,6 +100,10 @@ def actions() -> Iterator[Case]:
     yield case("profile", "straight", profile((14, 2), (6, 4)))
     yield case("profile_jerk_up", "straight", smooth_profile(18, up=2, down=3))
     yield case("profile_jerk_down", "curve", smooth_profile(4, up=1, down=2))
+    yield case("profile_corners", "straight", round_profile((16, 3), (4, 4), (12, 3)))
+    first = f'{speed(to(3))}</PrivateAction></Action><Action name="then"><PrivateAction>'
+    yield case("profile_after_step", "straight", first + profile((9, 3), (6, 2)))
+    yield case("speed_after_step", "straight", first + speed(to(12), "linear", 4))
     yield case("profile_relative", "curve", profile((2, 2), (-3, 3), other="ego"))
     yield case(
         "speed_followed",

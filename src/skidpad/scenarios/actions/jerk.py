@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import copysign, inf, sqrt
 
@@ -71,6 +71,44 @@ def smooth_pieces(
         peak / fall, reached + sign * peak * held, sign * peak, -sign * fall if fall < inf else 0.0
     )
     yield from (up, hold, down)
+
+
+def round_corners(
+    v: float, a: float, points: Sequence[tuple[float, float]], jerk: Jerk
+) -> list[Piece] | None:
+    """Returns a course along straight lines between speeds, with its corners rounded.
+
+    points: durations, s, and the speeds at their ends. The acceleration is `a` at the begin and 0 at
+    the end. None where two corners overlap.
+    """
+    lines: list[tuple[float, float]] = []  # acceleration, and speed at time 0
+    t, before = 0.0, v
+    for duration, end in points:
+        slope = (end - before) / duration
+        if not lines or abs(slope - lines[-1][0]) > SAME_SLOPE:
+            lines.append((slope, before - slope * t))
+        t, before = t + duration, end
+    if abs(lines[-1][0]) > SAME_SLOPE:
+        lines.append((0.0, before))
+    pieces: list[Piece] = []
+    now, slope, level = 0.0, a, v
+    for k, (aimed, its_level) in enumerate(lines):
+        change = aimed - slope
+        rate = jerk.up if change > 0.0 else -jerk.down
+        lasts = change / rate
+        begin = (its_level - level) / -change - 0.5 * lasts if k else 0.0
+        if begin < now:
+            return None
+        pieces.append(Piece(begin - now, v, slope, 0.0))
+        v += slope * (begin - now)
+        pieces.append(Piece(lasts, v, slope, rate if lasts else 0.0))
+        v += 0.5 * (slope + aimed) * lasts
+        now, slope = begin + lasts, aimed
+        level = v - slope * now
+    return pieces
+
+
+SAME_SLOPE = 1e-6  # m/s^2
 
 
 def settle(v: float, a: float, jerk: Jerk) -> Piece:

@@ -13,6 +13,7 @@ from skidpad.scenarios.actions.jerk import (
     Piece,
     SmoothProfile,
     pieces_over,
+    round_corners,
     settle,
     smooth_pieces,
 )
@@ -65,6 +66,7 @@ class Speed:
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """Begins the change from the speed demanded so far."""
+        finish_step(scene, actor)
         v, limits = actor.guide.v, actor.entity.performance
         asked = self.target.speed(scene)
         end = limit_speed(asked, limits)
@@ -118,6 +120,13 @@ class Speed:
         going = SmoothChange(actor, scene.t, [first, *pieces], end, follow)
         actor.pace_by(going, scene)
         return going
+
+
+def finish_step(scene: Scene, actor: Actor) -> None:
+    """Sets the speed of a change at once that has begun in this step, for an action that begins after it."""
+    going = actor.longitudinal
+    if isinstance(going, ChangeOfSpeed) and going.action.at_once and going.began == scene.t:
+        actor.guide.v = going.change.end
 
 
 def acceleration_under_way(actor: Actor) -> float:
@@ -262,6 +271,7 @@ class Profile:
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """Begins the profile from the speed demanded so far."""
+        finish_step(scene, actor)
         own = actor.entity.performance if self.following is Following.FOLLOW else Performance()
         jerk = Jerk(min(self.jerk.up, own.a_rate), min(self.jerk.down, own.b_rate))
         if jerk.is_limited:
@@ -272,7 +282,12 @@ class Profile:
         return going
 
     def _smooth(self, scene: Scene, actor: Actor, jerk: Jerk) -> Running:
-        """Returns the profile with limits of jerk: at each of its speeds the acceleration is 0."""
+        """Returns the profile with limits of jerk, several speeds with rounded corners.
+
+        Where corners overlap the acceleration is 0 at each of its speeds.
+        """
+        if len(self.entries) > 1 and (going := self._rounded(scene, actor, jerk)):
+            return going
         base = 0.0 if self.other is None else scene.actors[self.other].v_told
         own, v = actor.entity.performance, actor.guide.v
         pieces: list[Piece] = []
@@ -283,6 +298,28 @@ class Profile:
             pieces += smooth_pieces(v, end, min(*most, DEFAULT_CHANGE), jerk, duration)
             v = end
         return SmoothProfile(actor, scene.t, pieces, v)
+
+    def _rounded(self, scene: Scene, actor: Actor, jerk: Jerk) -> Running | None:
+        """Returns the profile as straight lines with rounded corners; None where that cannot be.
+
+        A first entry at time 0 says nothing: it has the speed that it has.
+        """
+        base = 0.0 if self.other is None else scene.actors[self.other].v_told
+        own, v = actor.entity.performance, actor.guide.v
+        points: list[tuple[float, float]] = []
+        for entry, duration in self.entries[self.entries[0][1] == 0.0 :]:
+            end = limit_speed(base + entry, own)
+            most = (self.limits.a_max, own.a_max) if end > v else (self.limits.b_max, own.b_max)
+            least = abs(end - v) / min(*most, DEFAULT_CHANGE)
+            takes = least if duration is None else max(duration, least)
+            if takes > 0.0:
+                points.append((takes, end))
+            elif end != v or duration is not None:
+                return None
+            v = end
+        a = acceleration_under_way(actor)
+        pieces = round_corners(actor.guide.v, a, points, jerk) if points else None
+        return None if pieces is None else SmoothProfile(actor, scene.t, pieces, v)
 
     def _straight(self, scene: Scene, actor: Actor) -> Running:
         """Returns the profile as straight lines between its speeds."""

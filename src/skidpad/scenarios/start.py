@@ -102,9 +102,12 @@ def _private(node: Node, ctx: Context, wishes: dict[str, _Wish]) -> None:
             action = ctx.attempt(partial(private_action, one, ctx))
             if isinstance(action, Teleport):
                 wish.positions.append(action.position)
-            elif isinstance(action, Speed) and action.at_once and not action.target.continuous:
+                continue
+            if isinstance(action, Speed) and action.at_once:
                 wish.speed = action
-            elif action is not None:
+                if not action.target.continuous:
+                    continue
+            if action is not None:
                 wish.actions.append(action)
 
 
@@ -144,6 +147,8 @@ class _Starting:
             self._known[key] = _ASKED
             self._known[key] = make()
         if self._known[key] is _ASKED:
+            if key == "speed" and self.wish.speed and self.wish.speed.target.continuous:
+                return 0.0  # a circle of speeds that are kept to begins at a stand
             raise self.wish.node.error(f"the {key} of {self.name!r} depends on itself")
         return self._known[key]
 

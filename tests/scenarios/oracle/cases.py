@@ -100,6 +100,10 @@ def actions() -> Iterator[Case]:
     yield case("profile", "straight", profile((14, 2), (6, 4)))
     yield case("profile_jerk_up", "straight", smooth_profile(18, up=2, down=3))
     yield case("profile_jerk_down", "curve", smooth_profile(4, up=1, down=2))
+    for name, then in (("soon", smooth_profile(4, up=4, down=3)), ("timed", round_profile((5, 5)))):
+        more = story(event("then", private(then), time(2.575)), name="b")
+        first = smooth_profile(20, up=2, down=3)
+        yield case(f"profile_under_way_{name}", "straight", first, more=more)
     yield case("profile_corners", "straight", round_profile((16, 3), (4, 4), (12, 3)))
     first = f'{speed(to(3))}</PrivateAction></Action><Action name="then"><PrivateAction>'
     yield case("profile_after_step", "straight", first + profile((9, 3), (6, 2)))

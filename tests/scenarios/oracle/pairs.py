@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from tests.scenarios.files import (
     by_entity,
     event,
+    init,
     on_lane,
     private,
     speed,
@@ -43,6 +44,18 @@ def speeds() -> Iterator[Case]:
         yield case("speed_moving", setting, action, more=ego_speeds(6, 3.0))
     too_fast = speed(relative(0, continuous=True), "step")
     yield case("speed_within_limits", "straight", too_fast, more=ego_speeds(40, 1.0))
+
+
+def speeds_from_the_begin() -> Iterator[Case]:
+    """A speed that is kept to another one's from the begin is there at time 0."""
+    kept = speed(relative(2, continuous=True))
+    parts = {
+        "entities": vehicle("ego") + vehicle("other"),
+        "init": moving("ego", on_lane(-2, 100), 12)
+        + init("other", teleport(on_lane(-1, 130)), kept),
+        "stories": ego_speeds(20),
+    }
+    yield Case("init_speed_kept_straight", "straight", parts, 6.0)
 
 
 CLEAR = """<RelativeClearanceCondition freeSpace="{}" distanceForward="{}" distanceBackward="20"
@@ -147,6 +160,7 @@ def pairs() -> Iterator[Case]:
     yield from road_ends()
     yield from routes()
     yield from speeds()
+    yield from speeds_from_the_begin()
     yield from rooms()
     yield from group_twice()
     yield from coming()

@@ -101,11 +101,46 @@ def round_corners(
             return None
         pieces.append(Piece(begin - now, v, slope, 0.0))
         v += slope * (begin - now)
-        pieces.append(Piece(lasts, v, slope, rate if lasts else 0.0))
+        pieces.append(Piece(lasts, v, slope, rate if abs(rate) < inf else 0.0))
         v += 0.5 * (slope + aimed) * lasts
         now, slope = begin + lasts, aimed
         level = v - slope * now
     return pieces
+
+
+SAME_SLOPE = 1e-6  # m/s^2
+
+
+def pieces_under_way(
+    v: float, a: float, end: float, most: float, jerk: Jerk, duration: float | None
+) -> list[Piece] | None:
+    """Returns a change of speed that begins with an acceleration and ends without one.
+
+    None where the acceleration lies beyond what the change needs.
+    """
+    size = end - v
+    mean = size / duration if duration else copysign(most, size)
+    first = jerk.up if mean > a else -jerk.down
+    last = -jerk.down if mean > 0.0 else jerk.up
+    if first * last >= 0.0:
+        return None
+    ramps, gain = 0.5 / first - 0.5 / last, size + 0.5 * a * a / first
+    if ramps == 0.0 or gain / ramps < 0.0:
+        return None
+    peak = copysign(sqrt(gain / ramps), mean)
+    time = a / first + (duration or 0.0)
+    room = time * time - 4.0 * ramps * gain
+    if duration is not None and time > 0.0 and room > 0.0:
+        peak = 2.0 * gain / (time + sqrt(room))
+    peak = copysign(min(abs(peak), most), peak)
+    if peak == 0.0 or (peak - a) / first < 0.0:
+        return None
+    held = max((size - 0.5 * (peak * peak - a * a) / first + 0.5 * peak * peak / last) / peak, 0.0)
+    rise = Piece((peak - a) / first, v, a, first if abs(first) < inf else 0.0)
+    reached = v + 0.5 * (peak + a) * rise.duration
+    hold = Piece(held, reached, peak, 0.0)
+    fall = Piece(-peak / last, reached + peak * held, peak, last if abs(last) < inf else 0.0)
+    return [rise, hold, fall]
 
 
 SAME_SLOPE = 1e-6  # m/s^2
@@ -143,6 +178,7 @@ def pieces_over(v: float, end: float, most: float, jerk: Jerk, way: float) -> li
 
 
 BISECTIONS = 50
+ROUNDING = 1e-9  # s, of sums of steps
 
 
 class SmoothProfile:
@@ -157,7 +193,7 @@ class SmoothProfile:
             return True
         t, guide = scene.t + scene.dt - self.began, self.actor.guide
         for piece in self.pieces:
-            if t < piece.duration:
+            if t < piece.duration - ROUNDING:
                 guide.v, guide.a = piece.at(t)
                 return False
             t -= piece.duration

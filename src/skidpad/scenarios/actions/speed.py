@@ -13,6 +13,7 @@ from skidpad.scenarios.actions.jerk import (
     Piece,
     SmoothProfile,
     pieces_over,
+    pieces_under_way,
     round_corners,
     settle,
     smooth_pieces,
@@ -286,7 +287,7 @@ class Profile:
 
         Where corners overlap the acceleration is 0 at each of its speeds.
         """
-        if len(self.entries) > 1 and (going := self._rounded(scene, actor, jerk)):
+        if going := self._rounded(scene, actor, jerk):
             return going
         base = 0.0 if self.other is None else scene.actors[self.other].v_told
         own, v = actor.entity.performance, actor.guide.v
@@ -317,8 +318,15 @@ class Profile:
             elif end != v or duration is not None:
                 return None
             v = end
-        a = acceleration_under_way(actor)
-        pieces = round_corners(actor.guide.v, a, points, jerk) if points else None
+        a, now = acceleration_under_way(actor), actor.guide.v
+        pieces = None
+        if len(self.entries) > 1 and points:
+            pieces = round_corners(now, a, points, jerk)
+        elif points and a != 0.0:
+            most = own.a_max if v > now else own.b_max
+            asked = self.limits.a_max if v > now else self.limits.b_max
+            limit = min(most, asked, DEFAULT_CHANGE)
+            pieces = pieces_under_way(now, a, v, limit, jerk, self.entries[0][1])
         return None if pieces is None else SmoothProfile(actor, scene.t, pieces, v)
 
     def _straight(self, scene: Scene, actor: Actor) -> Running:

@@ -51,7 +51,9 @@ PARTIAL: Mapping[str, str] = MappingProxyType(
         "FollowTrajectoryAction": FOLLOW,
         "LaneChangeAction": FOLLOW,
         "SpeedAction": "limits of jerk act under `follow`, not on a target that goes on changing",
-        "SpeedProfileAction": "limits of jerk act under `follow`; where corners overlap each speed with acceleration 0",
+        "SpeedProfileAction": (
+            "limits of jerk act under `follow`; where corners overlap each speed with acceleration 0"
+        ),
         "LongitudinalDistanceAction": (
             "axes of the world and of trajectories are those of the entity; braking ends at once"
         ),

@@ -287,7 +287,7 @@ class Profile:
 
         Where corners overlap the acceleration is 0 at each of its speeds.
         """
-        if going := self._rounded(scene, actor, jerk):
+        if going := self._round_off(scene, actor, jerk):
             return going
         base = 0.0 if self.other is None else scene.actors[self.other].v_told
         own, v = actor.entity.performance, actor.guide.v
@@ -300,7 +300,7 @@ class Profile:
             v = end
         return SmoothProfile(actor, scene.t, pieces, v)
 
-    def _rounded(self, scene: Scene, actor: Actor, jerk: Jerk) -> Running | None:
+    def _round_off(self, scene: Scene, actor: Actor, jerk: Jerk) -> Running | None:
         """Returns the profile as straight lines with rounded corners; None where that cannot be.
 
         A first entry at time 0 says nothing: it has the speed that it has.

@@ -44,6 +44,7 @@ from tests.scenarios.oracle.everywhere import everywhere
 from tests.scenarios.oracle.pairs import pairs
 from tests.scenarios.oracle.settings import BEGIN, NORTH, SETTINGS, WEST, Case, case, moving, turned
 from tests.scenarios.oracle.sideways import sideways
+from tests.scenarios.oracle.turns import turns
 
 
 def ego_does(action: str, t: float = 2.975) -> str:
@@ -374,6 +375,7 @@ CASES: dict[str, Case] = {
         sideways,
         pairs,
         everywhere,
+        turns,
     )
     for c in part()
 }

@@ -219,7 +219,8 @@ class Guide:
         if self.offset_rate and abs(self.v) > SLOW:
             drift = 0.0 if self.adds_offset else self.offset_rate
             forward = sqrt(max(self.v**2 - drift**2, 0.0))
-            lean = min(max(atan2(self.offset_rate, forward), -STEEPEST_TURN), STEEPEST_TURN)
+            across = self.offset_rate * self.network.lean(self.base)
+            lean = min(max(atan2(across, forward), -STEEPEST_TURN), STEEPEST_TURN)
             turn = self.along * (lean if self.v > 0.0 else -lean)
         yaw = pose.yaw + turn if self.along > 0.0 else pose.yaw + pi + turn
         return Pose(pose.x, pose.y, pose.z, yaw=wrap_angle(yaw))

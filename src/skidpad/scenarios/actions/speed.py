@@ -323,9 +323,8 @@ class Profile:
         if len(self.entries) > 1 and points:
             pieces = round_corners(now, a, points, jerk)
         elif points and a != 0.0:
-            most = own.a_max if v > now else own.b_max
-            asked = self.limits.a_max if v > now else self.limits.b_max
-            limit = min(most, asked, DEFAULT_CHANGE)
+            bounds = (self.limits.a_max, own.a_max) if v > now else (self.limits.b_max, own.b_max)
+            limit = min(*bounds, DEFAULT_CHANGE)
             pieces = pieces_under_way(now, a, v, limit, jerk, self.entries[0][1])
         return None if pieces is None else SmoothProfile(actor, scene.t, pieces, v)
 

@@ -28,6 +28,7 @@ from tests.scenarios.oracle.actions import (
     lane_offset,
     limits,
     relative,
+    round_profile,
     smooth_profile,
 )
 
@@ -100,6 +101,17 @@ def test_the_acceleration_of_a_profile_is_bounded_and_noted(tmp_path):
     (note,) = found
     assert note.startswith("<SpeedProfileAction> of other: maxAcceleration 3 m/s^2 asked, 2 m/s^2 ")
     assert note.endswith("(that of its <Performance> or 10)")
+
+
+def test_the_time_of_a_rounded_profile_is_bounded_and_noted(tmp_path):
+    """30 m/s in 2 s are 10 m/s^2; the file allows 5."""
+    found, _ = notes(tmp_path, round_profile((30, 2), (20, 4)), end=9.0)
+    assert found == [
+        (
+            "<SpeedProfileAction> of other: duration 2 s asked, 4 s applied "
+            "(limits of <Performance> and of the file)"
+        )
+    ]
 
 
 @pytest.mark.parametrize(

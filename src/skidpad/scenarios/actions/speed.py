@@ -294,7 +294,7 @@ class Profile:
         pieces: list[Piece] = []
         for entry, duration in self.entries:
             end = limit_speed(base + entry, own)
-            note_bound(scene, actor, PROFILE, base + entry, end, "speed, m/s, maxSpeed")
+            note_bound(scene, actor, PROFILE, base + entry, end, MAX_SPEED)
             most = (self.limits.a_max, own.a_max) if end > v else (self.limits.b_max, own.b_max)
             pieces += smooth_pieces(v, end, min(*most, DEFAULT_CHANGE), jerk, duration)
             v = end
@@ -313,6 +313,10 @@ class Profile:
             most = (self.limits.a_max, own.a_max) if end > v else (self.limits.b_max, own.b_max)
             least = abs(end - v) / min(*most, DEFAULT_CHANGE)
             takes = least if duration is None else max(duration, least)
+            note_bound(scene, actor, PROFILE, base + entry, end, MAX_SPEED)
+            if duration:
+                of = "duration, s, limits of <Performance> and of the file"
+                note_bound(scene, actor, PROFILE, duration, takes, of)
             if takes > 0.0:
                 points.append((takes, end))
             elif end != v or duration is not None:
@@ -337,7 +341,7 @@ class Profile:
         times, speeds = [scene.t], [actor.guide.v]
         for entry, duration in self.entries:
             v = limit_speed(base + entry, own)
-            note_bound(scene, actor, PROFILE, base + entry, v, "speed, m/s, maxSpeed")
+            note_bound(scene, actor, PROFILE, base + entry, v, MAX_SPEED)
             needed = abs(v - speeds[-1]) / (a if v > speeds[-1] else b)
             times.append(times[-1] + (needed if duration is None else duration))
             speeds.append(v)

@@ -222,6 +222,7 @@ def player() -> str:
 
 
 CSS = """\
+.highlight code { white-space: pre-wrap; overflow-wrap: anywhere; }
 figure.replay, figure.worlds { width: 100%; max-width: 760px; margin: .6rem 0 2rem; }
 figure.worlds { max-width: none; }
 figure.replay canvas, figure.worlds canvas { width: 100%; display: block; border-radius: 6px; }

@@ -69,7 +69,8 @@ def test_no_walk_over_the_controls_ends_a_drive(browser, tmp_path):
             "() => document.querySelector('.stage canvas')?.width === 800", timeout=WAIT
         )
         choose(page, "grip", "statistical")
-        choose(page, "weather (N)", "snow")
+        page.get_by_text("the published formula for wet and icy roads").wait_for()
+        choose(page, "weather (N)", "Packed snow")
         page.get_by_text("needs the physical grip model").wait_for()
         page.get_by_text("pictures (G)").click()
         seen = {}

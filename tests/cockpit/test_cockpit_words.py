@@ -1,6 +1,7 @@
 """What a page may say: words that cannot be are refused in the page, and the drive goes on."""
 
 import random
+from multiprocessing import Pipe
 
 import msgspec
 import numpy as np
@@ -8,10 +9,10 @@ import pytest
 from producers import bridge
 
 from skidpad.cockpit.hud import stopping_distance
-from skidpad.cockpit.words import Word, encode
+from skidpad.cockpit.words import Link, Word, encode
 from skidpad.core.inputs import Sky
 from skidpad.core.run import Function
-from skidpad.core.vocabulary import GripModel
+from skidpad.core.vocabulary import GripModel, RangeModel
 from skidpad.physics.grip import grip_params, mu_at
 from skidpad.physics.presets import all_presets, preset
 
@@ -45,6 +46,31 @@ def test_a_combination_that_cannot_be_is_refused_in_words_and_nothing_is_set():
     assert made.say("a", "hour") is None
     assert made.producer.words[-1].input.grip is GripModel.STATISTICAL
     assert "only on roads" in made.say("a", "crowd", 3)
+
+
+def test_a_weather_is_said_in_a_line_of_what_lies_on_the_road_and_the_grip_that_is_left():
+    pytest.importorskip("nicegui", reason="nicegui is not installed (extra cockpit)")
+    from skidpad.cockpit.page import MEANINGS, describe_weather
+
+    for weather in all_presets().values():
+        said = describe_weather(weather, GripModel.PHYSICAL)
+        grip = float(said.split("grip ")[1].split(" ")[0])
+        road = grip_params(weather, GripModel.PHYSICAL)
+        assert grip == pytest.approx(float(mu_at(road, 80.0 / 3.6)), abs=0.005)
+        assert ("of ice" in said) is (weather.ice_thickness > 0.0), weather.name
+    assert describe_weather(preset("clear-noon"), GripModel.NONE).startswith("dry road; ")
+    assert set(MEANINGS["grip"]) == {model.value for model in GripModel}
+    assert set(MEANINGS["range"]) == {model.value for model in RangeModel}
+
+
+def test_the_page_may_ask_for_a_run_to_be_driven_again():
+    made, (ours, theirs) = bridge(), Pipe()
+    assert made.say("a", "again", "ice") is None
+    (word,) = made.producer.words
+    link = Link(theirs)
+    ours.send_bytes(encode(word))
+    assert link.drain(1.0)
+    assert link.again == "ice"
 
 
 def test_no_word_of_a_page_ends_a_drive():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from enum import Enum
+from functools import lru_cache
 from importlib import resources
 from typing import Any
 from uuid import uuid4
@@ -16,9 +17,11 @@ from nicegui.events import GenericEventArguments
 from skidpad.cockpit.about import About
 from skidpad.cockpit.bridge import LAMP_ORDER, Bridge
 from skidpad.cockpit.hud import TIERS
+from skidpad.core.geometry import mps_from_kmh
 from skidpad.core.run import Function
 from skidpad.core.vocabulary import GripModel, RangeModel
-from skidpad.core.weather import RANGES
+from skidpad.core.weather import RANGES, Weather
+from skidpad.physics.grip import grip_params, mu_at, road_surface
 from skidpad.physics.presets import all_presets
 from skidpad.sensors.finish.extras import Extra
 from skidpad.stack.functions import FUNCTIONS
@@ -46,6 +49,18 @@ EXTRAS = {
     Extra.SNOW: "snow on the road",
     Extra.CALM: "less camera noise",
 }
+MEANINGS = {
+    "grip": {
+        "none": "tyres grip as on a dry road",
+        "statistical": "the published formula for wet and icy roads",
+        "physical": "water, ice and snow under each wheel, by speed",
+    },
+    "range": {
+        "none": "depth, labels and radar see through any weather",
+        "physical": "rain, fog and snow shorten what sensors see",
+    },
+}
+SHOWN_SPEED = mps_from_kmh(80.0)
 RATES = {0.25: "0.25 x", 0.5: "0.5 x", 1.0: "1 x", 2.0: "2 x", 4.0: "4 x", 0.0: "as fast as it can"}
 Keys = list[tuple[str, str]]  # a key, and what it does
 KEYS_OF_VIEWS: Keys = [
@@ -246,14 +261,15 @@ def _has(names: list[str] | None, name: str) -> bool | None:
 
 def weather_controls(panel: Panel) -> None:
     """Weather by name and by slider, and how it acts."""
-    names = list(all_presets())
+    titles = {name: one.title or name for name, one in all_presets().items()}
     with ui.element("div").classes("selects"):
         weather = ui.select(
-            names,
+            titles,
             label="weather (N)",
             on_change=lambda e: panel.changed("weather", e.value, "weather", e.value),
         ).props("dense outlined options-dense")
-        panel.follow("weather", weather, lambda seat: _known_name(seat.get("weather"), names))
+        panel.follow("weather", weather, lambda seat: _known_name(seat.get("weather"), titles))
+        meaning_line(panel, meaning_of_weather)
         acting_select(panel, "grip", GripModel)
         acting_select(panel, "range", RangeModel)
     with ui.element("div").classes("sliders"):
@@ -271,6 +287,35 @@ def acting_select(panel: Panel, word: str, kinds: type[Enum]) -> None:
         on_change=lambda e: panel.changed(word, e.value, word, e.value),
     )
     panel.follow(word, select.props("dense outlined options-dense"), lambda seat: seat.get(word))
+    meaning_line(panel, lambda seat: MEANINGS[word].get(seat.get(word, ""), ""))
+
+
+def meaning_line(panel: Panel, read: Callable[[dict[str, Any]], str]) -> None:
+    """Draws the line below a choice that says what the chosen one means."""
+    line = ui.label("").classes("help meaning")
+
+    def sync(seat: dict[str, Any]) -> None:
+        line.text = read(seat)
+
+    panel.syncing.append(sync)
+
+
+def meaning_of_weather(seat: dict[str, Any]) -> str:
+    """Returns water, ice, snow and grip of the weather of a seat."""
+    sky = seat.get("sky")
+    if not sky:
+        return ""
+    return describe_weather(Weather(**sky), GripModel(seat.get("grip", GripModel.PHYSICAL.value)))
+
+
+@lru_cache(maxsize=64)
+def describe_weather(weather: Weather, model: GripModel) -> str:
+    """Returns what lies on the road in a weather, and the grip at 80 km/h that a model leaves."""
+    surface = road_surface(weather)
+    depths = (("water", surface.film_mm), ("ice", surface.ice_mm), ("snow", surface.snow_mm))
+    lies = [f"{depth:.1f} mm of {name}" for name, depth in depths if depth >= 0.05]
+    grip = float(mu_at(grip_params(weather, model), SHOWN_SPEED))
+    return f"{', '.join(lies) or 'dry road'}; grip {grip:.2f} at 80 km/h"
 
 
 def weather_slider(panel: Panel, field: str, title: str) -> None:
@@ -298,6 +343,6 @@ def crowd_slider(panel: Panel) -> None:
     panel.follow("crowd", slider, lambda seat: seat.get("crowd"))
 
 
-def _known_name(name: str | None, names: list[str]) -> str | None:
+def _known_name(name: str | None, names: Mapping[str, str]) -> str | None:
     """Returns the name where it is one of the names, else None."""
     return name if name in names else None

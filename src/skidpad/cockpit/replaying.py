@@ -118,7 +118,7 @@ class Replayer:
         self._from(self.k)
 
     def _drive_again(self, change: str) -> None:
-        """Drives the run with one thing changed and shows that beside it; the page waits meanwhile."""
+        """Drives the run with one thing changed and shows both from the opening on; the page waits."""
         self.link.again = None
         self.note = "driving it again, please wait ..."
         self.show()
@@ -128,7 +128,7 @@ class Replayer:
             self.note = f"beside it: {self.other.folder}"
         except SkidpadError as error:
             self.note = str(error)
-        self._from(self.k)
+        self._from(index_at(self.source, opening_tick(self.source)))
         self.show()
 
     def _is_taken(self) -> bool:

@@ -84,7 +84,7 @@ class Warehouse:
 
     @property
     def _database(self) -> duckdb.DuckDBPyConnection:
-        """Returns the connection to the warehouse's file, opened on first use."""
+        """Returns the connection to the warehouse's file, opened on first use; FileError where it cannot."""
         if self._opened is None:
             try:
                 opened = duckdb.connect(str(self.path))
@@ -139,7 +139,7 @@ class Warehouse:
         self._whole = False
 
     def moments(self, column: str | None, tenant: str, days: int) -> list[Moments]:
-        """Lists moments by indicator and stretch of days; column: which must be the tenant's, None: all."""
+        """Lists sums over vehicles of counts and their products, per indicator and stretch of `days` days."""
         told: dict[str, object] = {"days": days}
         right = "true"
         if column is not None:

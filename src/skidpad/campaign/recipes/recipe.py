@@ -48,7 +48,7 @@ class Driven(Generic[K, M]):
 
 
 def nothing_else(tasks: Sequence[Any], out: Path, runner: Runner) -> None:
-    """A recipe that leaves results and nothing besides."""
+    """Does nothing: the `finish` of recipes that leave only results."""
     del tasks, out, runner
 
 

@@ -221,6 +221,7 @@ def die_with_parent() -> None:
     assert parent is not None
 
     def watch() -> None:
+        """Waits for the parent's end, then kills this process and all that it started."""
         wait([parent.sentinel])
         _kill_group(os.getpid())  # with what it started
         os._exit(1)

@@ -200,7 +200,7 @@ def _check(path: Path, course: Scenario) -> None:
 
 
 def _is_clean(file: Path, course: Scenario) -> bool:
-    """Say everything that is found in a file, and in each choice where it is a distribution."""
+    """Prints all that is found in a file or its choices; returns whether everything can be played."""
     from skidpad.campaign.driving.run_setup import check_scenario
     from skidpad.campaign.recipes.files import courses_of
     from skidpad.core.errors import FileError

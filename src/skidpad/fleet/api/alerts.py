@@ -84,7 +84,7 @@ def escalate(request: Request, who: Answerer, alert: str) -> dict[str, Any]:
 
 @router.post("/{alert}/close")
 def close(request: Request, who: Answerer, alert: str) -> dict[str, Any]:
-    """Nothing more is to be done."""
+    """Closes an alert; returns it."""
     return keep_answer(fleet_of(request), who, alert, What.CLOSED)
 
 

@@ -46,7 +46,7 @@ def errors_of(
 def _errors(
     cycles: Sequence[Cycle], channels: Sequence[str], settings: MonitorSettings, true: list[Span]
 ) -> Errors:
-    """Returns a monitor's false and missed hazards in the cycles, and the kinds that it found."""
+    """Counts false and missed hazards of scored kinds, with all kinds found."""
     monitor = Monitor(channels, settings)
     for cycle in cycles:
         monitor.update(cycle)

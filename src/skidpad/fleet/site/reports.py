@@ -23,7 +23,7 @@ ROWS = 200  # of the export that its page shows, newest first
 
 
 def places_of(fleet: Fleet, who: Principal) -> list[PlaceRow]:
-    """What the page of places shows."""
+    """Lists hazards by place and weather that `who` may see, most frequent first; from 3 vehicles on."""
     with fleet.engine.connect() as connection:
         return places(connection, who)
 

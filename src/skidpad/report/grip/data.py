@@ -121,7 +121,7 @@ class GripCampaign(CampaignView[GripEntry]):
 
     @cached_property
     def distances(self) -> dict[Key, dict[str, Distance]]:
-        """Reduced against original, of every metric and cell."""
+        """Returns warping distances of reduced against original grip, by cell that has both, then metric."""
         found = {}
         for key, pair in self.pairs.items():
             a, b = self.series(pair, ORIGINAL), self.series(pair, REDUCED)

@@ -275,7 +275,7 @@ def _parking(read: Reader, road: RoadRecord, node: Node) -> ParkingSpace:
 
 
 def _places(read: Reader, node: Node) -> Iterator[tuple[float, float, float]]:
-    """(s, t, height) of the object or of its repetitions."""
+    """Returns (s, t, zOffset) in m of an object's corners or repeated places."""
     repeats = node.findall("repeat")
     if not repeats:
         yield read.number(node, "s"), read.number(node, "t"), read.number(node, "zOffset", 0.0)

@@ -56,7 +56,7 @@ class ToldEvent(StatefulElement):
         self.happened_at: float | None = None  # s, the first time
 
     def due(self, scene: Scene) -> bool:
-        """The trigger fires, and the event may still run."""
+        """Tells whether the trigger fires, executions are left and it is not running."""
         fires = not self.watch or self.watch.fires(scene)
         return fires and self.left > 0 and not self.running
 

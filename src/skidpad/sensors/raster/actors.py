@@ -53,7 +53,7 @@ def make_actors(table: ActorTable) -> Actors:
 
 
 def place_actors(states: ActorStates, out: Actors) -> None:
-    """Write attitude, position and presence of all actors into `out`."""
+    """Writes each actor's rotation matrix, position and presence into `out`."""
     cr, sr = np.cos(states.roll), np.sin(states.roll)
     cp, sp = np.cos(states.pitch), np.sin(states.pitch)
     cy, sy = np.cos(states.yaw), np.sin(states.yaw)

@@ -71,7 +71,7 @@ class Channel:
         self._params = self._params._replace(speed_factor=factor)
 
     def update(self, view: ChannelView) -> ChannelFrame:
-        """What this channel says; `command` is then what it would do."""
+        """Tracks, predicts and plans one cycle; returns the frame and sets `self.command`."""
         self.tracker.update(view)
         rows = self.tracker.confirmed
         objects = self.tracker.objects(view.ego)

@@ -207,7 +207,7 @@ class Radar:
         self.reset()
 
     def reset(self) -> None:
-        """Resets the velocity limit to that of the first measurement."""
+        """Resets the limit of range rates to its value before any measurement."""
         self.velocity_limit = FIRST_VELOCITY_LIMIT
 
     def update(

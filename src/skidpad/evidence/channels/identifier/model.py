@@ -77,7 +77,7 @@ class Model:
 
     @property
     def sees_labels(self) -> bool:
-        """Whether among these are some that nearly are its labels."""
+        """Tells whether its features include any outside TRAINED_ON, which are near its labels."""
         return not set(self.features) <= set(TRAINED_ON)
 
     def trained_on(self) -> set[tuple[str, str]]:

@@ -166,7 +166,7 @@ def look(channels: Sequence[str], cycles: Sequence[Cycle]) -> list[Looked]:
 def _short(
     tracked: Tracked, looked: Sequence[Looked], begin: float
 ) -> dict[HazardType, tuple[Span, ...]]:
-    """Returns the stretches in which gaps are short."""
+    """Returns spans (s) of short gaps ahead and behind that end at `begin` or later."""
     rows = [tracked.distances(*cycle) for cycle in looked]
     t = np.array([cycle.t for cycle in looked])
     short = {

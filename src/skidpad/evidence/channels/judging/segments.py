@@ -108,7 +108,7 @@ def judge(
     context: Mapping[str, str] | None = None,
     timer: Stopwatch | None = None,
 ) -> Segment:
-    """Run all identifiers and the truths over a recording's cycles.
+    """Judges a recording by every rule profile and truth after its warm-up; spans are keyed by profile.
 
     With `curve` the practical rules are applied again with each clause on that signal scaled by
     CURVE_FACTORS (C-105).

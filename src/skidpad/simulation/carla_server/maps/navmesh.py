@@ -127,7 +127,7 @@ def _tree(
 
 
 def _grow(boxes: Boxes, members: NDArray[np.int64], nodes: list[tuple[Boxes, int]]) -> None:
-    """A node for these polygons and, below it, one for each half along the longer axis."""
+    """Appends a tree of boxes: an index is a polygon at leaves, minus the node's count elsewhere."""
     mine = boxes[members]
     around = np.concatenate((mine[:, :3].min(axis=0), mine[:, 3:].max(axis=0)))
     if len(members) == 1:

@@ -92,7 +92,7 @@ def _attachment(kind: Any) -> Attachment:
 
 
 def _spawn(served: Served, members: list[Any], depth: int) -> int:
-    """Spawns or attaches an actor, runs the commands for it that follow, and returns its id."""
+    """Spawns an actor, runs the commands that follow for it (one that fails is skipped), returns its id."""
     if len(members) != 6 or depth > MAX_DEPTH:
         raise wire.WireError("a spawn command has six members and is nested at most four deep")
     description, transform, parent, kind, socket, after = members

@@ -67,7 +67,7 @@ def make_retina(actor: Actor, seed: int) -> Retina:
 
 
 def dynamic_vision(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
-    """The events since the last reading in order of time; nothing when there are none."""
+    """Returns one message with all events since the last reading, or none."""
     retina: Retina = sensor.equipment
     camera = retina.camera
     scene, view = camera.look(around, clock, sensor.actor)

@@ -140,7 +140,7 @@ class Falling:
         return bool(self._moving.rows.simulated[self._moving.row(actor.body or 0)])
 
     def _hold(self, actor: Actor) -> None:
-        """Takes a floating actor off the road: nothing sets its height, and tyres have no friction."""
+        """Takes a floating actor off the road, or puts one that floats no more back."""
         assert actor.body is not None
         floats = self._floats(actor)
         self._moving.set_grounded(actor.body, self._is_simulated(actor) and not floats)

@@ -113,7 +113,7 @@ class CameraDriver:
 
 
 def steer_of(offsets: Floats, v: float) -> float:
-    """Returns steer in [-1, 1] towards the lane's middle (A-142 to A-146); offsets in m at AHEAD, v in m/s."""
+    """Returns steer in [-1, 1] towards the lane's middle; offsets in m at AHEAD, v in m/s (A-142, A-146)."""
     v_kmh = kmh_from_mps(v)
     distance = min(NEARER * lookahead_distance(v_kmh), AHEAD[-1])
     left = float(np.interp(distance, AHEAD, offsets))

@@ -207,14 +207,10 @@ def _integrate(
 def nurbs(
     order: int, points: Sequence[Vertex], weights: Sequence[float], knots: Sequence[float]
 ) -> list[Vertex]:
-<<<<<<< HEAD
     """Points of a rational B-spline; time is a dimension of it where every point has one.
 
     It runs evenly along the spline where only the ends have times.
     """
-=======
-    """Returns points of a rational B-spline; their times are proportional to the distance along it."""
->>>>>>> 353cea6b (docs in code: what two readers of a fresh draw missed; limits of the language lint follow)
     from scipy.interpolate import BSpline  # 20 MB that only a file with splines needs
 
     degree, n = order - 1, len(points)

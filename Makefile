@@ -118,6 +118,7 @@ campaigns: $(VENV)/.installed
 # tables of docs/ from the results that campaigns left in docs/results
 tables: $(VENV)/.installed
 	$(BIN)/python tools/result_tables.py
+	$(BIN)/python tools/benchmarks_page.py
 
 # the documentation as a site in build/site
 docs: $(VENV)/.documented-with

@@ -25,7 +25,7 @@ TITLES: dict[int, str] = {
     0: "baseline, no ADAS",
     1: "ACC only",
     2: "ACC + LCA",
-    3: "ACC + LCA + light assist",
+    3: "ACC + LCA + traffic-light assist",
     4: "full package, 80 km/h limiter",
 }
 

@@ -53,7 +53,7 @@ def _own_functions() -> tuple[FunctionType, ...]:
     titles = {
         Function.ACC: "ACC",
         Function.LCA: "lane centring",
-        Function.TLA: "light assist",
+        Function.TLA: "traffic-light assist",
         Function.RESUME: "resume",
         Function.LIMITER: "limiter",
         Function.AEB: "emergency braking",

@@ -35,7 +35,7 @@ def step_blocks(matrix: Matrix) -> list[Block]:
         return [Text(few_seeds_text(matrix.seeds))]
     intro = Text(
         "The difference that each step makes, paired by weather and seed: second minus first "
-        "configuration. The step from 2 to 4 adds light assist, resume protocol and limiter at once."
+        "configuration. The step from 2 to 4 adds traffic-light assist, resume protocol and limiter at once."
     )
     there = [step for step in STEPS if {*step} <= {*matrix.configs}]
     found = step_differences(matrix, there)

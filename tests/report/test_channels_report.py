@@ -70,7 +70,8 @@ def test_every_indicator_carries_what_a_violation_points_at_into_the_page(folder
     drive_ = load_drive(folder)
     table = next(s for s in drive_page(drive_).sections if s.title == "Indicators").blocks[0]
     audit = json.loads((folder / "monitor.json").read_text())["indicators"]
-    meanings = [drive_.thresholds[Indicator(a["indicator"])].meaning for a in audit]
+    entries = [drive_.thresholds[Indicator(a["indicator"])] for a in audit]
+    meanings = [f"{entry.label}: {entry.meaning}" for entry in entries]
     claimed = [m for m, a in zip(meanings, audit, strict=True) if a["claim"]]
     assert len(claimed) >= 9
     assert all(claimed)

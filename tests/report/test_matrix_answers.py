@@ -272,6 +272,7 @@ def test_rows_that_count_touches_at_the_side_as_struck_from_behind_say_so(tmp_pa
     titles = [title for title, _ in kinds_table(load_matrix(tmp_path)).columns]
     assert ("of these struck from behind" in titles) is graded
     assert ("of these struck from behind or touched sideways" in titles) is not graded
+    assert "rolled over" not in titles  # nobody did
 
 
 def test_results_that_grade_no_contact_say_that_a_crash_is_an_intervention(tmp_path):

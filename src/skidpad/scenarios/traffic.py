@@ -226,6 +226,8 @@ def drive(scene: Scene) -> None:
     """
     for name in list(scene.cruising):
         actor = scene.actors[name]
+        if actor.word is not None and actor.word.place is not None:
+            continue  # it has just appeared, and drives from the next step on
         guide = actor.guide
         if guide.base is None or scene.network.ahead(guide.base, END, guide.roads) is None:
             vanish(scene, actor)

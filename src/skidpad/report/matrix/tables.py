@@ -270,9 +270,14 @@ def possible_part(limits: Interval, column: str, least: float) -> Interval:
 
 
 def kinds_table(matrix: Matrix) -> Table:
-    """What put the car back, as counts of each configuration."""
+    """What put the car back, as counts of each configuration; roll-overs where there were any."""
     titles = {} if matrix.has_grades else UNGRADED_TITLES
-    kinds = [(kind, titles.get(kind, title), words) for kind, title, words in KINDS]
+    rolled = any(matrix.cell(config)["roll_overs"].sum() for config in matrix.configs)
+    kinds = [
+        (kind, titles.get(kind, title), words)
+        for kind, title, words in KINDS
+        if kind != "roll_overs" or rolled
+    ]
     return _counts(matrix, kinds, "What the interventions were: counts, every drive once")
 
 

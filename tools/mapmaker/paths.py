@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import cos, sin
 
@@ -63,9 +63,17 @@ def elements(start: Start, pieces: Sequence[Piece]) -> tuple[Element, ...]:
     return tuple(out)
 
 
+def add_up(values: Iterable[float]) -> float:
+    """Add from left to right with plain roundings; `sum` of Python 3.12 and later adds otherwise."""
+    total = 0.0
+    for value in values:
+        total += value
+    return total
+
+
 def length(pieces: Sequence[Piece]) -> float:
     """Length of a chain of pieces."""
-    return sum(part[0] for piece in pieces for part in _clothoids(piece))
+    return add_up(part[0] for piece in pieces for part in _clothoids(piece))
 
 
 def end(start: Start, pieces: Sequence[Piece]) -> Start:
@@ -87,7 +95,7 @@ def fitted(
         chain[i] = Straight(0.0)
     reached = end(start, [p for p in chain if p != Straight(0.0)])
     headings = [
-        start.heading + sum(p.angle for p in chain[:i] if isinstance(p, Bend)) for i in free
+        start.heading + add_up(p.angle for p in chain[:i] if isinstance(p, Bend)) for i in free
     ]
     directions = np.array([[cos(h) for h in headings], [sin(h) for h in headings]])
     lengths = np.linalg.solve(directions, np.array(target) - (reached.x, reached.y))

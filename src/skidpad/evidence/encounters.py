@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import cos, pi
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -167,8 +168,8 @@ def crossing(one: Body, other: Body, t: Floats) -> float | None:
     a, b = _places(one), _places(other)
     first, second = _select_rows(one, a), _select_rows(other, b)
     x, y, yaw = first.x[:, None], first.y[:, None], first.yaw[:, None]
-    shared = _overlap(x, y, yaw, second.x, second.y, second.yaw, one, other)
-    shared &= _overlap(second.x, second.y, second.yaw, x, y, yaw, other, one)
+    shared = overlap_along(x, y, yaw, second.x, second.y, second.yaw, one, other)
+    shared &= overlap_along(second.x, second.y, second.yaw, x, y, yaw, other, one)
     if not shared.any():
         return None
     apart = np.where(shared, t[a][:, None] - t[b][None, :], np.inf)
@@ -183,8 +184,20 @@ def _places(one: Body) -> NDArray[np.int64]:
     return np.unique(np.append(rows, len(way) - 1))
 
 
-def _overlap(
-    x: Floats, y: Floats, yaw: Floats, x2: Floats, y2: Floats, yaw2: Floats, box: Body, box2: Body
+class Sized(Protocol):
+    """A thing with a box on the ground, m."""
+
+    @property
+    def length(self) -> float:
+        """The size of the box along its heading."""
+
+    @property
+    def width(self) -> float:
+        """The size of the box across its heading."""
+
+
+def overlap_along(
+    x: Floats, y: Floats, yaw: Floats, x2: Floats, y2: Floats, yaw2: Floats, box: Sized, box2: Sized
 ) -> Mask:
     """Return where boxes at all these places overlap along both edges of the first one."""
     c, s = np.cos(yaw), np.sin(yaw)

@@ -130,7 +130,7 @@ def _nearness(trial: Trial) -> str:
     if trial.departed_s is not None:
         return "the ego left the road"
     if trial.min_gap_m is None:
-        return "nobody was met"
+        return "no other road user was met"
     ttc = (
         "" if trial.min_ttc_s is None else f", the least time to collision {trial.min_ttc_s:.1f} s"
     )

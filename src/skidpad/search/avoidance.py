@@ -25,6 +25,7 @@ from skidpad.search.bound import (
     is_in_sight,
     predict_motion,
     replace_places,
+    take_rows,
 )
 
 BEFORE = 10.0  # s before a failure in which its beginning is looked for
@@ -156,22 +157,15 @@ def _others(
         if i == 0 or not track.present[begin:end].any():
             continue
         if i != actor:
-            found.append(_take_rows(track, begin, end))
+            found.append(take_rows(track, begin, end))
             continue
         x, y, yaw = (float(c[last]) for c in track[:3])
         point = road.project(x, y, float(log.actors.z[last, i]))
         follows = point is not None and abs(wrap_angle(yaw - point.heading)) < 0.25 * pi
         along = point.heading if point is not None and follows else yaw
-        cut, speed = _take_rows(track, begin, last + 1), motion_of(log, i).speed[begin : last + 1]
+        cut, speed = take_rows(track, begin, last + 1), motion_of(log, i).speed[begin : last + 1]
         found += continue_track(cut, speed, last - begin, round(AFTER / dt), dt, along)
     return found
-
-
-def _take_rows(track: Track, begin: int, end: int) -> Track:
-    """Returns the track from moment `begin` up to, but without, moment `end`."""
-    x, y, yaw, present = track.x, track.y, track.yaw, track.present
-    part = slice(begin, end)
-    return Track(x[part], y[part], yaw[part], present[part], track.length, track.width)
 
 
 def _standing(log: RunLog, tick: int) -> Track:

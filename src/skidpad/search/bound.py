@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.constants import G
+from skidpad.evidence.encounters import overlap_along
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -88,15 +89,8 @@ class Start:
 
 def boxes_overlap(a: Track, b: Track) -> Mask:
     """Return where two boxes overlap, by the normals of their edges; places broadcast."""
-    dx, dy, turn = b.x - a.x, b.y - a.y, b.yaw - a.yaw
-    along, across = np.abs(np.cos(turn)), np.abs(np.sin(turn))
-    found = np.ones(np.broadcast(dx, turn).shape, dtype=bool)
-    for one, other in ((a, b), (b, a)):
-        c, s = np.cos(one.yaw), np.sin(one.yaw)
-        ahead, left = np.abs(dx * c + dy * s), np.abs(dy * c - dx * s)
-        found &= ahead <= 0.5 * (one.length + other.length * along + other.width * across)
-        found &= left <= 0.5 * (one.width + other.length * across + other.width * along)
-    return found
+    found: Mask = overlap_along(a.x, a.y, a.yaw, b.x, b.y, b.yaw, a, b)
+    return found & overlap_along(b.x, b.y, b.yaw, a.x, a.y, a.yaw, b, a)
 
 
 def predict_motion(track: Track, motion: Motion, rows: NDArray[np.int64]) -> Track:
@@ -117,6 +111,13 @@ def predict_motion(track: Track, motion: Motion, rows: NDArray[np.int64]) -> Tra
 def replace_places(track: Track, x: Floats, y: Floats, yaw: Floats) -> Track:
     """Return a box of the same size at other places."""
     return Track(x, y, yaw, np.ones(np.shape(x), dtype=bool), track.length, track.width)
+
+
+def take_rows(track: Track, begin: int, end: int) -> Track:
+    """Return the track from row `begin` up to, but without, row `end`."""
+    x, y, yaw, present = track.x, track.y, track.yaw, track.present
+    part = slice(begin, end)
+    return Track(x[part], y[part], yaw[part], present[part], track.length, track.width)
 
 
 def is_in_sight(eye: Track, seen: Track, others: Sequence[Track], row: int) -> bool:
@@ -180,9 +181,7 @@ def find_avoidance(
     free = np.ones(len(aims), dtype=bool)
     for other in others:
         n = min(len(other.x), rows)
-        other = replace_places(other, other.x[:n], other.y[:n], other.yaw[:n])._replace(
-            present=other.present[:n]
-        )
+        other = take_rows(other, 0, n)
         part = Track(ego.x[:, :n], ego.y[:, :n], ego.yaw[:, :n], ego.present[:, :n], *ego[4:])
         free &= ~(boxes_overlap(part, other) & other.present).any(axis=1)
     order = sorted(np.flatnonzero(free), key=lambda k: abs(np.nan_to_num(aims[k] - start.offset)))

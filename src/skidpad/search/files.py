@@ -85,4 +85,9 @@ def write_choices(path: Path, scenario: str, trials: Sequence[Trial]) -> None:
                 text = value if isinstance(value, str) else repr(value)
                 ElementTree.SubElement(one, "ParameterAssignment", parameterRef=name, value=text)
     ElementTree.indent(root)
+    write_xml(path, root)
+
+
+def write_xml(path: Path, root: ElementTree.Element) -> None:
+    """Write an XML tree to a file in UTF-8 with its declaration."""
     write_bytes(path, ElementTree.tostring(root, encoding="utf-8", xml_declaration=True))

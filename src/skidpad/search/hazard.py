@@ -36,6 +36,7 @@ from skidpad.scenarios.export.hazard_export import export_hazard
 from skidpad.scenarios.reading.document import parse
 from skidpad.search.exported import ExportedHazard, Way
 from skidpad.search.failures import find_border
+from skidpad.search.files import write_xml
 from skidpad.search.loop import SCENE, drive_all
 from skidpad.search.margin import NO_CONFLICT
 from skidpad.search.trial import Point, describe_run
@@ -153,7 +154,7 @@ def _centre_lane(road: Path) -> None:
     h, half = float(line.attrib["hdg"]), 0.5 * float(width.attrib["a"])
     line.set("x", repr(float(line.attrib["x"]) - half * sin(h)))
     line.set("y", repr(float(line.attrib["y"]) + half * cos(h)))
-    write_bytes(road, ElementTree.tostring(root, encoding="utf-8", xml_declaration=True))
+    write_xml(road, root)
 
 
 def _write_scene(source: Path, title: str, folder: Path, is_road_known: bool = False) -> Scene:
@@ -172,15 +173,10 @@ def _write_scene(source: Path, title: str, folder: Path, is_road_known: bool = F
         logic.set("filepath", str((source.parent / logic.attrib["filepath"]).resolve()))
     recorded, varied = folder / "recorded.xosc", folder / "varied.xosc"
     folder.mkdir(parents=True, exist_ok=True)
-    _write(recorded, copy.deepcopy(root))
+    write_xml(recorded, copy.deepcopy(root))
     variables, values = found.add_parameters(way)
-    _write(varied, root)
+    write_xml(varied, root)
     return Scene(title, recorded, varied, variables, values)
-
-
-def _write(path: Path, root: ElementTree.Element) -> None:
-    """Writes an XML tree to a file in UTF-8 with its declaration."""
-    write_bytes(path, ElementTree.tostring(root, encoding="utf-8", xml_declaration=True))
 
 
 def _bend_of(way: Way) -> float:

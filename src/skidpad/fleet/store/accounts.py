@@ -43,7 +43,7 @@ def find_tenant(connection: Connection, name: str) -> str:
         str(r.name): str(r.id) for r in connection.execute(select(tenants.c.id, tenants.c.name))
     }
     if name not in known:
-        names = ", ".join(sorted(known)) or "nobody yet"
+        names = ", ".join(sorted(known)) or "none yet"
         raise ConfigError(f"unknown operator {name!r}; the fleet knows: {names}")
     return known[name]
 

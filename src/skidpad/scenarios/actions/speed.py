@@ -310,8 +310,7 @@ class Profile:
         points: list[tuple[float, float]] = []
         for entry, duration in self.entries[self.entries[0][1] == 0.0 :]:
             end = limit_speed(base + entry, own)
-            most = (self.limits.a_max, own.a_max) if end > v else (self.limits.b_max, own.b_max)
-            least = abs(end - v) / min(*most, DEFAULT_CHANGE)
+            least = abs(end - v) / self._largest_change(own, end > v)
             takes = least if duration is None else max(duration, least)
             note_bound(scene, actor, PROFILE, base + entry, end, MAX_SPEED)
             if duration:
@@ -327,8 +326,7 @@ class Profile:
         if len(self.entries) > 1 and points:
             pieces = round_corners(now, a, points, jerk)
         elif points and a != 0.0:
-            bounds = (self.limits.a_max, own.a_max) if v > now else (self.limits.b_max, own.b_max)
-            limit = min(*bounds, DEFAULT_CHANGE)
+            limit = self._largest_change(own, v > now)
             pieces = pieces_under_way(now, a, v, limit, jerk, self.entries[0][1])
         return None if pieces is None else SmoothProfile(actor, scene.t, pieces, v)
 
@@ -346,6 +344,12 @@ class Profile:
             times.append(times[-1] + (needed if duration is None else duration))
             speeds.append(v)
         return Profiled(actor, times, speeds)
+
+    def _largest_change(self, own: Performance, is_faster: bool) -> float:
+        """Return the largest acceleration, or deceleration, of the profile, m/s^2."""
+        if is_faster:
+            return min(self.limits.a_max, own.a_max, DEFAULT_CHANGE)
+        return min(self.limits.b_max, own.b_max, DEFAULT_CHANGE)
 
     def _most(self, scene: Scene, actor: Actor, name: str, asked: float, own: float) -> float:
         """Returns the acceleration of an entry without a time; says where it is not the file's."""

@@ -3,6 +3,7 @@
     python tools/channels_campaign.py --out out/channels --hours 50        # about 1.5 h on two cores
     python tools/channels_campaign.py --out out/channels --hours 50 --publish
     python tools/channels_campaign.py --only rules --out out/channels --workers 16 --stop-after 540
+    python tools/channels_campaign.py --only rules --table further --out out/channels --publish
 
 Parts on seeds of their own, each on every route. `train` and `validate` are driven in the route's own
 weather, by day, by night, in rain and on ice, among natural and among risky drivers; `report` the same
@@ -68,6 +69,7 @@ PARTS = (
     Part("ice", 64, 0.35, ICE, "natural"),
 )
 HAZARDS, REDUNDANCY, RULES = "hazards", "redundancy", "rules"
+FURTHER = "further"  # table of the hours that were registered for one variant, always driven whole
 HOURS_EACH = 6.0  # of the arbiter and of each channel alone
 SEED_OF_REDUNDANCY = 65
 UNFINISHED = 3  # exit code: --stop-after came first
@@ -85,17 +87,24 @@ def main(words: Sequence[str] | None = None) -> int:
             _drive(folder, asked, SEED_OF_REDUNDANCY, HOURS_EACH, drive_by=driver)
     is_whole = asked.only not in (None, RULES) or _rules(asked)
     if asked.publish:
-        publish(asked.out, asked.hours, only=asked.only, name=asked.table)
+        publish(asked.out, asked.hours, only=asked.only, table=asked.table)
     return 0 if is_whole else UNFINISHED
 
 
 def _rules(asked: argparse.Namespace) -> bool:
     """Drive the hours of the rules; returns whether all are driven."""
-    parts = monitor_drives.registered_parts(asked.hours)
-    is_whole = monitor_drives.drive(asked.out / RULES, parts, asked.workers, asked.stop_after)
+    folder, parts = _hours_of(asked.table, asked.out, asked.hours)
+    is_whole = monitor_drives.drive(folder, parts, asked.workers, asked.stop_after)
     if not is_whole:
         print("Not all hours are driven; the same command goes on.", flush=True)
     return is_whole
+
+
+def _hours_of(table: str, out: Path, hours: float) -> tuple[Path, list[monitor_drives.Part]]:
+    """Returns the folder of a table's rows, and the parts that are driven for it."""
+    if table == FURTHER:
+        return out / FURTHER, monitor_drives.registered_parts(None, FURTHER)
+    return out / RULES, monitor_drives.registered_parts(hours)
 
 
 def _hazards(asked: argparse.Namespace, out: Path) -> None:
@@ -129,7 +138,7 @@ def _asked(words: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument(
         "--table",
-        choices=(RULES, "variants"),
+        choices=(RULES, "variants", FURTHER),
         default=RULES,
         help="of the page, for the rules' hours",
     )
@@ -157,25 +166,26 @@ def _skidpad(*words: object) -> None:
 
 
 def publish(
-    out: Path, hours: float, results: Path = RESULTS, only: str | None = None, name: str = RULES
+    out: Path, hours: float, results: Path = RESULTS, only: str | None = None, table: str = RULES
 ) -> None:
-    """Copy what the page needs, and write its tables anew. name: of the table of rules."""
+    """Copy what the page needs, and write its tables anew. table: of the rules."""
     results.mkdir(parents=True, exist_ok=True)
     if only in (None, HAZARDS):
         for name in JUDGED:
-            table = json.loads((out / name / "evaluation.json").read_text(encoding="utf-8"))
-            _write(results / f"{name}.json", {"model": table["model"], "strata": _kept(table)})
+            judged = json.loads((out / name / "evaluation.json").read_text(encoding="utf-8"))
+            _write(results / f"{name}.json", {"model": judged["model"], "strata": _kept(judged)})
         seeds = {p.name: p.seed * SEEDS_EACH for p in PARTS}
         _write(results / "run.json", _driven() | {"hours_asked": hours, "first_seed": seeds})
     if only in (None, REDUNDANCY):
         about = _driven() | {"first_seed": SEED_OF_REDUNDANCY * SEEDS_EACH}
         _write(results / "redundancy.json", about | {"drivers": _outcomes(out / REDUNDANCY)})
     if only in (None, RULES):
-        parts = monitor_drives.registered_parts(hours)
-        rows = monitor_drives.read_rows(out / RULES / monitor_drives.ROWS)
+        folder, parts = _hours_of(table, out, hours)
+        rows = monitor_drives.read_rows(folder / monitor_drives.ROWS)
         about = {name: value for name, value in _driven().items() if name != "processors"}
-        _write(results / f"{name}.json", about | monitor_drives.summary(parts, rows))
-        (results / "ways.json").write_text(json.dumps(monitor_drives.ways(parts, rows)) + "\n")
+        _write(results / f"{table}.json", about | monitor_drives.summary(parts, rows))
+        if table != FURTHER:
+            (results / "ways.json").write_text(json.dumps(monitor_drives.ways(parts, rows)) + "\n")
     channels_tables.main([])
 
 

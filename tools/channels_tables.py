@@ -210,7 +210,12 @@ def variants(results: Path) -> str:
     return _rules_table(results, "variants")
 
 
-def _rules_table(results: Path, name: str) -> str:
+def further(results: Path) -> str:
+    """Returns what was found on the hours that were registered for one variant of positions."""
+    return _rules_table(results, "further", HAZARDS[:1])
+
+
+def _rules_table(results: Path, name: str, hazards: tuple[str, ...] = HAZARDS) -> str:
     told = _rules_of(results, name)
     if told is None:
         return "Not driven.\n"
@@ -221,7 +226,7 @@ def _rules_table(results: Path, name: str) -> str:
         [drives, _words(hazard), rule, _count_true(row), str(row["tp"]), str(row["fp"]),
          _share(row, "precision"), _share(row, "recall"), _false_rate(row)]
         for drives, part in told["drives"].items()
-        for hazard in HAZARDS
+        for hazard in hazards
         for rule, of in part["rules"].items()
         if (row := of.get(hazard)) and row["tp"] + row["fn"] and not rule.startswith(REFERENCE)
     ]  # fmt: skip
@@ -329,7 +334,7 @@ def _false_rate(row: dict[str, Any]) -> str:
 TABLES: dict[str, Callable[[Path], str]] = {
     "driven": driven, "scores": scores, "missed": missed, "ice": ice, "curves": curves,
     "redundancy": redundancy, "rules": rules, "reference": reference, "rarity": rarity,
-    "ways": ways, "variants": variants,
+    "ways": ways, "variants": variants, "further": further,
 }  # fmt: skip
 
 

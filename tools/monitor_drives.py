@@ -69,12 +69,11 @@ class Task:
     stop_at: float
 
 
-def registered_parts(hours: float) -> list[Part]:
-    """The parts of the registration, which have so many hours together."""
-    parts = [
-        Part(**row) for row in yaml.safe_load(PLAN.read_text(encoding="utf-8"))["monitor"]["parts"]
-    ]
-    share = hours / sum(part.hours for part in parts)
+def registered_parts(hours: float | None, table: str = "parts") -> list[Part]:
+    """Returns the parts of the registration, which have so many hours together, or their own."""
+    plan = yaml.safe_load(PLAN.read_text(encoding="utf-8"))["monitor"]
+    parts = [Part(**row) for row in plan[table]]
+    share = 1.0 if hours is None else hours / sum(part.hours for part in parts)
     return [Part(p.name, p.seed, p.hours * share, p.conditions, p.stratum) for p in parts]
 
 

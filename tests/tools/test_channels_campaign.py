@@ -119,3 +119,32 @@ def test_one_of_the_two_parts_can_be_driven_and_published_alone(monkeypatch, tmp
     calls.clear()
     campaign.main([*asked, "hazards"])
     assert not any("--drive-by" in c for c in calls)
+
+
+def test_hours_registered_for_one_variant_are_driven_whole_and_have_a_table_of_their_own(
+    monkeypatch, tmp_path
+):
+    driven = []
+    drive = lambda out, parts, workers, stop: driven.append((out, parts)) or True  # noqa: E731
+    monkeypatch.setattr(campaign.monitor_drives, "drive", drive)
+    asked = ["--out", str(tmp_path), "--only", "rules", "--table", "further", "--hours", "50"]
+    assert campaign.main(asked) == 0
+    ((folder, parts),) = driven
+    assert folder == tmp_path / "further"
+    assert [p.hours for p in parts] == [2.0, 2.0, 2.0]
+    results = tmp_path / "results"
+    monkeypatch.setattr(campaign.monitor_drives, "read_rows", lambda file: [file.parent.name])
+    monkeypatch.setattr(campaign.monitor_drives, "summary", lambda parts, rows: {"rows": rows})
+    monkeypatch.setattr(tables, "main", lambda words: 0)
+    campaign.publish(tmp_path, 50.0, results, only="rules", table="further")
+    assert json.loads((results / "further.json").read_text())["rows"] == ["further"]
+    assert not (results / "ways.json").exists()
+
+
+def test_tables_of_rules_do_not_overwrite_those_of_hazards(monkeypatch, driven, tmp_path):
+    monkeypatch.setattr(campaign.monitor_drives, "summary", lambda parts, rows: {"rows": 1})
+    monkeypatch.setattr(campaign.monitor_drives, "ways", lambda parts, rows: {})
+    monkeypatch.setattr(tables, "main", lambda words: 0)
+    campaign.publish(driven, 1.0, tmp_path)
+    assert json.loads((tmp_path / "rules.json").read_text())["rows"] == 1
+    assert "strata" in json.loads((tmp_path / "ice.json").read_text())

@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 from scipy import stats
 
+from skidpad.core.arrays import Floats
 from skidpad.search.probability import (
-    Floats,
     Limit,
     compare_estimates,
     explore,

@@ -30,6 +30,7 @@ from typer.testing import CliRunner
 
 from skidpad.campaign.workers.worker import Finished, Job
 from skidpad.cli.main import app
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import OutputError
 from skidpad.core.space import Choice, Space
 from skidpad.recording.campaign.searches import Search, Trial, read_search, read_trials
@@ -115,7 +116,7 @@ class Sampler:
         self.process.stdin.write(json.dumps(what) + "\n")
         self.process.stdin.flush()
 
-    def ask(self, count: int) -> methods.Floats:
+    def ask(self, count: int) -> Floats:
         """Return the next points of the sampler."""
         assert self.process.stdout is not None
         self._say(count)
@@ -124,7 +125,7 @@ class Sampler:
             raise OutputError("the process with VerifAI ended; its message is above")
         return np.array(json.loads(line))
 
-    def tell(self, points: methods.Floats, margins: methods.Floats) -> None:
+    def tell(self, points: Floats, margins: Floats) -> None:
         """Tell the sampler its margins, in which a failure is below 0."""
         del points
         self._say([float(m) if m > 0.0 else float(m) - 1e-6 for m in margins])

@@ -16,11 +16,11 @@ import cv2
 import msgspec
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
 from skidpad.campaign.driving.loop import Moment, Sink
 from skidpad.campaign.runs.folder import write_config
 from skidpad.campaign.runs.run import Run, run
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError, OutputError, StackError
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.core.run import AdasDriver, CameraDriver, RunSpec
@@ -151,7 +151,6 @@ def _describe_mount(mount: Pose, camera: Any) -> dict[str, float]:
 # --- labels of images, from the truth: where the lane runs, and which vehicle is in it
 
 
-Floats = NDArray[np.float64]
 REACH = 70.0  # m of lane ahead in which a lead is looked for
 STEP = 2.0  # m between the places of that lane
 SPARE = 0.15  # m beside the ego's body that belongs to its way

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
 from skidpad.campaign.driving.loop import Moment
 from skidpad.campaign.runs.stored import read_segment
@@ -20,6 +19,7 @@ from skidpad.campaign.user_files import with_kept_map
 from skidpad.cockpit.indicators import every, least_of, ttc_ahead
 from skidpad.cockpit.marks import RADAR_MOUNT
 from skidpad.cockpit.source import Curves, Said, Seat
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame, Context, Decision, TruthFrame
 from skidpad.core.errors import FileError, InputError
 from skidpad.core.frames import RadarPoints, SensorFrame
@@ -54,7 +54,6 @@ from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.recovery import Action
 
-Floats = NDArray[np.float64]
 BRAKING_AX = -1.5  # m/s^2, below which brake lamps are shown lit; our choice
 HEIGHT = {  # m, by class; our choice
     SemanticClass.TRUCK: 3.4,

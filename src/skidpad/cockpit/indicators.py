@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.evidence.drive.conflict import time_to_collision
 from skidpad.evidence.pairs import Body, following
 
 NEAR = 10.0  # s, our choice: a longer time to collision is not shown
 CURVE = 1000  # about so many moments of a curve are shown
-Floats = NDArray[np.float64]
 
 
 def ttc_ahead(bodies: Sequence[Body], present: NDArray[np.bool_]) -> Floats:

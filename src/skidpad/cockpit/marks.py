@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skidpad.campaign.driving.loop import Moment
+from skidpad.core.arrays import Floats
 from skidpad.core.frames import RadarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import CameraSpec, RadarSpec
@@ -21,7 +21,6 @@ from skidpad.sensors.raster.view import camera_view
 from skidpad.stack.perception.lane_view import LaneView
 from skidpad.stack.perception.lights import LightScan
 
-Floats = NDArray[np.float64]
 CLOSING = -1.0  # m/s, below which a radar point is shown as closing
 LEAD_HALF_WIDTH, LEAD_HEIGHT = 1.0, 1.5  # m, of the bracket at the measured distance
 BODY = Pose(0.0, 0.0)

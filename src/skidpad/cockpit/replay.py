@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skidpad.campaign.driving.loop import Moment
 from skidpad.campaign.runs.road import load_road
@@ -23,6 +22,7 @@ from skidpad.campaign.runs.stored import read_run
 from skidpad.campaign.takeover.desk import beam_of
 from skidpad.cockpit.indicators import every, least_of, ttc_ahead
 from skidpad.cockpit.source import Curves, Said, Seat, index_at
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import FileError
 from skidpad.core.frames import RadarPoints, SensorFrame
 from skidpad.core.geometry import Pose
@@ -50,7 +50,6 @@ from skidpad.simulation.recovery import Action, Moved, Relocate
 from skidpad.stack.control.text import mode_text
 
 LEAST_WAY, MOST_WAY = 0.3, 12.0  # m in two ticks, between which a grade can be told
-Floats = NDArray[np.float64]
 BRAKING_AX = -1.5  # m/s^2, below which the brake lamps of others are shown lit; our choice
 WORDS: dict[str, type[Any]] = {
     "status": DetectionStatus,

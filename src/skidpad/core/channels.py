@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.vocabulary import LightState
-
-Floats = NDArray[np.float64]
 
 
 class ChannelFrame(NamedTuple):

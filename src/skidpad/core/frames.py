@@ -10,11 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats32
 from skidpad.core.slots import fill_slots
 from skidpad.core.states import ContactEvent, EgoEstimate, LaneInvasion
 from skidpad.core.vocabulary import LightState, Supervision
-
-Float32 = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,17 +23,17 @@ class CameraImage:
     Row 0 is the top, column 0 the left.
     """
 
-    inverse_depth: Float32 | None = None  # (H, W) 1/m, planar; 0 where there is nothing
+    inverse_depth: Floats32 | None = None  # (H, W) 1/m, planar; 0 where there is nothing
     labels: NDArray[np.uint8] | None = None  # (H, W) SemanticClass; may be a strided view
     instances: NDArray[np.uint16] | None = None  # (H, W) 0 static, else actor index + 1
     rgb: NDArray[np.uint8] | None = None  # (H, W, 3) red, green, blue
     packed: NDArray[np.uint32] | None = None  # (H, W) rgb as 4-byte pixels, where it is kept so
 
-    def depth(self) -> Float32:
+    def depth(self) -> Floats32:
         """(H, W) planar depth in m, +inf where there is nothing; computed at each call."""
         assert self.inverse_depth is not None, "this camera delivers no depth"
         with np.errstate(divide="ignore"):
-            metres: Float32 = np.float32(1.0) / self.inverse_depth
+            metres: Floats32 = np.float32(1.0) / self.inverse_depth
         return metres
 
 
@@ -68,10 +67,10 @@ def image_rows(
 class RadarPoints(NamedTuple):
     """n radar returns; azimuth left positive, altitude up positive, velocity negative closing."""
 
-    range: Float32  # m along the ray
-    azimuth: Float32  # rad
-    altitude: Float32  # rad
-    velocity: Float32  # m/s, range rate
+    range: Floats32  # m along the ray
+    azimuth: Floats32  # rad
+    altitude: Floats32  # rad
+    velocity: Floats32  # m/s, range rate
 
     @classmethod
     def none(cls) -> RadarPoints:
@@ -82,9 +81,9 @@ class RadarPoints(NamedTuple):
 class LidarPoints(NamedTuple):
     """n returns in the lidar's frame (x forward, y left, z up)."""
 
-    xyz: Float32  # (n, 3) m
-    intensity: Float32  # (n,) 0 .. 1
-    cosine: Float32  # (n,) of the angle of incidence
+    xyz: Floats32  # (n, 3) m
+    intensity: Floats32  # (n,) 0 .. 1
+    cosine: Floats32  # (n,) of the angle of incidence
     label: NDArray[np.uint8]  # (n,) SemanticClass
     instance: NDArray[np.uint16]  # (n,) 0 static, else actor index + 1
 
@@ -112,11 +111,11 @@ class Segments(NamedTuple):
     pixels carry `label[i]` at planar depth `depth[i]`. Only visible vehicle faces are listed.
     """
 
-    u: Float32  # px
-    width: Float32  # px
-    top: Float32  # px
-    bottom: Float32  # px
-    depth: Float32  # m
+    u: Floats32  # px
+    width: Floats32  # px
+    top: Floats32  # px
+    bottom: Floats32  # px
+    depth: Floats32  # m
     label: NDArray[np.uint8]
 
 

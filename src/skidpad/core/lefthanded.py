@@ -10,11 +10,9 @@ from __future__ import annotations
 from math import degrees, pi, radians
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.geometry import Pose
-
-Floats = NDArray[np.float64]
 
 
 def pose_from_carla(

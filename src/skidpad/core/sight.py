@@ -10,10 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import LightState
-
-Floats = NDArray[np.float64]
 
 
 class RoadLook(str, Enum):

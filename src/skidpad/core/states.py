@@ -8,11 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.geometry import Pose
 from skidpad.core.slots import fill_slots
 from skidpad.core.vocabulary import DetectionStatus, LightSource, LightState, Tier
-
-Floats = NDArray[np.float64]
 
 
 @fill_slots

@@ -13,9 +13,9 @@ from functools import lru_cache
 from math import erf, exp, log, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from skidpad.core.arrays import Floats
+
 GRIP = np.geomspace(0.05, 1.05, 28)
 STIFFNESS_SHARES = np.geomspace(0.22, 1.55, 13)  # of the tyre that the estimator was designed with
 STIFFNESS_SPREAD, STIFFNESS_OPEN = 0.25, 0.3  # relative, and share of the prior that is flat

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from math import cos, inf, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.frames import RadarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import RadarSpec
 from skidpad.roads.queries import RoadMap
 
-Floats = NDArray[np.float64]
 STEP, REACH = 5.0, 160.0  # m between places along the lane, and to the last one
 HALF_LANE = 1.5  # m to either side in which a return counts as being in the lane
 LEAST_HEIGHT, MOST_HEIGHT = 0.3, 3.0  # m above the road, else a return is road or bridge

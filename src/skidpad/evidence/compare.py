@@ -13,10 +13,9 @@ from dataclasses import dataclass
 from enum import Enum
 from math import ceil, log2
 
-import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError
 from skidpad.core.wording import count_text
 from skidpad.evidence.comparisons import parse_comparison
@@ -31,8 +30,6 @@ from skidpad.evidence.statistics import (
 )
 from skidpad.recording.campaign.matrix import Metrics
 from skidpad.recording.campaign.results import definitions_of
-
-Floats = NDArray[np.float64]
 
 ALPHA = 0.05
 PAIRED_BY = ("config", "weather", "seed")

@@ -17,11 +17,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Flags, Floats
 from skidpad.evidence.pairs import Body, body, following, together
 from skidpad.recording.run.log import RunLog
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 TIME, DISTANCE = 3.0, 20.0  # s, m: farther apart is no interaction
 LEFT = 2.0  # s after which a place that was left is no matter any more, as for PET (C-094)
 STANDING = 0.1  # m/s
@@ -64,7 +63,7 @@ def _in_play(one: Body, two: Body, ways_apart: bool) -> bool:
     return ways_apart and bool(near.any())
 
 
-def _select_rows(one: Body, rows: Mask | NDArray[np.int64]) -> Body:
+def _select_rows(one: Body, rows: Flags | NDArray[np.int64]) -> Body:
     """Return a body with these rows alone."""
     x, y, yaw, vx, vy, ax, ay = (column[rows] for column in one[:7])
     return Body(x, y, yaw, vx, vy, ax, ay, one.length, one.width)
@@ -119,11 +118,11 @@ def _follows(behind: Body, ahead: Body) -> bool:
     return bool((seen & stays & near).any())
 
 
-def _alongside(one: Body, other: Body) -> Mask:
+def _alongside(one: Body, other: Body) -> Flags:
     """Return (n,) True where both lie along one line or one of them stands."""
     same_line = np.abs(np.cos(other.yaw - one.yaw)) > ALONG
     stands = (np.hypot(one.vx, one.vy) < STANDING) | (np.hypot(other.vx, other.vy) < STANDING)
-    mask: Mask = same_line | stands
+    mask: Flags = same_line | stands
     return mask
 
 
@@ -198,12 +197,12 @@ class Sized(Protocol):
 
 def overlap_along(
     x: Floats, y: Floats, yaw: Floats, x2: Floats, y2: Floats, yaw2: Floats, box: Sized, box2: Sized
-) -> Mask:
+) -> Flags:
     """Return where boxes at all these places overlap along both edges of the first one."""
     c, s = np.cos(yaw), np.sin(yaw)
     along, across = np.abs(np.cos(yaw2 - yaw)), np.abs(np.sin(yaw2 - yaw))
     forward = np.abs((x2 - x) * c + (y2 - y) * s)
     left = np.abs((y2 - y) * c - (x2 - x) * s)
-    mask: Mask = forward <= 0.5 * (box.length + box2.length * along + box2.width * across)
+    mask: Flags = forward <= 0.5 * (box.length + box2.length * along + box2.width * across)
     mask &= left <= 0.5 * (box.width + box2.length * across + box2.width * along)
     return mask

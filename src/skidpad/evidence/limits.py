@@ -6,11 +6,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import stats
 from scipy.special import chdtri, stdtrit
 
-Floats = NDArray[np.float64]
+from skidpad.core.arrays import Floats
 
 CONFIDENCE = 0.95
 DISPERSION_ERROR = 12.0  # widens an excess of variance seen in few runs with events

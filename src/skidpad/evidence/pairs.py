@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.evidence.channels.boxes import STEP
 from skidpad.evidence.channels.conflicts import encroachment
 from skidpad.evidence.drive.conflict import (
@@ -19,7 +20,6 @@ from skidpad.evidence.drive.conflict import (
 )
 from skidpad.recording.run.log import RunLog
 
-Floats = NDArray[np.float64]
 EGO = 0
 V_HEADWAY = 1.0  # m/s, below there is no headway
 STEEPEST = 0.15  # no road climbs as much; assumption

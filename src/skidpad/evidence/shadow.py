@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from skidpad.core.arrays import Floats
 
 BRAKING = 0.15  # of full brake, from which a driver counts as braking
 BEFORE = 6.0  # s before an event in which braking belongs to it

@@ -18,14 +18,13 @@ from math import ceil, floor, log2
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import stats
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import require_range
 from skidpad.core.randomness import stream
 from skidpad.evidence.limits import CONFIDENCE, count_limits, mean_widths, skew_limits
-
-Floats = NDArray[np.float64]
 
 UNITS_FROM = 8  # runs, seeds, segments or vehicles, below which no limits are given
 RUNS_WITH_EVENT_FROM = 2  # below, nothing tells clumps from single events

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame, Decision
 from skidpad.core.errors import ConfigError, MissingExtra
 from skidpad.live.child import ALARMS
@@ -23,7 +23,6 @@ try:
 except ImportError as error:
     raise MissingExtra("a live scene for Foxglove", "live") from error
 
-Floats = NDArray[np.float64]
 SCENE, ARBITER, ALARM = "/scene", "/arbiter", "/alarms"
 COLOURS = ((0.12, 0.47, 0.71), (1.0, 0.5, 0.05), (0.17, 0.63, 0.17), (0.58, 0.4, 0.74))
 HEIGHT = 1.5  # m

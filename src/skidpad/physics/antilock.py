@@ -12,12 +12,8 @@ ours (assumptions).
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from skidpad.core.arrays import Floats
 from skidpad.core.jit import inner_kernel
-
-Floats = NDArray[np.float64]
 
 # Columns of what the control remembers of a vehicle; the first three hold FL, FR, RL, RR
 PRESSURE, RIM, PHASE = 0, 4, 8  # share of the torque asked for, m/s, one of the phases

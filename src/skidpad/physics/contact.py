@@ -12,15 +12,12 @@ from math import cos, exp, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics.overlap import Boxes, box_box, box_segment, corners_room
 from skidpad.physics.segments import Segments, candidates
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 NEAR = 64  # segments in reach of one actor at most
 PASSES = 2  # over all contacts, so that a car squeezed between two feels both

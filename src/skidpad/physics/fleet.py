@@ -9,6 +9,7 @@ from math import cos, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.core.states import ActorStates
@@ -18,8 +19,6 @@ from skidpad.physics.rollover import OVER
 from skidpad.physics.sensed import MEMORY
 from skidpad.physics.types import TIRE_FRICTION_REFERENCE, VehicleType
 from skidpad.physics.vehicle import step_vehicles
-
-Floats = NDArray[np.float64]
 
 SUBSTEP = 0.01  # s; stopping distances and yaw rates within 3 % of 1 ms (docs/physics.md)
 GEAR_UP_V = (4.0, 8.5, 14.0, 20.0, 27.0)  # m/s, full-load shift points of a compact car

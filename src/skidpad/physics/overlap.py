@@ -6,11 +6,10 @@ from math import cos, inf, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.jit import inner_kernel, kernel
 
-Floats = NDArray[np.float64]
 Overlap = tuple[bool, float, float, float, float, float]  # touching, x, y, nx, ny, depth
 
 

@@ -9,11 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.physics.rollover import roll_inertias
 from skidpad.physics.types import VehicleType
 from skidpad.physics.wind import AIR_DENSITY, side_coefficients
-
-Floats = NDArray[np.float64]
 
 
 class VehicleParams(NamedTuple):

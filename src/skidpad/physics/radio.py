@@ -14,11 +14,9 @@ from functools import cache
 from math import log10, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.physics.droplets import rain_drops
-
-Floats = NDArray[np.float64]
 
 LIGHT = 299_792_458.0  # m/s
 WATER = 1000.0  # kg/m^3

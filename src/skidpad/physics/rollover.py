@@ -20,14 +20,12 @@ from collections.abc import Sequence
 from math import cos, pi, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.constants import G
 from skidpad.core.jit import inner_kernel
 from skidpad.physics.antilock import MEMORY as FIRST
 from skidpad.physics.types import VehicleType
-
-Floats = NDArray[np.float64]
 
 # Columns of a vehicle's memory
 TILT, TILT_RATE, OVER = (

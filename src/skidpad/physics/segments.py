@@ -6,12 +6,9 @@ from math import floor
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.jit import inner_kernel
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 CELL = 20.0  # m, a few car lengths
 CELLS_MAX = 250_000  # larger maps get larger cells

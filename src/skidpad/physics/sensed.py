@@ -15,9 +15,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-import numpy as np
-from numpy.typing import NDArray
-
+from skidpad.core.arrays import Floats
 from skidpad.core.constants import G
 from skidpad.core.jit import inner_kernel
 from skidpad.physics.rollover import MEMORY as FIRST
@@ -30,8 +28,6 @@ from skidpad.physics.stability import (
     Motion,
     correction,
 )
-
-Floats = NDArray[np.float64]
 
 # Columns of a vehicle's memory: m/s; share of g that was used; rad; rad/s^2; share of the drive; whether
 # it is being taken back; counts

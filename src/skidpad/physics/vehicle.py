@@ -15,11 +15,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.constants import G
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics.antilock import PRESSURE, regulate
-from skidpad.physics.params import STIFFNESS, WATER, Floats, VehicleParams, WheelStates
+from skidpad.physics.params import STIFFNESS, WATER, VehicleParams, WheelStates
 from skidpad.physics.rollover import OVER, SLIDING, TILT, left_arm, tip
 from skidpad.physics.sensed import limit_drive, note_motion, sensed_correction
 from skidpad.physics.stability import Correction, Model, Motion, correction

@@ -19,13 +19,11 @@ from collections.abc import Sequence
 from math import cos, exp, sin, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.randomness import stream
 from skidpad.core.setup import Wind
 from skidpad.physics.types import VehicleType
-
-Floats = NDArray[np.float64]
 
 AIR_DENSITY = 1.225  # kg/m^3, ISO 2533 at sea level
 FRONTAL, FORCE_SLOPE, MOMENT_SLOPE = 2.0, 3.0, 1.0  # m^2, 1/rad, 1/rad over the wheelbase

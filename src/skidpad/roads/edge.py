@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Flags, Floats
 from skidpad.roads.lanes import LaneKind, LaneSamples, LaneTable
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Numbers = NDArray[np.floating[Any]]
 
 ROAD = (
@@ -96,7 +95,7 @@ class RoadEdge:
 
     def off(
         self, x: Numbers, y: Numbers, z: Numbers, yaw: Numbers, length: float, width: float
-    ) -> Mask:
+    ) -> Flags:
         """(n,) whether a car of this size at these places has all four wheels off the road."""
         off = self.beyond(x, y, z) > 0.0
         rows = np.flatnonzero(off)

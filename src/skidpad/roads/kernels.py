@@ -8,8 +8,8 @@ from __future__ import annotations
 from math import atan2, ceil, floor, inf, nan, pi, sqrt
 from typing import NamedTuple
 
+from skidpad.core.arrays import Floats, Ints32
 from skidpad.core.jit import inner_kernel, kernel
-from skidpad.roads.lanes import Floats, Ints
 
 REACH = 20.0  # m, beyond this there is no lane
 Z_WEIGHT = 2.0  # heights count double, so that a road 8 m above is 16 m away
@@ -26,29 +26,29 @@ class LaneArrays(NamedTuple):
     """A baked map in the form that kernels read; N samples, L lanes, K signals."""
 
     sample: Floats  # (N, 13) columns X to SIN (of the heading); heading continuous within a lane
-    lane_of: Ints  # (N,)
-    first: Ints  # (L,) first sample
-    size: Ints  # (L,)
+    lane_of: Ints32  # (N,)
+    first: Ints32  # (L,) first sample
+    size: Ints32  # (L,)
     length: Floats  # (L,) m
-    road: Ints  # (L,)
-    lane_id: Ints  # (L,)
-    junction: Ints  # (L,) or -1
-    drivable: Ints  # (L,) 1 for driving lanes and ramps
-    left: Ints  # (L,)
-    right: Ints  # (L,)
-    opposite: Ints  # (L,)
-    next_start: Ints  # (L + 1,)
-    next_lane: Ints
-    prev_start: Ints  # (L + 1,)
-    prev_lane: Ints
-    signal_start: Ints  # (L + 1,) signals of lane i, by s: rows signal_row[start[i]:start[i + 1]]
-    signal_row: Ints  # (K,) row of SignalTable
+    road: Ints32  # (L,)
+    lane_id: Ints32  # (L,)
+    junction: Ints32  # (L,) or -1
+    drivable: Ints32  # (L,) 1 for driving lanes and ramps
+    left: Ints32  # (L,)
+    right: Ints32  # (L,)
+    opposite: Ints32  # (L,)
+    next_start: Ints32  # (L + 1,)
+    next_lane: Ints32
+    prev_start: Ints32  # (L + 1,)
+    prev_lane: Ints32
+    signal_start: Ints32  # (L + 1,) signals of lane i, by s: rows signal_row[start[i]:start[i + 1]]
+    signal_row: Ints32  # (K,) row of SignalTable
     signal_s: Floats  # (K,) m along the lane, in the order of signal_row
-    signal_kind: Ints  # (K,) SignalKind, in the order of signal_row
+    signal_kind: Ints32  # (K,) SignalKind, in the order of signal_row
     cell_size: float  # m, edge of a cell of the search grid
     cell_origin: Floats  # (2,)
-    cell_start: Ints  # (rows + 1, columns) samples of a cell: cell_sample[start:next start]
-    cell_sample: Ints  # (N,)
+    cell_start: Ints32  # (rows + 1, columns) samples of a cell: cell_sample[start:next start]
+    cell_sample: Ints32  # (N,)
     cell_point: Floats  # (N, 3) x, y, z in the order of cell_sample: read one after the other
 
 

@@ -12,8 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
+from skidpad.core.arrays import Floats, Ints32
 
 
 class LaneKind(IntEnum):
@@ -59,27 +58,29 @@ class LaneSamples(NamedTuple):
     limit: Floats  # m/s, NaN where the map gives none
     marking_left: NDArray[np.uint8]  # Marking, seen in driving direction
     marking_right: NDArray[np.uint8]
-    lane: Ints  # index into LaneTable
+    lane: Ints32  # index into LaneTable
 
 
 class LaneTable(NamedTuple):
     """L lanes; arrays (L,) unless said otherwise. Index -1 means none."""
 
-    road: Ints  # OpenDRIVE road id
-    lane_id: Ints  # OpenDRIVE lane id, sign as in the file
-    section: Ints
-    first: Ints  # first sample
-    size: Ints  # number of samples, >= 2
+    road: Ints32  # OpenDRIVE road id
+    lane_id: Ints32  # OpenDRIVE lane id, sign as in the file
+    section: Ints32
+    first: Ints32  # first sample
+    size: Ints32  # number of samples, >= 2
     length: Floats  # m
     kind: NDArray[np.uint8]  # LaneKind
-    junction: Ints  # OpenDRIVE junction id or -1
-    left: Ints  # neighbour lane of the same direction that can be driven, or -1
-    right: Ints
-    opposite: Ints  # innermost lane across the centre line when this one is innermost, or -1
-    next_start: Ints  # (L + 1,) successors of lane i are next_lane[next_start[i]:next_start[i + 1]]
-    next_lane: Ints
-    prev_start: Ints  # (L + 1,) predecessors likewise
-    prev_lane: Ints
+    junction: Ints32  # OpenDRIVE junction id or -1
+    left: Ints32  # neighbour lane of the same direction that can be driven, or -1
+    right: Ints32
+    opposite: Ints32  # innermost lane across the centre line when this one is innermost, or -1
+    next_start: (
+        Ints32  # (L + 1,) successors of lane i are next_lane[next_start[i]:next_start[i + 1]]
+    )
+    next_lane: Ints32
+    prev_start: Ints32  # (L + 1,) predecessors likewise
+    prev_lane: Ints32
 
 
 class SignalTable(NamedTuple):
@@ -88,16 +89,16 @@ class SignalTable(NamedTuple):
     One row per signal and lane on which it is valid.
     """
 
-    id: Ints  # OpenDRIVE signal id
+    id: Ints32  # OpenDRIVE signal id
     kind: NDArray[np.uint8]  # SignalKind
     x: Floats  # position of the signal head or sign
     y: Floats
     z: Floats
     heading: Floats  # direction of the traffic that it governs
-    lane: Ints  # index into LaneTable
+    lane: Ints32  # index into LaneTable
     s: Floats  # m along that lane: the stop line, or where the sign takes effect
     value: Floats  # limit in m/s for SPEED_LIMIT, else NaN
-    group: Ints  # controller or junction that it belongs to, -1: alone
+    group: Ints32  # controller or junction that it belongs to, -1: alone
 
 
 class SignalKind(IntEnum):

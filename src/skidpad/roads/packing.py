@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from skidpad.core.arrays import Floats, Ints32
 from skidpad.roads.baked import BakedMap
 from skidpad.roads.kernels import LaneArrays
-from skidpad.roads.lanes import Floats, Ints, LaneKind
+from skidpad.roads.lanes import LaneKind
 
 CELL = 4.0  # m, edge of a cell of the search grid
 CELLS_MAX = 8_000_000  # a map that is larger gets larger cells
@@ -56,7 +57,7 @@ def lane_arrays(baked: BakedMap) -> LaneArrays:
     )
 
 
-def _grid(x: Floats, y: Floats) -> tuple[float, Floats, Ints, Ints]:
+def _grid(x: Floats, y: Floats) -> tuple[float, Floats, Ints32, Ints32]:
     """Returns cell size in m, origin, cell starts (rows + 1, columns) and the points' order by cell."""
     origin = np.array([x.min(), y.min()])
     size = max(CELL, float(np.sqrt(np.ptp(x) / CELLS_MAX * np.ptp(y))))

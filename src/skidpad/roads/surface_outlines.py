@@ -6,12 +6,11 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.surface import SurfacePatch
 from skidpad.roads.queries import RoadMap
 
-Floats = NDArray[np.float64]
 CORNERS = 32  # of a circle
 STEP = 4  # samples of a lane between two corners
 WATER, ICE, SNOW, FRICTION = "water", "ice", "snow", "friction"

@@ -16,10 +16,10 @@ import shapely
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from skidpad.core.arrays import Floats
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import RoadMap
 
-Floats = NDArray[np.float64]
 Ring = tuple[int, ...]
 
 VERGE = 4.0  # m beside the lanes of a junction on which one walks around its corners

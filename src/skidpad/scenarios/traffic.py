@@ -10,11 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from skidpad.core.arrays import Flags
 from skidpad.core.setup import ActorCommand
 from skidpad.roads.queries import LanePoint, RoadMap
 from skidpad.scenarios.movement.measures import between
 from skidpad.scenarios.movement.network import Place
-from skidpad.scenarios.places.spots import Disc, Mask, Region, Spots, along, spot_at, spots_of
+from skidpad.scenarios.places.spots import Disc, Region, Spots, along, spot_at, spots_of
 from skidpad.scenarios.scene import Actor, Scene
 from skidpad.simulation.world.traffic.idm import B_COMFORT, Character, idm
 
@@ -82,7 +83,7 @@ def vanish(scene: Scene, actor: Actor) -> None:
     actor.word = ActorCommand(actor.name, present=False)
 
 
-def _free(scene: Scene, spots: Spots, v: float, length: float) -> Mask:
+def _free(scene: Scene, spots: Spots, v: float, length: float) -> Flags:
     """Returns spots where a body of this length may appear at v m/s without hard braking of others."""
     mask = np.ones(len(spots.x), np.bool_)
     for actor in scene.actors.values():
@@ -161,7 +162,7 @@ class Directions:
     same: float
     opposite: float
 
-    def drawn(self, rng: Random, scene: Scene, spots: Spots) -> Mask:
+    def drawn(self, rng: Random, scene: Scene, spots: Spots) -> Flags:
         """Returns the mask of the spots in the direction of one draw: same as the entity's or opposite."""
         same = rng.random() * (self.same + self.opposite) < self.same
         mask = along(scene.actors[self.entity].pose, spots)

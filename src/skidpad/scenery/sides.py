@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.geometry import mps_from_kmh
 from skidpad.roads.lanes import LaneKind, LaneSamples, LaneTable
-
-Floats = NDArray[np.float64]
 
 TOWN_LIMIT, MOTORWAY_LIMIT = mps_from_kmh(61.0), mps_from_kmh(99.0)
 DRIVEN = (LaneKind.DRIVING, LaneKind.RAMP)

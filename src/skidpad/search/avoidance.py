@@ -7,13 +7,12 @@ from math import ceil, pi
 
 import numpy as np
 
+from skidpad.core.arrays import Flags, Floats
 from skidpad.core.geometry import wrap_angle
 from skidpad.recording.run.log import RunLog
 from skidpad.roads.queries import RoadMap
 from skidpad.search.bound import (
     REACTION,
-    Floats,
-    Mask,
     Motion,
     Path,
     Start,
@@ -83,7 +82,7 @@ def motion_of(log: RunLog, actor: int) -> Motion:
 def _foreseen(
     log: RunLog, road: RoadMap, tracks: list[Track], actor: int | None, rows: np.ndarray,
     standing: list[Track],
-) -> Mask:  # fmt: skip
+) -> Flags:  # fmt: skip
     """(rows,) whether constant motion leads to the failure, and what is touched can be seen."""
     ego = predict_motion(tracks[0], motion_of(log, 0), rows)
     if actor is None or actor < 0:

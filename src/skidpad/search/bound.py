@@ -21,11 +21,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Flags, Floats
 from skidpad.core.constants import G
 from skidpad.evidence.encounters import overlap_along
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Beyond = Callable[[Floats, Floats, Floats], Floats]  # x, y, z: m beyond the road's edge, 0 on it
 
 REACTION = 0.9  # s, the median of the reference driver (docs/reference-driver.md)
@@ -44,7 +43,7 @@ class Track(NamedTuple):
     x: Floats
     y: Floats
     yaw: Floats
-    present: Mask
+    present: Flags
     length: float
     width: float
 
@@ -87,9 +86,9 @@ class Start:
     width: float = 1.8
 
 
-def boxes_overlap(a: Track, b: Track) -> Mask:
+def boxes_overlap(a: Track, b: Track) -> Flags:
     """Return where two boxes overlap, by the normals of their edges; places broadcast."""
-    found: Mask = overlap_along(a.x, a.y, a.yaw, b.x, b.y, b.yaw, a, b)
+    found: Flags = overlap_along(a.x, a.y, a.yaw, b.x, b.y, b.yaw, a, b)
     return found & overlap_along(b.x, b.y, b.yaw, a.x, a.y, a.yaw, b, a)
 
 
@@ -144,7 +143,7 @@ def is_in_sight(eye: Track, seen: Track, others: Sequence[Track], row: int) -> b
     return not hidden.all()
 
 
-def first_known_row(foreseen: Mask) -> int:
+def first_known_row(foreseen: Flags) -> int:
     """Return the first row of the stretch of foreseen rows that ends the mask; the last row at least."""
     missed = np.flatnonzero(~foreseen)
     return min(int(missed[-1]) + 1 if len(missed) else 0, len(foreseen) - 1)
@@ -195,7 +194,7 @@ def find_avoidance(
 
 
 def drive_manoeuvres(
-    start: Start, path: Path, aims: Floats, holds: Mask, rows: int, mu: float, dt: float,
+    start: Start, path: Path, aims: Floats, holds: Flags, rows: int, mu: float, dt: float,
     reaction: float,
 ) -> tuple[Track, Floats]:  # fmt: skip
     """Return the ego's box (manoeuvres, rows) in each manoeuvre, and the way along the path.

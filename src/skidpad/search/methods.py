@@ -10,15 +10,14 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import MissingExtra
 
 if TYPE_CHECKING:
     from cmaes import CMA
 
-Floats = NDArray[np.float64]
 BATCH = 16  # points that are driven side by side; it never depends on the number of workers
 EXPLORED = 0.2  # share of the budget that `cma` spends on spreading out before it descends
 SIGMA = 0.15  # of a descent's first population, in the unit cube

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from scipy import stats
 from scipy.special import logsumexp
 
-Floats = NDArray[np.float64]
+from skidpad.core.arrays import Floats
+
 Limit = Callable[[Floats], Floats]  # z (n, d) to margins (n,)
 
 SHARE = 0.1  # of the samples of a level that begin the next one (Zuev 2013: 0.1 to 0.3)

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from skidpad.campaign.workers.worker import Runner
+from skidpad.core.arrays import Floats
 from skidpad.core.space import Choice, Variable
 from skidpad.recording.campaign.risks import (
     RISK_FOUND,
@@ -29,7 +30,6 @@ from skidpad.recording.files import write_bytes
 from skidpad.search.loop import StoredTrials, drive_all
 from skidpad.search.probability import (
     Estimate,
-    Floats,
     Weighted,
     compare_estimates,
     counting_estimate,

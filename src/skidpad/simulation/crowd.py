@@ -13,6 +13,7 @@ from math import atan2, cos, hypot, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.geometry import Pose
 from skidpad.core.randomness import stream
 from skidpad.core.setup import ActorCommand, ActorSetup
@@ -20,8 +21,6 @@ from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import Control, LightState
 from skidpad.roads.lanes import LaneKind, SignalKind
 from skidpad.roads.queries import RoadMap
-
-Floats = NDArray[np.float64]
 
 PERIOD = 0.1  # s between two updates
 WALK_MEAN, WALK_SIGMA = 1.34, 0.26  # m/s (Weidmann 1993)

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Flags, Ints32
 from skidpad.simulation.world.traffic.state import Held
 from skidpad.simulation.world.world import World
-
-Ints = NDArray[np.int32]
-Bools = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +33,7 @@ def cause_name(cause: Held) -> str:
     return cause.name.lower().replace("_", " ")
 
 
-def wait_graph(world: World, stands: Bools) -> list[Wait]:
+def wait_graph(world: World, stands: Flags) -> list[Wait]:
     """Returns for each vehicle that stands (n,) for what and whom it waits."""
     assert world.traffic is not None
     state, path = world.traffic.drivers.state, world.traffic.drivers.path
@@ -53,7 +50,7 @@ def wait_graph(world: World, stands: Bools) -> list[Wait]:
     ]
 
 
-def root_of(blocker: Ints, stands: Bools, i: int) -> int:
+def root_of(blocker: Ints32, stands: Flags, i: int) -> int:
     """Returns the last vehicle that stands in the chain of those for whom vehicle i waits.
 
     In a circle it is the one before the first that comes twice.
@@ -65,7 +62,7 @@ def root_of(blocker: Ints, stands: Bools, i: int) -> int:
     return i
 
 
-def wait_circles(blocker: Ints, stands: Bools) -> list[tuple[int, ...]]:
+def wait_circles(blocker: Ints32, stands: Flags) -> list[tuple[int, ...]]:
     """Returns the circles of vehicles that stand and wait for each other, each from its least row on.
 
     None of them can go before another one does: they stand until a rule lets one go first.

@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 
 from skidpad.campaign.bench.headways import field_sources, headways_of, judge
 from skidpad.campaign.bench.traffic_waits import cause_name, root_of, wait_circles, wait_graph
+from skidpad.core.arrays import Floats
 from skidpad.simulation.world.traffic.manager import CHECK_PERIOD
 from skidpad.simulation.world.traffic.state import Held
 from skidpad.simulation.world.world import World
-
-Floats = NDArray[np.float64]
 
 # Steady following: speeds within 1.52 m/s and accelerations within 0.75 m/s^2 for 3.5 s (Parashar et
 # al. 2025, Communications in Transportation Research, 10.1016/j.commtr.2025.100169, from NGSIM I-80).

@@ -15,11 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError, FileError, MissingExtra
 from skidpad.core.surface import WATER_MM, SurfacePatch
 from skidpad.core.told import on_a_line
-
-Floats = NDArray[np.float64]
 
 ALONG, ACROSS = 2.0, 0.05  # m, between sections and between points of one
 LEVELS_MM = (

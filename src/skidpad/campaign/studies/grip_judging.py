@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from skidpad.campaign.driving.loop import Moment, Sink
 from skidpad.campaign.runs.run import run
+from skidpad.core.arrays import Floats
 from skidpad.core.run import RunSpec
 from skidpad.core.setup import DT
 from skidpad.core.states import EgoEstimate, VehicleCommand
@@ -24,7 +25,6 @@ from skidpad.envelope.signals import BusModel, CarBus
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
 
-Floats = NDArray[np.float64]
 V_LEAST = 2.0  # m/s, below which nothing is judged
 SURE = 0.3  # confidence from which an estimate counts as one
 ALARM, MISSED = 0.6, 1.3  # of the true grip: below is a false alarm, above is too high

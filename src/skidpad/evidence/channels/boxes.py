@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.evidence.channels.paths import sample_path, sample_plan
 
-Floats = NDArray[np.float64]
 HORIZON = 4.0  # s, also the time to collision without risk (C-094)
 STEP = 0.1  # s between samples; between them boxes go straight on
 SAMPLES = round(HORIZON / STEP) + 1

@@ -8,12 +8,11 @@ line for equal times, and a polygon in the plane of both times for a shift betwe
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.evidence.channels.boxes import HORIZON, STEP
 
-Floats = NDArray[np.float64]
 PET_SAFE = 2.0  # s, the post-encroachment time without risk (C-094)
 TINY = 1e-12
 CORNERS = 16  # of a square cut by eight lines, at most 12

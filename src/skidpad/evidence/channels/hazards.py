@@ -13,8 +13,8 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError
 from skidpad.core.reading import decode_yaml, read_bytes
 from skidpad.core.vocabulary import HazardType
@@ -23,7 +23,6 @@ from skidpad.evidence.channels.indicators.comfort import Form
 from skidpad.evidence.channels.indicators.layout import IndicatorReadings, Layout
 from skidpad.evidence.channels.risk import RiskMatrix
 
-Floats = NDArray[np.float64]
 SCORED_HAZARDS = (
     HazardType.INCONSISTENT_LOCALISATION,
     HazardType.EGO_TAILGATING,

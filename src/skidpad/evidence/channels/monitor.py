@@ -13,6 +13,7 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame, Cycle
 from skidpad.core.errors import ConfigError, require_range
 from skidpad.core.vocabulary import HazardType
@@ -42,8 +43,6 @@ from skidpad.evidence.channels.timefilter import Event, TimeFilter
 from skidpad.evidence.channels.tracked.distance import GRIPS, SafeDistance
 from skidpad.evidence.channels.tracked.vote import Tracked
 from skidpad.recording.hazards.records import HazardRecord
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(slots=True)

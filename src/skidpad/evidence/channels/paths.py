@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.jit import inner_kernel, kernel
-
-Floats = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 
 @inner_kernel
@@ -85,7 +82,7 @@ def sample_predictions(
     t_start: float,
     step: float,
     out: Floats,
-    inside: Counts,
+    inside: Ints,
 ) -> None:
     """`sample_path` for each of n objects: objects (n, 5), predictions (n, p, 2), out (n, m, 2)."""
     for i in range(objects.shape[0]):

@@ -24,13 +24,13 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.evidence.channels.boxes import HORIZON, STEP, Movers, ego_movers, world_movers
 from skidpad.evidence.channels.conflicts import PET_SAFE, encroachment, first_overlap
 from skidpad.evidence.channels.frames import usable
 
-Floats = NDArray[np.float64]
 MISS_MOST = 0.1  # risk of the nearest miss; the hit at the very end of the horizon begins there
 # Ours: a lead that brakes as hard as cars in traffic do, the response time of drivers that expect it,
 # and the hardest braking of a car on a dry road. Below 1 s of time gap at equal speed there is risk.

@@ -8,12 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame, Cycle
 from skidpad.evidence.shadow import Pedals
-
-Floats = NDArray[np.float64]
 
 AHEAD = 1.0  # s of a plan over which its braking is read
 HARDEST = 8.0  # m/s^2 of a full brake; 0.15 of it, where braking begins, are 1.2 m/s^2

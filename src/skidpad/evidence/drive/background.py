@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from skidpad.core.arrays import Flags
 from skidpad.core.vocabulary import ActorKind
-from skidpad.evidence.drive.prepared import Drive, Mask
+from skidpad.evidence.drive.prepared import Drive
 from skidpad.recording.campaign.matrix import Metrics
 
 AFTER_EGO = 20.0  # s after a contact of the ego, in which others may owe theirs to it
 UNSEEN = "unseen"  # `traffic` of a log's header: the backend does not tell contacts of others
 
 
-def background(drive: Drive, where: Mask) -> Metrics:
+def background(drive: Drive, where: Flags) -> Metrics:
     """Contacts among background vehicles over the ticks of `where` (T,); those soon after a contact
     of the ego are counted apart."""
     log = drive.log
@@ -37,7 +38,7 @@ def background(drive: Drive, where: Mask) -> Metrics:
     )
 
 
-def _vehicle_km(drive: Drive, where: Mask) -> float:
+def _vehicle_km(drive: Drive, where: Flags) -> float:
     """km that all vehicles but the ego drove."""
     log = drive.log
     others = log.table.kind <= ActorKind.MOTORCYCLE

@@ -7,10 +7,11 @@ from enum import Enum
 
 import numpy as np
 
+from skidpad.core.arrays import Flags
 from skidpad.core.states import ContactEvent
 from skidpad.core.vocabulary import RelocationReason, Supervision
 from skidpad.evidence.drive.perception import vehicle_present
-from skidpad.evidence.drive.prepared import Drive, Mask
+from skidpad.evidence.drive.prepared import Drive
 from skidpad.evidence.drive.severity import Contact, grade
 from skidpad.recording.run.log import RunLog
 
@@ -271,7 +272,7 @@ def _lead_since(drive: Drive, at: int, actor: int | None) -> float | None:
     return None if begin is None else (at - begin) * drive.log.header.dt
 
 
-def last_stretch(flags: Mask, since: int) -> int | None:
+def last_stretch(flags: Flags, since: int) -> int | None:
     """Returns where the last stretch of true values begins, None if it ends before `since`."""
     last = np.flatnonzero(flags[since:])
     if not last.size:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from skidpad.evidence.drive.prepared import Drive, Mask
-
-Floats = NDArray[np.float64]
+from skidpad.core.arrays import Flags, Floats
+from skidpad.evidence.drive.prepared import Drive
 
 V_EGO_MIN = 1.0  # m/s, below there is no time to collision (A-232)
 V_CLOSING_MIN = 0.5  # m/s (A-232)
@@ -69,7 +67,7 @@ def reported_ttc(drive: Drive) -> Floats:
     return inside
 
 
-def conflicts(drive: Drive, where: Mask) -> Conflicts:
+def conflicts(drive: Drive, where: Flags) -> Conflicts:
     """Least time to collision and time below the critical one, over samples in `where`."""
     ttc = np.where(where & drive.sample, reported_ttc(drive), np.inf)
     critical = int(np.count_nonzero(ttc < TTC_CRITICAL))
@@ -81,7 +79,7 @@ def conflicts(drive: Drive, where: Mask) -> Conflicts:
     )
 
 
-def true_conflicts(drive: Drive, where: Mask) -> TrueConflicts:
+def true_conflicts(drive: Drive, where: Flags) -> TrueConflicts:
     """Surrogates from truth while the ego drives, for leads whose box is in the ego's way."""
     lead = drive.lead
     use = where & drive.free & (drive.v > V_EGO_MIN) & lead.overlap & ~np.isnan(lead.gap)

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from skidpad.core.arrays import Floats, Ints
 from skidpad.roads.lanes import LaneKind, LaneSamples, LaneTable
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Numbers = NDArray[np.floating[Any]]
 DRIVEN = (LaneKind.DRIVING, LaneKind.RAMP)
 CANDIDATES = 4  # nearest samples whose segments are tried

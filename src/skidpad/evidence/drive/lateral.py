@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from skidpad.core.arrays import Flags
 from skidpad.core.states import LaneInvasion
-from skidpad.evidence.drive.prepared import Drive, Mask
+from skidpad.evidence.drive.prepared import Drive
 
 V_MIN = 5.0 / 3.6  # m/s, slower the offset says nothing (A-245)
 CHANGE_COOL_DOWN = 12.0  # s (A-031)
@@ -31,7 +32,7 @@ class Invasions(NamedTuple):
     lane_changes: int
 
 
-def lateral_offset(drive: Drive, where: Mask) -> Offsets:
+def lateral_offset(drive: Drive, where: Flags) -> Offsets:
     """Statistics of |offset| above 5 km/h, outside recovery and warm-up (A-245)."""
     offset = np.abs(drive.place.offset)
     use = where & drive.free & (drive.v > V_MIN) & ~np.isnan(offset)

@@ -6,12 +6,10 @@ Limits here tell events apart; those without a source are ours and were set befo
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Flags
 from skidpad.core.vocabulary import Supervision, Tier
 from skidpad.recording.run.log import RunLog
-
-Mask = NDArray[np.bool_]
 
 BRAKING = (Tier.HARD_STOP, Tier.EMERGENCY)
 FOLLOWING = (Tier.ACC_HOLD, Tier.ACC_OPEN, Tier.ACC_CLOSE)
@@ -85,32 +83,32 @@ def hits_in_cool_down(log: RunLog) -> int:
     return sum(bool(np.any((hits > r.tick) & (hits - r.tick <= lag))) for r in log.relocations)
 
 
-def _free(log: RunLog) -> Mask:
+def _free(log: RunLog) -> Flags:
     """Returns (n,) True in the ticks in which no supervisor had the ego."""
-    free: Mask = log.supervision == Supervision.NONE
+    free: Flags = log.supervision == Supervision.NONE
     return free
 
 
-def _emergency(log: RunLog) -> Mask:
+def _emergency(log: RunLog) -> Flags:
     """Returns (n,) True in free ticks in which the stack reports a braking tier."""
-    braking: Mask = np.isin(log.report.tier, BRAKING) & _free(log)
+    braking: Flags = np.isin(log.report.tier, BRAKING) & _free(log)
     return braking
 
 
-def _begins(mask: Mask) -> Mask:
+def _begins(mask: Flags) -> Flags:
     """Returns (n,) True where the mask is True and was False the tick before."""
-    begins: Mask = mask & ~np.concatenate([[False], mask[:-1]])
+    begins: Flags = mask & ~np.concatenate([[False], mask[:-1]])
     return begins
 
 
-def _within(mask: Mask, seconds: float, dt: float) -> Mask:
+def _within(mask: Flags, seconds: float, dt: float) -> Flags:
     """Ticks at most `seconds` after one of `mask`, that one included."""
     last = np.maximum.accumulate(np.where(mask, np.arange(len(mask)), -(10**9)))
-    recent: Mask = np.arange(len(mask)) - last <= round(seconds / dt)
+    recent: Flags = np.arange(len(mask)) - last <= round(seconds / dt)
     return recent
 
 
-def _disturbed_ticks(log: RunLog) -> Mask:
+def _disturbed_ticks(log: RunLog) -> Flags:
     """Ticks soon after a contact or a relocation."""
     mask = np.zeros(len(log), dtype=np.bool_)
     events = [c.tick for c in log.contacts] + [r.tick for r in log.relocations]

@@ -8,6 +8,7 @@ from dataclasses import fields
 
 import numpy as np
 
+from skidpad.core.arrays import Flags, Floats
 from skidpad.core.vocabulary import RelocationReason, Supervision
 from skidpad.evidence.drive.background import background
 from skidpad.evidence.drive.collisions import BEND_RADIUS, Crash, CrashKind, find_crashes
@@ -19,7 +20,7 @@ from skidpad.evidence.drive.perception import (
     gap_variance,
     radar_levels,
 )
-from skidpad.evidence.drive.prepared import Drive, Floats, Mask, MetricSettings, prepare
+from skidpad.evidence.drive.prepared import Drive, MetricSettings, prepare
 from skidpad.evidence.drive.severity import (
     Measure,
     Severity,
@@ -65,7 +66,7 @@ def highway_roads(drive: Drive, road_map: RoadMap) -> frozenset[int]:
 
 
 def summarise(
-    drive: Drive, crashes: Sequence[Crash], highway: frozenset[int], where: Mask | None = None
+    drive: Drive, crashes: Sequence[Crash], highway: frozenset[int], where: Flags | None = None
 ) -> Metrics:
     """Metrics over the ticks of `where` (T,), all by default."""
     if where is None:
@@ -91,12 +92,12 @@ def combine_metrics(*parts: Metrics) -> Metrics:
     return Metrics(**set_by)
 
 
-def _among(drive: Drive, events: Iterable[Event], where: Mask) -> int:
+def _among(drive: Drive, events: Iterable[Event], where: Flags) -> int:
     """Returns how many of the events lie in ticks of the mask `where`."""
     return sum(bool(where[drive.row(e.tick)]) for e in events)
 
 
-def _collisions(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
+def _collisions(drive: Drive, here: Sequence[Crash], where: Flags) -> Metrics:
     """Returns the metrics of crashes in `where`; `here` are the crashes there."""
     log = drive.log
     kinds, first = [c.kind for c in here], [c.kind for c in here if not c.follows]
@@ -126,7 +127,7 @@ def _collisions(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
     )
 
 
-def _severity(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
+def _severity(drive: Drive, here: Sequence[Crash], where: Flags) -> Metrics:
     """Returns the metrics of how hard contacts were in `where`; `here` are the crashes there."""
     touches = [c for c in graded_contacts(drive) if where[drive.row(c.tick)]]
     users = [c for c in distinct_contacts(drive) if where[drive.row(c.tick)]]
@@ -152,14 +153,14 @@ def _severity(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
     )
 
 
-def _first_fatal(drive: Drive, here: Sequence[Crash], where: Mask) -> float | None:
+def _first_fatal(drive: Drive, here: Sequence[Crash], where: Flags) -> float | None:
     """s driven among `where` to the first fatal event; None: none, it lies beyond the run."""
     if not here:
         return None
     return float(np.count_nonzero(where[: drive.row(here[0].tick)]) * drive.log.header.dt)
 
 
-def _lanes(drive: Drive, highway: frozenset[int], where: Mask) -> Metrics:
+def _lanes(drive: Drive, highway: frozenset[int], where: Flags) -> Metrics:
     """Returns the metrics of lane markings crossed and of the lateral offset in `where`."""
     counted = where & drive.free
     crossed = [i for i in drive.log.invasions if counted[drive.row(i.tick)]]
@@ -176,7 +177,7 @@ def _lanes(drive: Drive, highway: frozenset[int], where: Mask) -> Metrics:
     )
 
 
-def _conflicts(drive: Drive, where: Mask) -> Metrics:
+def _conflicts(drive: Drive, where: Flags) -> Metrics:
     """Returns the metrics of time to collision, deceleration and gap in `where`."""
     seen, true = conflicts(drive, where), true_conflicts(drive, where)
     return Metrics(
@@ -190,7 +191,7 @@ def _conflicts(drive: Drive, where: Mask) -> Metrics:
     )
 
 
-def _radar(drive: Drive, where: Mask) -> Metrics:
+def _radar(drive: Drive, where: Flags) -> Metrics:
     """Returns the metrics of false and missed radar detections in `where`."""
     pre, lane, final = radar_levels(drive, where)
     return Metrics(
@@ -207,7 +208,7 @@ def _radar(drive: Drive, where: Mask) -> Metrics:
     )
 
 
-def _distances(drive: Drive, where: Mask) -> Metrics:
+def _distances(drive: Drive, where: Flags) -> Metrics:
     """Returns the metrics of the measured distance and its dropouts in `where`."""
     errors = distance_errors(drive, where)
     dropout, dropout_present = dropout_pct(drive, where)
@@ -222,7 +223,7 @@ def _distances(drive: Drive, where: Mask) -> Metrics:
     )
 
 
-def _driving(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
+def _driving(drive: Drive, here: Sequence[Crash], where: Flags) -> Metrics:
     """Returns the metrics of speed, distance and rates in `where`; `here` are the crashes there."""
     counted = where & drive.free
     v = drive.v * KMH
@@ -244,12 +245,12 @@ def _driving(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
     )
 
 
-def _distance_km(drive: Drive, where: Mask) -> float:
+def _distance_km(drive: Drive, where: Flags) -> float:
     """Returns the distance in km driven in the ticks of `where`."""
     return float(drive.v[where].sum() * drive.log.header.dt / 1000.0)
 
 
-def _per_100_km(drive: Drive, where: Mask, events: int) -> float | None:
+def _per_100_km(drive: Drive, where: Flags, events: int) -> float | None:
     """Returns the events per 100 km driven in `where`; None without distance."""
     distance_km = _distance_km(drive, where)
     return 100.0 * events / distance_km if distance_km > 0.0 else None
@@ -260,7 +261,7 @@ def _percentile(values: Floats, percent: float) -> float | None:
     return float(np.percentile(values, percent)) if values.size else None
 
 
-def _ticks(drive: Drive, where: Mask) -> Metrics:
+def _ticks(drive: Drive, where: Flags) -> Metrics:
     """Returns the metrics of ticks counted and skipped in `where`, and of notices."""
     return Metrics(
         samples=int(np.count_nonzero(where & drive.sample)),
@@ -274,7 +275,7 @@ def _ticks(drive: Drive, where: Mask) -> Metrics:
 NO_INTERVENTION = (RelocationReason.STUCK, RelocationReason.ROAD_END)
 
 
-def first_intervention(drive: Drive, where: Mask) -> tuple[float | None, float]:
+def first_intervention(drive: Drive, where: Flags) -> tuple[float | None, float]:
     """Returns the s driven among `where` to the first intervention, and to the first reset.
 
     The first is None when no reset was made, when another one came first (a stuck ego, the end of

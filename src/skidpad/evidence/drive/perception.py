@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Flags, Floats
 from skidpad.core.vocabulary import DetectionStatus, Tier
-from skidpad.evidence.drive.prepared import LEAD_RANGE, Drive, Mask
-
-Floats = NDArray[np.float64]
+from skidpad.evidence.drive.prepared import LEAD_RANGE, Drive
 
 PRESENT = (2.0, LEAD_RANGE)  # m, exclusive (A-237)
 MEASURED = (0.1, 99.0)  # m, exclusive (A-240)
@@ -51,20 +49,20 @@ def percent(part: int, whole: int) -> float | None:
     return 100.0 * part / whole if whole else None
 
 
-def vehicle_present(drive: Drive) -> Mask:
+def vehicle_present(drive: Drive) -> Flags:
     """(T,) a lead is there in truth (A-237)."""
     d = drive.lead.distance
     return np.asarray((d > PRESENT[0]) & (d < PRESENT[1]), dtype=np.bool_)
 
 
-def confusion(reported: Mask, present: Mask, where: Mask) -> Confusion:
+def confusion(reported: Flags, present: Flags, where: Flags) -> Confusion:
     """Counts over the ticks of `where`; masks (T,)."""
     r, p = reported[where], present[where]
     counts = (r & p, r & ~p, ~r & ~p, ~r & p)
     return Confusion(*(int(np.count_nonzero(c)) for c in counts))
 
 
-def radar_levels(drive: Drive, where: Mask) -> tuple[Confusion, Confusion, Confusion]:
+def radar_levels(drive: Drive, where: Flags) -> tuple[Confusion, Confusion, Confusion]:
     """Counts at the pre-filter, after the lane check, and of the final decision (A-239)."""
     report, present = drive.log.report, vehicle_present(drive)
     use = where & drive.sample
@@ -73,7 +71,7 @@ def radar_levels(drive: Drive, where: Mask) -> tuple[Confusion, Confusion, Confu
     return pre, lane, final
 
 
-def distance_errors(drive: Drive, where: Mask) -> Errors:
+def distance_errors(drive: Drive, where: Flags) -> Errors:
     """|truth - measured| where both lie strictly between 0.1 and 99 m (A-240)."""
     truth, measured = drive.lead.distance, drive.log.report.distance
     use = where & drive.sample & _inside(truth) & _inside(measured)
@@ -88,12 +86,12 @@ def distance_errors(drive: Drive, where: Mask) -> Errors:
     )
 
 
-def _inside(distance: Floats) -> Mask:
+def _inside(distance: Floats) -> Flags:
     """Returns (n,) True where the distance in m lies within the MEASURED range, ends excluded."""
     return np.asarray((distance > MEASURED[0]) & (distance < MEASURED[1]), dtype=np.bool_)
 
 
-def gap_variance(drive: Drive, where: Mask) -> float | None:
+def gap_variance(drive: Drive, where: Flags) -> float | None:
     """Population variance of the true gap in m^2 while the stack follows (A-242)."""
     following = np.isin(drive.log.report.tier, FOLLOWING)
     gap = drive.lead.gap[where & drive.sample & following]
@@ -101,7 +99,7 @@ def gap_variance(drive: Drive, where: Mask) -> float | None:
     return float(gap.var()) if gap.size > 1 else None
 
 
-def dropout_pct(drive: Drive, where: Mask) -> tuple[float | None, float | None]:
+def dropout_pct(drive: Drive, where: Flags) -> tuple[float | None, float | None]:
     """Share of ticks that are a detection gap: of all samples (A-243), and of those on which a
     vehicle is truly there (A-244)."""
     lost = np.isin(drive.log.report.status, LOST)
@@ -110,6 +108,6 @@ def dropout_pct(drive: Drive, where: Mask) -> tuple[float | None, float | None]:
     return (_share(lost, every), _share(lost, there))
 
 
-def _share(part: Mask, whole: Mask) -> float | None:
+def _share(part: Flags, whole: Flags) -> float | None:
     """Returns how many % of the `whole` are also in `part`; None where the whole is empty."""
     return percent(int(np.count_nonzero(part & whole)), int(np.count_nonzero(whole)))

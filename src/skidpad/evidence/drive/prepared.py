@@ -8,16 +8,12 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Flags, Floats, Ints
 from skidpad.core.vocabulary import ActorKind, Supervision
 from skidpad.evidence.drive.lanematch import LaneIndex, LaneMatch
 from skidpad.recording.run.log import RunLog
 from skidpad.roads.queries import RoadMap
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 LEAD_RANGE = 80.0  # m, A-236
 
@@ -43,7 +39,7 @@ class Leads(NamedTuple):
     distance: Floats  # m between positions (A-236)
     gap: Floats  # m bumper to bumper along the lane, >= 0; NaN also where it is behind
     v_closing: Floats  # m/s along the lane, positive when closing
-    overlap: Mask  # the two boxes overlap across the lane
+    overlap: Flags  # the two boxes overlap across the lane
 
 
 class Pairs(NamedTuple):
@@ -55,7 +51,7 @@ class Pairs(NamedTuple):
     other: LaneMatch
     along: Floats  # m along the lane between positions, not finite where no lane leads there
 
-    def where(self, chosen: Mask) -> Pairs:
+    def where(self, chosen: Flags) -> Pairs:
         """Returns only the chosen pairs."""
         ego, other = self.ego.at(chosen), self.other.at(chosen)
         return Pairs(self.row[chosen], self.actor[chosen], ego, other, self.along[chosen])
@@ -81,9 +77,9 @@ class Drive:
     place: LaneMatch
     lead: Leads
     v: Floats
-    free: Mask
-    sample: Mask
-    strays: Mask
+    free: Flags
+    sample: Flags
+    strays: Flags
 
     def row(self, tick: int) -> int:
         """The row of a tick, or of the first one after it."""
@@ -114,12 +110,12 @@ def lane_index(road_map: RoadMap) -> LaneIndex:
     return LaneIndex(road_map.samples, road_map.lanes)
 
 
-def _strays(log: RunLog, road_map: RoadMap, free: Mask) -> Mask:
+def _strays(log: RunLog, road_map: RoadMap, free: Flags) -> Flags:
     """Ticks off all lanes that nothing counts: a stretch that the supervisor ended is counted."""
     a, table = log.actors, log.table
     size = float(table.length[0]), float(table.width[0])
     off = road_map.edge.off(a.x[:, 0], a.y[:, 0], a.z[:, 0], a.yaw[:, 0], *size)
-    strays: Mask = off & free
+    strays: Flags = off & free
     for row in np.flatnonzero(free[:-1] & ~free[1:]).tolist():
         while row >= 0 and strays[row]:
             strays[row] = False
@@ -145,11 +141,11 @@ def find_leads(log: RunLog, index: LaneIndex, place: LaneMatch, rule: LeadDefini
     return _describe(log, pairs.where(is_lead & (np.argmin(best, axis=1)[k] == i)))
 
 
-def _same_ids(index: LaneIndex, a: LaneMatch, b: LaneMatch) -> Mask:
+def _same_ids(index: LaneIndex, a: LaneMatch, b: LaneMatch) -> Flags:
     """Returns (n,) True where both matches lie on lanes of the same road and lane id."""
     road, lane_id = index.lanes.road, index.lanes.lane_id
     same = (road[a.lane] == road[b.lane]) & (lane_id[a.lane] == lane_id[b.lane])
-    known: Mask = same & (a.lane >= 0) & (b.lane >= 0)
+    known: Flags = same & (a.lane >= 0) & (b.lane >= 0)
     return known
 
 

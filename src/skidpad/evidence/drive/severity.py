@@ -7,10 +7,11 @@ from enum import Enum
 
 import numpy as np
 
+from skidpad.core.arrays import Floats
 from skidpad.core.geometry import mps_from_kmh
 from skidpad.core.states import ContactEvent
 from skidpad.core.vocabulary import ActorKind
-from skidpad.evidence.drive.prepared import Drive, Floats
+from skidpad.evidence.drive.prepared import Drive
 from skidpad.recording.run.log import RunLog
 
 LIGHT_BELOW = mps_from_kmh(5.0)  # m/s, a contact below it is of the lowest class

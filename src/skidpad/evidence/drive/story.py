@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from skidpad.core.arrays import Flags, Floats
 from skidpad.core.vocabulary import DetectionStatus, Tier
 from skidpad.evidence.drive.collisions import (
     CHAIN_TIME,
@@ -24,7 +25,7 @@ from skidpad.evidence.drive.collisions import (
     number,
     rows_before,
 )
-from skidpad.evidence.drive.prepared import LEAD_RANGE, Drive, Floats, Mask
+from skidpad.evidence.drive.prepared import LEAD_RANGE, Drive
 from skidpad.evidence.drive.severity import Contact, graded_contacts
 from skidpad.recording.run.log import RunLog
 
@@ -133,7 +134,7 @@ class _Way:
         self.reach = LEAD_RANGE - float(half_lengths[EGO] + half_lengths.max())
         lead = drive.lead
         self.gap: Floats = np.full(at + 1, np.nan)
-        self.ahead: Mask = np.zeros(at + 1, dtype=np.bool_)
+        self.ahead: Flags = np.zeros(at + 1, dtype=np.bool_)
         if actor is not None:
             self.gap, straight = _box_gap(drive.log, at, actor)
             hidden = lead.gap[: at + 1] < self.gap  # the lead stands between
@@ -230,7 +231,7 @@ def _box_of(log: RunLog, at: int, actor: int) -> _Box:
     return _Box(x, y, yaw, length / 2.0, width / 2.0)
 
 
-def _box_gap(log: RunLog, at: int, actor: int) -> tuple[Floats, Mask]:
+def _box_gap(log: RunLog, at: int, actor: int) -> tuple[Floats, Flags]:
     """m between the boxes of the ego and an actor, and whether it is straight ahead and near."""
     ego, other = (_box_of(log, at, i) for i in (EGO, actor))
     gaps = [a.gap(x, y) for a, b in ((ego, other), (other, ego)) for x, y in b.corners()]

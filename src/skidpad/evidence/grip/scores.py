@@ -16,14 +16,13 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.geometry import kmh_from_mps
 from skidpad.core.lefthanded import mirror_value
 from skidpad.core.states import ContactEvent
 from skidpad.core.vocabulary import ActorKind, Outcome
 from skidpad.recording.campaign.grip import GripMetrics
 from skidpad.recording.run.log import RunLog
-
-Floats = NDArray[np.float64]
 
 # What counts as lost control is our choice, no standard's: 49 CFR 571.126 (FMVSS 126) judges the decay
 # of the yaw rate after a sine-with-dwell steer, which no scenario here performs.

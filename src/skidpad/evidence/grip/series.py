@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.randomness import stream
 from skidpad.evidence.grip.warping import Cost, warping_distance
 from skidpad.evidence.limits import CONFIDENCE
 from skidpad.evidence.statistics import Interval
-
-Floats = NDArray[np.float64]
 
 RESAMPLES = 200  # decision G-4
 STRIDE = 4  # 20 Hz to 5 Hz, for resamples only (decision G-4)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.setup import DT
 from skidpad.evidence.contrasts import NOT_RUN
 from skidpad.evidence.grip.series import (
@@ -31,8 +31,6 @@ from skidpad.evidence.statistics import (
     mean_limits,
 )
 from skidpad.recording.campaign.grip import COLUMNS
-
-Floats = NDArray[np.float64]
 
 ORIGINAL, REDUCED = "original", "reduced"
 METRICS = ("x", "y", "v", "cvip", "steer", "brake", "throttle")  # B-107

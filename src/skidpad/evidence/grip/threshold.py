@@ -22,8 +22,6 @@ from skidpad.evidence.grip.study import ORIGINAL, REDUCED, Share, completion
 from skidpad.evidence.statistics import Interval, median_time
 from skidpad.evidence.verdicts import Judgement, judge
 
-Floats = NDArray[np.float64]
-
 SITUATION = ("driver", "actors", "start", "deceleration")
 BASELINE_MIN = 0.95  # share completed on dry road, below which a situation says nothing of friction
 JUDGED = ("BF-01", "BF-02", "BF-03", "BF-10")  # what a lead slowdown alone can judge

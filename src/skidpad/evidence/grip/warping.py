@@ -6,9 +6,8 @@ from enum import Enum
 
 import numpy as np
 from dtaidistance import dtw
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from skidpad.core.arrays import Floats
 
 
 class Cost(str, Enum):

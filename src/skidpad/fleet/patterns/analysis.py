@@ -10,9 +10,9 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 from sqlalchemy import ColumnElement, Connection, select
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import FileError
 from skidpad.evidence.channels.hazards import Signal
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
@@ -186,7 +186,6 @@ def cluster_row(connection: Connection, who: Principal, cluster: str) -> dict[st
 # --- how a hazard went: signals of the rules over its record, as one series of fixed length
 
 
-Floats = NDArray[np.float64]
 POINTS = 20  # of a series; records have 11 s, so one point stands for about half a second
 VERSION = 1  # of what a series means; another one is computed anew
 # signal, what it is divided by, and what stands where there is no conflict or no value

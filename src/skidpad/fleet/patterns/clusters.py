@@ -18,11 +18,10 @@ from math import floor, hypot
 
 import numpy as np
 from dtaidistance import dtw_ndim
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError, MissingExtra, require_range
 
-Floats = NDArray[np.float64]
 BLOCK = 2000  # hazards of one map and kind that density is asked of at once
 
 

@@ -6,13 +6,11 @@ from math import cos, sin
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skidpad.core.channels import ChannelFrame
 from skidpad.live.ros2.types import OBJECTS, ODOMETRY, PATH, Types
 from skidpad.recording.formats.ros_objects import AUTOWARE_CLASSES
 
-Floats = NDArray[np.float64]
 NS = 1_000_000_000
 NOTHING_KNOWN = [0.0] * 36  # a covariance
 POLYGON = 2  # type of a shape with a footprint

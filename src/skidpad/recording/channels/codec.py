@@ -7,11 +7,11 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame, Context, Decision, TruthFrame
 from skidpad.core.errors import FileError
 from skidpad.recording.channels import channels_pb2 as pb
 
-Floats = NDArray[np.float64]
 POLYGON_LIMIT = 64  # vertices; a shape with more is not a shape but damage
 
 

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.recording.files import read_parquet, require_columns, write_parquet
 
-Floats = NDArray[np.float64]
 FILE = "indicators.parquet"
 TYPES = {
     "cycle": pl.Int64,

@@ -23,8 +23,8 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame
 from skidpad.core.errors import ConfigError, FileError, MissingExtra
 from skidpad.core.reading import decode_yaml, read_bytes
@@ -32,7 +32,6 @@ from skidpad.core.told import on_a_line
 from skidpad.recording.channels.mcap_files import Losses, Message
 from skidpad.recording.formats.ros_objects import OBJECT_READERS, RosObjects, empty_objects, yaw_of
 
-Floats = NDArray[np.float64]
 NS = 1e9
 FRESH = 0.15  # s, an older object list does not belong to an ego pose
 PLAN_FRESH = 1.0  # s, an older plan is none

@@ -7,13 +7,11 @@ from math import atan2, cos, sin
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.recording.channels.codec import POLYGON_LIMIT, padded_polygons
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 NS = 1e9
 # autoware_perception_msgs/ObjectClassification
 AUTOWARE_CLASSES = {

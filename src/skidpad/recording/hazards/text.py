@@ -21,15 +21,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame, Cycle
 
 HEADER = "SKIDPAD HAZARDS 1"
 PATHS_EVERY_MS = 500
 SHAPE_TOLERANCE = 5  # cm
 NUMBER_LIMIT = 10**15  # a greater size is written as not a number
-Floats = NDArray[np.float64]
 _POSE_SCALE = np.array([100.0, 100.0, 1000.0, 100.0, 100.0])  # cm, cm, mrad, cm/s, cm/s
 Pose = list["int | None"]  # x, y in cm, heading in mrad, vx, vy in cm/s
 Numbers = list["int | None"]

@@ -6,14 +6,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame, Cycle
 from skidpad.core.errors import FileError
 from skidpad.recording.channels.codec import padded_polygons
 from skidpad.recording.hazards.text import NUMBER_LIMIT, Channel, Numbers, Object, Pose, moved_on
 
-Floats = NDArray[np.float64]
 LINE_LIMIT = 2_000_000  # characters
 CYCLE_LIMIT = 10_000
 ID_LIMIT = 2**63  # identities are the largest numbers of the format

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Floats32, Ints
 from skidpad.core.states import ActorTable, ContactEvent, LaneInvasion, TrafficContact
 from skidpad.recording.run.events import (
     Event,
@@ -23,23 +24,19 @@ from skidpad.recording.run.events import (
     RolledOver,
 )
 
-Floats = NDArray[np.float64]
-Float32 = NDArray[np.float32]
-Ints = NDArray[np.int64]
-
 
 class ActorSeries(NamedTuple):
     """Motion of n actors over T ticks, arrays (T, n); column 0 is the ego."""
 
-    x: Float32
-    y: Float32
-    z: Float32
-    yaw: Float32
-    vx: Float32
-    vy: Float32
-    yaw_rate: Float32
-    ax: Float32  # body frame
-    ay: Float32
+    x: Floats32
+    y: Floats32
+    z: Floats32
+    yaw: Floats32
+    vx: Floats32
+    vy: Floats32
+    yaw_rate: Floats32
+    ax: Floats32  # body frame
+    ay: Floats32
 
 
 class EgoSeries(NamedTuple):
@@ -111,7 +108,7 @@ class RunLog:
     tick: Ints  # (T,)
     actors: ActorSeries
     present: NDArray[np.bool_]  # (T, n)
-    mu: Float32  # (T, n, 4) at the tyres FL, FR, RL, RR; NaN where there is none
+    mu: Floats32  # (T, n, 4) at the tyres FL, FR, RL, RR; NaN where there is none
     ego: EgoSeries
     applied: CommandSeries  # what drove the ego into this moment
     requested: CommandSeries  # what the stack asked for in answer to it

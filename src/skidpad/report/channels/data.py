@@ -12,6 +12,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.reading import convert_plain
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.indicators.catalogue import (
@@ -24,8 +25,6 @@ from skidpad.recording.channels.indicators import read_indicators
 from skidpad.recording.channels.monitored import SUMMARY, read_summary, read_timing
 from skidpad.recording.hazards.records import HazardRecord, read_hazards
 from skidpad.recording.hazards.searched import Searches, read_searches
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame, Cycle
 from skidpad.core.errors import MissingExtra
 from skidpad.evidence.channels.monitor import Monitor
 
-Floats = NDArray[np.float64]
 APPLICATION = "skidpad channels"
 COLOURS = ((255, 91, 82), (79, 206, 127), (242, 180, 65), (181, 140, 255))  # C-211: red, green
 EGO = (77, 157, 255)

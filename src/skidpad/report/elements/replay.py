@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.surface import SurfacePatch
 from skidpad.recording.run.log import RunLog
 from skidpad.roads.lanes import LaneKind
@@ -22,7 +23,6 @@ BORDER_STEP = 4  # samples between the points of a lane border
 SPAN = 70.0  # m across the picture
 LEVEL = 4.0  # m of height within which things share a level
 FRAMES = 900  # of a whole run
-Floats = NDArray[np.float64]
 
 
 def replay(
@@ -118,7 +118,7 @@ def _near(points: Floats, way: Floats) -> NDArray[np.bool_]:
     return near
 
 
-def _place(log: RunLog, k: int, i: int, centre: NDArray[np.float64]) -> list[int | None]:
+def _place(log: RunLog, k: int, i: int, centre: Floats) -> list[int | None]:
     """Return actor `i` at tick `k`: x, y in UNIT from `centre`, yaw in mrad; None each if absent."""
     if not log.present[k, i]:
         return [None, None, None]
@@ -126,7 +126,7 @@ def _place(log: RunLog, k: int, i: int, centre: NDArray[np.float64]) -> list[int
     return [*_whole(np.array([a.x[k, i], a.y[k, i]]) - centre), round(float(a.yaw[k, i]) * 1000)]
 
 
-def _whole(points: NDArray[np.float64]) -> list[int]:
+def _whole(points: Floats) -> list[int]:
     """Return points in m flattened to whole multiples of UNIT."""
     whole: list[int] = np.round(points.ravel() / UNIT).astype(int).tolist()
     return whole

@@ -9,7 +9,8 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from skidpad.core.arrays import Floats
+
 BINS = 420  # over the width; a bin shows the least and greatest value in it
 LEFT, WIDTH, STRIP, GAP = 232.0, 840.0, 30.0, 9.0  # px
 ALARM = "#d9541e"

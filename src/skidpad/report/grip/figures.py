@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.setup import DT
 from skidpad.evidence.grip.study import ORIGINAL, REDUCED, CellSeries, Pair
 from skidpad.report.elements.figures import Chart, Curve, curves
 from skidpad.report.elements.page import Block, Figure
 from skidpad.report.grip.data import GripCampaign, scenario_title
 
-Floats = NDArray[np.float64]
 SHOWN = ("icy_30", "icy_100", "rain_100")  # of each scenario
 LABELS = {"cvip": "distance, m", "v": "speed, m/s", "steer": "steering, left negative"}
 ACROSS = (("lead_slowdown", "icy"), ("ghost_cut_in", "icy"), ("front_accident", "rain"))

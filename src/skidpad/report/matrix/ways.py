@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.recording.run.log_files import read_log
 from skidpad.report.crashes.cards import Found
 from skidpad.report.elements.figures import FRAME, Chart, Curve, curves
@@ -19,7 +20,6 @@ from skidpad.roads.bundled import kept_map
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import RoadMap
 
-Floats = NDArray[np.float64]
 JUMP = 20.0  # m between two points that are drawn, beyond which the car was put back
 THINNED = 10  # ticks between the points of a way
 GREY = 5  # of the palette

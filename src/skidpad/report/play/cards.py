@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.geometry import kmh_from_mps
 from skidpad.evidence.drive.conflict import time_to_collision
 from skidpad.evidence.pairs import EGO, body, following, together
@@ -21,7 +21,6 @@ from skidpad.report.elements.replay import replay_run
 from skidpad.report.elements.timeline import Mark, Strip, timelines
 from skidpad.report.play.runs import PlayRun, find_road
 
-Floats = NDArray[np.float64]
 STORY = "storyboard.csv"
 OF_FILE = "file"  # name of the weather that a file describes
 OTHERS, EVENTS = 3, 14  # shown at most

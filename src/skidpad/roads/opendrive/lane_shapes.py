@@ -10,12 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import FileError
 from skidpad.roads.lanes import LaneKind, Marking
 from skidpad.roads.opendrive.document import Document, LaneRecord, RoadRecord, SectionRecord
 from skidpad.roads.opendrive.reference_line import Cubics
-
-Floats = NDArray[np.float64]
 
 STEP = 0.98  # m, longest distance of samples along any lane of a section
 JOINT = 1e-6  # m inside a section: where records are chosen at its ends

@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skidpad.roads.lanes import Ints, LaneKind
+from skidpad.core.arrays import Ints32
+from skidpad.roads.lanes import LaneKind
 from skidpad.roads.opendrive.document import Document, Link, RoadRecord
 from skidpad.roads.opendrive.lane_shapes import SHORTEST, LaneKey, LaneShape
 
@@ -17,9 +18,9 @@ DRIVABLE = (LaneKind.DRIVING, LaneKind.RAMP)
 class Neighbours(NamedTuple):
     """Columns of the lane table, (L,)."""
 
-    left: Ints
-    right: Ints
-    opposite: Ints
+    left: Ints32
+    right: Ints32
+    opposite: Ints32
 
 
 def neighbours(shapes: Sequence[LaneShape], index: Mapping[LaneKey, int]) -> Neighbours:
@@ -57,7 +58,7 @@ def successions(
     return pairs
 
 
-def compress_pairs(pairs: set[tuple[int, int]], lanes: int) -> tuple[Ints, Ints]:
+def compress_pairs(pairs: set[tuple[int, int]], lanes: int) -> tuple[Ints32, Ints32]:
     """Compresses pairs (a, b) to (start, b sorted by a): the b of lane i are b[start[i]:start[i + 1]]."""
     table = np.array(sorted(pairs), dtype=np.int32).reshape(-1, 2)
     start = np.searchsorted(table[:, 0], np.arange(lanes + 1)).astype(np.int32)

@@ -13,8 +13,8 @@ import numpy as np
 from lxml import etree
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.roads.edge import ROAD, RoadEdge
-from skidpad.roads.lanes import Floats
 from skidpad.roads.opendrive.bake import bake
 from skidpad.roads.opendrive.document import Document, Node, RoadRecord, id_number, parse
 from skidpad.roads.opendrive.lane_shapes import LaneShape, lane_shapes

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from skidpad.core.arrays import Floats
 
 STRAIGHTEST = 1e-12  # 1/m^2, slower change of curvature than this is an arc
 TABLE_STEP = 0.25  # m, spacing of the table that turns arc length into a cubic's parameter

@@ -7,16 +7,14 @@ from math import cos, sin
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.lanes import SignalTable
 from skidpad.roads.opendrive.document import Document, Node, Reader, RoadRecord
 from skidpad.roads.opendrive.lane_shapes import LaneShape
 from skidpad.roads.opendrive.signals import road_place, signal_heads
 from skidpad.roads.roadside import Barrier, BarrierKind, Box, ParkingSpace, Roadside
-
-Floats = NDArray[np.float64]
 
 BARRIER_STEP = 2.0  # m between the points of a barrier; 7 mm of chord at R 70
 REPEATS_MAX = 1_000_000  # of one object

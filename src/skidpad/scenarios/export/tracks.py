@@ -6,13 +6,12 @@ from dataclasses import dataclass, field
 from math import cos, hypot, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.recording.hazards.records import HazardRecord
 
-Floats = NDArray[np.float64]
 V_STANDING = 0.5  # m/s, below it the heading is held
 GAP_MAX = 0.35  # s without the object that still is one track
 MATCH_DISTANCE = 3.0  # m between expected and reported place of an object without identity

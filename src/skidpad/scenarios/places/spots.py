@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Flags
 from skidpad.core.geometry import Pose
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import LanePoint, RoadMap
@@ -18,7 +19,6 @@ from skidpad.scenarios.scene import Actor, Scene
 SPACING = 5  # samples, each at most 1 m, from one spot to the next
 ABREAST = 2.0  # m, nearer than this sideways is in the same lane
 Array = NDArray[Any]
-Mask = NDArray[np.bool_]
 
 
 class Spots(NamedTuple):
@@ -33,17 +33,17 @@ class Spots(NamedTuple):
     lane: Array
     s: Array
 
-    def where(self, mask: Mask) -> Spots:
+    def where(self, mask: Flags) -> Spots:
         """Returns the spots of a mask."""
         return Spots(*(column[mask] for column in self))
 
-    def free(self, actor: Actor, before: float, behind: float) -> Mask:
+    def free(self, actor: Actor, before: float, behind: float) -> Flags:
         """Those with room in m, before and behind them, to an actor's centre in their lane."""
         dx, dy = actor.pose.x - self.x, actor.pose.y - self.y
         c, s = np.cos(self.heading), np.sin(self.heading)
         forward = dx * c + dy * s
         along = (forward < before) & (forward > -behind)
-        away: Mask = ~along | (np.abs(dy * c - dx * s) > ABREAST)
+        away: Flags = ~along | (np.abs(dy * c - dx * s) > ABREAST)
         return away
 
 
@@ -71,7 +71,7 @@ def spot_at(map: RoadMap, point: LanePoint) -> Spots:
 class Region(Protocol):
     """A part of the world, perhaps around something that moves."""
 
-    def inside(self, scene: Scene, spots: Spots) -> Mask:
+    def inside(self, scene: Scene, spots: Spots) -> Flags:
         """Returns the mask of the spots that lie in the region now."""
         ...
 
@@ -83,10 +83,10 @@ class Disc:
     centre: Position
     radius: float
 
-    def inside(self, scene: Scene, spots: Spots) -> Mask:
+    def inside(self, scene: Scene, spots: Spots) -> Flags:
         """Returns which spots lie within the radius of the centre."""
         pose = self.centre.place(scene).pose
-        near: Mask = np.hypot(spots.x - pose.x, spots.y - pose.y) <= self.radius
+        near: Flags = np.hypot(spots.x - pose.x, spots.y - pose.y) <= self.radius
         return near
 
 
@@ -105,12 +105,12 @@ class Oval:
     inner: float
     rim: float = 0.0
 
-    def inside(self, scene: Scene, spots: Spots) -> Mask:
+    def inside(self, scene: Scene, spots: Spots) -> Flags:
         """Tells the spots between the inner disc, or the rim, and the ellipse."""
         centre = scene.actors[self.entity].pose.moved(forward=self.offset)
         forward, left = between(centre, spots.x, spots.y)
         share = np.hypot(forward / self.major, left / self.minor)
-        far: Mask = (np.hypot(forward, left) >= self.inner) & (share >= self.rim) & (share <= 1.0)
+        far: Flags = (np.hypot(forward, left) >= self.inner) & (share >= self.rim) & (share <= 1.0)
         return far
 
 
@@ -120,7 +120,7 @@ class Outline:
 
     corners: tuple[Position, ...]
 
-    def inside(self, scene: Scene, spots: Spots) -> Mask:
+    def inside(self, scene: Scene, spots: Spots) -> Flags:
         """Tells the spots inside by the edges that a ray along x crosses (even and odd)."""
         poses = [corner.place(scene).pose for corner in self.corners]
         odd = np.zeros(len(spots.x), np.bool_)
@@ -147,7 +147,7 @@ class Stretches:
 
     parts: tuple[Stretch, ...]
 
-    def inside(self, scene: Scene, spots: Spots) -> Mask:
+    def inside(self, scene: Scene, spots: Spots) -> Flags:
         """Tells the spots inside by road, lane and s."""
         del scene
         found = np.zeros(len(spots.x), np.bool_)
@@ -161,7 +161,7 @@ class Stretches:
         return found
 
 
-def along(pose: Pose, spots: Spots) -> Mask:
+def along(pose: Pose, spots: Spots) -> Flags:
     """Spots whose traffic runs as the pose looks."""
-    same: Mask = np.cos(spots.heading - pose.yaw) > 0.0
+    same: Flags = np.cos(spots.heading - pose.yaw) > 0.0
     return same

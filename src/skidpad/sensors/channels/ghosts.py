@@ -8,10 +8,10 @@ from math import cos, pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.randomness import stream
 from skidpad.core.vocabulary import SemanticClass
 
-Floats = NDArray[np.float64]
 NEAREST, FARTHEST = 8.0, 40.0  # m from the ego
 CLASSES = (SemanticClass.CAR, SemanticClass.PEDESTRIAN)
 SIZES = {SemanticClass.CAR: (4.5, 1.9), SemanticClass.PEDESTRIAN: (0.5, 0.6)}  # m

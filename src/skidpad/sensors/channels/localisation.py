@@ -6,12 +6,10 @@ from dataclasses import dataclass, replace
 from math import exp, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import require_range
 from skidpad.core.randomness import stream
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

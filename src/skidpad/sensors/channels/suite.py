@@ -14,6 +14,7 @@ from math import cos, hypot, pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelView
 from skidpad.core.errors import require_range
 from skidpad.core.randomness import stream
@@ -26,8 +27,6 @@ from skidpad.sensors.channels.ghosts import Ghosts, GhostSettings
 from skidpad.sensors.channels.localisation import Localisation, LocalisationError, gauss_markov
 from skidpad.sensors.object_level.boxes import Boxes, posts_of
 from skidpad.sensors.object_level.sight import empty_sight, look, sees_point
-
-Floats = NDArray[np.float64]
 
 CYCLE = 0.1  # s (C-022)
 DARK_LUX = 10.0  # civil twilight ends near 3 lux; street lights are switched on at 10 to 40

@@ -11,12 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind, LightState
 from skidpad.roads.roadside import SignalHead
 from skidpad.sensors.pictures.lighting import Lighting
-
-Floats = NDArray[np.float64]
 
 HEAD, TAIL, BRAKE = (1.0, 0.93, 0.78), (0.55, 0.02, 0.02), (1.0, 0.05, 0.03)
 SIGNAL = {

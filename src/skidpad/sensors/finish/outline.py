@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.sensors.raster.view import View
 
-Floats = NDArray[np.float64]
 MOST = 96  # points on screen: 16 corners, and where their 120 edges pass the near plane
 CUT = 0.3  # m, the plane before the camera at which edges are cut
 

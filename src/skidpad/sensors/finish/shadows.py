@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind
@@ -22,8 +23,6 @@ from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.pictures.packing import pack, unpack
 from skidpad.sensors.raster.view import View
 from skidpad.sensors.scene.materials import MATERIALS, Material
-
-Floats = NDArray[np.float64]
 
 GROUND = (
     Material.ASPHALT,

@@ -5,15 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import inner_kernel
 from skidpad.core.states import ActorStates
 from skidpad.roads.roadside import Roadside
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 GROUP = 16  # walls
 ROUNDING = 1e-3  # m, more than any sum of coordinates is rounded by

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Flags, Floats
 from skidpad.core.jit import kernel
 from skidpad.core.setup import Setup
 from skidpad.core.sight import DriverView, RoadLook, SeenActors
@@ -29,8 +30,6 @@ from skidpad.roads.roadside import Roadside
 from skidpad.sensors.object_level.boxes import Boxes, posts_of
 from skidpad.sensors.object_level.sight import ray_box
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 EGO = 0
 FARTHEST = 300.0  # m that a driver attends to at most (ours)
 LIGHT_FARTHEST = 200.0  # m likewise for the lamps of traffic lights (ours)

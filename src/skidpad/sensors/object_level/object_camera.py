@@ -7,12 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.jit import inner_kernel
 from skidpad.core.states import ActorStates
 from skidpad.sensors.object_level.boxes import Boxes, Mount, boxes_in_view, place
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 NEAR = 0.1  # m, near clip
 STRIP = 0.75  # m of a long face per strip

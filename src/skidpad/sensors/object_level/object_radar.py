@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.jit import inner_kernel
 from skidpad.core.specs import RadarSpec
 from skidpad.core.states import ActorStates
@@ -26,9 +27,6 @@ from skidpad.sensors.object_level.boxes import (
     walls_in_view,
 )
 from skidpad.sensors.ranging.beam import Beam, beam_of, direction
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 NEAR = 0.1  # m, near clip
 CERTAIN = 1e-9  # a share of a wall this far below its first end, or above its last, is beyond it

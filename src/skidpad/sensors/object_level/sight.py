@@ -11,11 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints32
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.sensors.object_level.boxes import Boxes
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
 
 BEARINGS = 720  # of half a degree: a pedestrian at 60 m still fills one
 LEVEL_GAP = 1.5  # m above or below the eye's road, beyond which a body is on another road
@@ -26,7 +24,7 @@ class Sight(NamedTuple):
     """Depth buffer over bearings; bearing k looks along -pi + (k + 0.5) * 2 pi / BEARINGS."""
 
     depth: Floats  # (BEARINGS,) m, inf: nothing
-    owner: Ints  # (BEARINGS,) actor index; n + j: fixed box j; -1: nothing
+    owner: Ints32  # (BEARINGS,) actor index; n + j: fixed box j; -1: nothing
     share: Floats  # (n,) of the bearings that an actor fills, those on which it is nearest
 
 

@@ -12,14 +12,11 @@ from math import exp, log, pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.jit import inner_kernel
 from skidpad.core.splitmix import GOLDEN
 from skidpad.sensors.noise import uniform
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 BITS = 14
 SLOTS = 1 << BITS  # of the table; fewer than half may be taken

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.jit import inner_kernel
 from skidpad.core.states import ActorStates
 from skidpad.sensors.noise import uniform
@@ -15,8 +16,6 @@ from skidpad.sensors.object_level.boxes import WallGroups, Walls, walls_in_view
 from skidpad.sensors.physical_radar.cells import Cells, add_echo, normal_pair
 from skidpad.sensors.physical_radar.setup import BEAM_STEP, DB, RadarSetup
 from skidpad.sensors.physical_radar.targets import LOBES, Sites, Targets
-
-Floats = NDArray[np.float64]
 
 NEAR = 1.0  # m, nearest echo
 

@@ -14,8 +14,8 @@ from math import ceil, log, pi, radians, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.specs import RadarSpec
 from skidpad.core.weather import Weather
 from skidpad.physics.grip import rain_rate
@@ -23,8 +23,6 @@ from skidpad.physics.optics import RADAR_GHZ, rain_attenuation_db_km
 from skidpad.physics.radio import rain_scatter, wet_radome_db
 from skidpad.sensors.object_level.boxes import Mount, mount_of
 from skidpad.sensors.physical_radar.cells import RANGES, Grid, cfar_threshold, snr_for
-
-Floats = NDArray[np.float64]
 
 RANGE_STEP, SPEED_STEP, BEAM_STEP = 0.6, 0.53 / 3.6, radians(1.4)  # TIDUEN5A
 MAX_SPEED = 133.0 / 3.6  # m/s, TIDUEN5A; faster targets keep their Doppler here

@@ -15,11 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.states import ActorTable
 from skidpad.core.vocabulary import ActorKind
 from skidpad.roads.roadside import Roadside
-
-Floats = NDArray[np.float64]
 
 FRONT, LEFT, BACK, RIGHT = range(4)  # sides, counter-clockwise from the front
 # by side: phi_center deg, phi_3dB deg, theta_center deg, theta_3dB deg, G_max dBsm, sigma_max dB

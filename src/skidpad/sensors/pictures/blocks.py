@@ -9,12 +9,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats32
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.sensors.pictures.packing import pack
 from skidpad.sensors.raster.view import View
 from skidpad.sensors.scene.materials import MATERIALS
-
-Float32 = NDArray[np.float32]
 
 # Columns of the look-up table, one row per (instance, material).
 RED, GREEN, BLUE, GLOW, WETTABLE, GLOSS = range(6)
@@ -46,7 +45,7 @@ def end_of_run(keys: NDArray[np.int32], x: int) -> int:
 
 @kernel
 def gather(
-    key: NDArray[np.int32], y: int, first: int, count: int, table: Float32, work: Float32
+    key: NDArray[np.int32], y: int, first: int, count: int, table: Floats32, work: Floats32
 ) -> None:
     """Colour and behaviour of a block's pixels from the table, one read per run of equal keys."""
     keys = key[y, first : first + count]
@@ -70,7 +69,7 @@ def gather(
 
 @inner_kernel
 def slopes(
-    inverse: Float32, y: int, first: int, count: int, view: View, work: Float32
+    inverse: Floats32, y: int, first: int, count: int, view: View, work: Floats32
 ) -> tuple[bool, bool]:
     """Viewing direction, inverse depth and its two slopes, of a block's pixels.
 
@@ -109,7 +108,7 @@ def slopes(
 
 
 @inner_kernel
-def develop(count: int, work: Float32, out: NDArray[np.uint32]) -> None:
+def develop(count: int, work: Floats32, out: NDArray[np.uint32]) -> None:
     """Linear light to bytes: gamma 2, clipped, packed as red, green, blue, 255."""
     for x in range(count):
         r, g, b = work[R + x], work[G + x], work[B + x]

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Bytes
 from skidpad.core.vocabulary import SemanticClass
-
-Bytes = NDArray[np.uint8]
 
 # CityScapes colours as documented for CARLA 0.9.15.
 CITYSCAPES: dict[SemanticClass, tuple[int, int, int]] = {
@@ -46,7 +45,7 @@ for _label, _rgb in CITYSCAPES.items():
     _COLOURS[_label] = _rgb
 
 
-def cityscapes_colours(labels: NDArray[np.uint8]) -> Bytes:
+def cityscapes_colours(labels: Bytes) -> Bytes:
     """(H, W) class ids to (H, W, 3) red, green, blue (A-034)."""
     return _COLOURS[labels]
 

@@ -10,20 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from skidpad.core.arrays import Floats32
 from skidpad.core.jit import inner_kernel
-from skidpad.sensors.pictures.blocks import (
-    BLOCK,
-    LANES,
-    ONE,
-    ZERO,
-    B,
-    Float32,
-    G,
-    R,
-    U,
-    W,
-    end_of_run,
-)
+from skidpad.sensors.pictures.blocks import BLOCK, LANES, ONE, ZERO, B, G, R, U, W, end_of_run
 from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.raster.view import View
 
@@ -32,7 +21,7 @@ SIZE = 256  # texels of a tile's edge, a power of two
 FINE, COARSE = 0.04, 1.0  # m, a texel of grains and one of patches
 
 
-def _make_tiles() -> Float32:
+def _make_tiles() -> Floats32:
     """(3 * SIZE * SIZE,) grains, then patches and tints in turn: mean 0, deviation a third."""
     rng = np.random.default_rng(20)
     tiles = np.empty((3, SIZE, SIZE), dtype=np.float32)
@@ -80,8 +69,8 @@ def _texel(a: np.float32, b: np.float32) -> np.float32:
 
 @inner_kernel
 def roughen(
-    view: View, v: np.float32, count: int, keys: NDArray[np.int32], grain: Float32, tiles: Float32,
-    work: Float32,
+    view: View, v: np.float32, count: int, keys: NDArray[np.int32], grain: Floats32, tiles: Floats32,
+    work: Floats32,
 ) -> None:  # fmt: skip
     """Change the colours of a block's surfaces by where in the world they lie."""
     r = view.rotation
@@ -132,8 +121,8 @@ def roughen(
 
 @inner_kernel
 def vary_sky(
-    view: View, v: np.float32, count: int, light: Lighting, sun: Float32, tiles: Float32,
-    work: Float32,
+    view: View, v: np.float32, count: int, light: Lighting, sun: Floats32, tiles: Floats32,
+    work: Floats32,
 ) -> None:  # fmt: skip
     """Change a block's sky by the direction: brighter around the sun, thin veils, no two parts alike.
 

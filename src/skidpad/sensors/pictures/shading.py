@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats32
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.states import ActorTable
@@ -24,7 +25,6 @@ from skidpad.sensors.pictures.blocks import (
     WETTABLE,
     ZERO,
     B,
-    Float32,
     G,
     H,
     L,
@@ -70,11 +70,11 @@ class Shading:
 
     def __init__(
         self,
-        palette: Float32,
+        palette: Floats32,
         table: ActorTable,
         light: Lighting,
         snow_on_road: bool = False,
-        grain: Float32 = NO_GRAIN,
+        grain: Floats32 = NO_GRAIN,
         street_light: StreetLight = NO_STREET_LIGHT,
     ) -> None:
         """snow_on_road: for people; what a stack reads has snow beside the road only.
@@ -99,16 +99,16 @@ class Shading:
         tails[braking, :3] = np.array([BRAKE_GLOW, 0.03, 0.03], dtype=np.float32)
         tails[braking, GLOW] = 1.0
 
-    def surfaces(self, key: NDArray[np.int32]) -> Float32:
+    def surfaces(self, key: NDArray[np.int32]) -> Floats32:
         """(H, W, COLUMNS): colour in linear light, and behaviour, of what each pixel shows."""
-        found: Float32 = self._table[(key >> 16) * MATERIALS + (key & 255)]
+        found: Floats32 = self._table[(key >> 16) * MATERIALS + (key & 255)]
         return found
 
     def paint(
         self,
         view: View,
         ego: Pose,
-        inverse: Float32,
+        inverse: Floats32,
         key: NDArray[np.int32],
         out: NDArray[np.uint32],
     ) -> None:
@@ -137,7 +137,7 @@ class Shading:
         )
 
 
-def _look_up(palette: Float32, table: ActorTable, light: Lighting, snow_on_road: bool) -> Float32:
+def _look_up(palette: Floats32, table: ActorTable, light: Lighting, snow_on_road: bool) -> Floats32:
     """((n + 1) * 256, COLUMNS): colour and behaviour of each material on each actor."""
     n = len(table)
     out = np.zeros((n + 1, MATERIALS, COLUMNS), dtype=np.float32)
@@ -210,7 +210,7 @@ def beam_of(light: Lighting) -> tuple[np.float32, np.float32, np.float32]:
 
 @kernel
 def behind_lamps(
-    view: View, v: np.float32, first: int, count: int, to_body: Float32, before: np.float32
+    view: View, v: np.float32, first: int, count: int, to_body: Floats32, before: np.float32
 ) -> bool:
     """Whether no point that a block can show lies before the lamps.
 
@@ -228,9 +228,9 @@ def _headlights(
     v: np.float32,
     count: int,
     light: Lighting,
-    to_body: Float32,
-    offset: Float32,
-    work: Float32,
+    to_body: Floats32,
+    offset: Floats32,
+    work: Floats32,
 ) -> None:
     """Light of the ego's beam on a block."""
     beam, slope, reach = beam_of(light)
@@ -249,7 +249,7 @@ def _headlights(
 
 @inner_kernel
 def _surfaces(
-    v: np.float32, count: int, light: Lighting, sun: Float32, up: Float32, work: Float32
+    v: np.float32, count: int, light: Lighting, sun: Floats32, up: Floats32, work: Floats32
 ) -> None:
     """Sun, diffuse light, lamps, wet mirror and haze of a block's surfaces, in place."""
     beta, begins = np.float32(light.extinction), np.float32(light.haze_begins)
@@ -302,16 +302,16 @@ def _surfaces(
 def shade(
     view: View,
     light: Lighting,
-    sun: Float32,
-    up: Float32,
-    to_body: Float32,
-    offset: Float32,
-    table: Float32,
-    grain: Float32,
-    tiles: Float32,
+    sun: Floats32,
+    up: Floats32,
+    to_body: Floats32,
+    offset: Floats32,
+    table: Floats32,
+    grain: Floats32,
+    tiles: Floats32,
     lamps: StreetLight,
-    work: Float32,
-    inverse: Float32,
+    work: Floats32,
+    inverse: Floats32,
     key: NDArray[np.int32],
     out: NDArray[np.uint32],
 ) -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from skidpad.core.arrays import Floats32
 from skidpad.core.jit import inner_kernel
-from skidpad.sensors.pictures.blocks import ONE, ZERO, B, Float32, G, R, U, W
+from skidpad.sensors.pictures.blocks import ONE, ZERO, B, G, R, U, W
 from skidpad.sensors.pictures.lighting import Lighting
 
 _TWO = np.float32(2.0)
@@ -13,7 +14,7 @@ _GLOW_SHARE, _DISC_SHARE = np.float32(0.25), np.float32(3.0)
 
 
 @inner_kernel
-def sky(v: np.float32, count: int, light: Lighting, up: Float32, work: Float32) -> None:
+def sky(v: np.float32, count: int, light: Lighting, up: Floats32, work: Floats32) -> None:
     """The sky where a block shows nothing else."""
     hor_r, hor_g, hor_b = light.horizon[0], light.horizon[1], light.horizon[2]
     zen_r, zen_g, zen_b = light.zenith[0] - hor_r, light.zenith[1] - hor_g, light.zenith[2] - hor_b
@@ -31,7 +32,7 @@ def sky(v: np.float32, count: int, light: Lighting, up: Float32, work: Float32) 
 
 
 @inner_kernel
-def disc(v: np.float32, count: int, light: Lighting, sun: Float32, work: Float32) -> None:
+def disc(v: np.float32, count: int, light: Lighting, sun: Floats32, work: Floats32) -> None:
     """The sun and its glow in a block's sky."""
     bright = np.float32(light.disc)
     sun_r, sun_g, sun_b = light.sun[0], light.sun[1], light.sun[2]

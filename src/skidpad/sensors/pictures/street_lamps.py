@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from skidpad.core.arrays import Floats32
 from skidpad.core.jit import inner_kernel
-from skidpad.sensors.pictures.blocks import ONE, ZERO, Float32, H, U, W
+from skidpad.sensors.pictures.blocks import ONE, ZERO, H, U, W
 from skidpad.sensors.pictures.roughness import A
 from skidpad.sensors.raster.view import View
 from skidpad.sensors.scene.street_light import StreetLight
@@ -16,7 +17,7 @@ _NOWHERE = np.float32(-1.0)
 
 @inner_kernel
 def add_street_light(
-    view: View, v: np.float32, count: int, share: np.float32, lamps: StreetLight, work: Float32
+    view: View, v: np.float32, count: int, share: np.float32, lamps: StreetLight, work: Floats32
 ) -> None:
     """Add the light of street lamps, `share` of it, to the beams that fall on a block."""
     r = view.rotation

@@ -6,16 +6,14 @@ from math import ceil, pi
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import kernel
 from skidpad.sensors.raster.live_scene import LiveScene
 from skidpad.sensors.raster.rays import Hits, make_hits, make_rays
 from skidpad.sensors.raster.view import View, world_to_camera
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 CELLS = 128  # columns of cells over a sector
 SECTORS = 4
 STEEPEST_DEG = 80.0  # a ray's elevation; straight up and down lie in no pyramid

@@ -12,8 +12,8 @@ from math import atan2, cos, exp, log, pi, sin
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.splitmix import GOLDEN, scrambled, unit
@@ -21,8 +21,6 @@ from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind
 from skidpad.physics.droplets import FOG_BACKSCATTER
 from skidpad.physics.spray import ASIDE, HANGS, HIGHEST, spray_density, spray_extinction
-
-Floats = NDArray[np.float64]
 
 THIN = log(6.0)  # depths of thinning at which a cloud ends
 STEPS = 6

@@ -11,8 +11,8 @@ from __future__ import annotations
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import LidarPoints
 from skidpad.core.geometry import Pose
@@ -31,8 +31,6 @@ from skidpad.sensors.ranging.around import (
 from skidpad.sensors.ranging.clouds import SprayClouds, Sprayed, no_spray
 from skidpad.sensors.ranging.lidar_returns import BeamAir, ReturnModel, find_returns
 from skidpad.sensors.raster.live_scene import LiveScene
-
-Floats = NDArray[np.float64]
 
 
 class Lidar:

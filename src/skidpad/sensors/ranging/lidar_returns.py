@@ -23,14 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta, norm
 
+from skidpad.core.arrays import Floats
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.splitmix import GOLDEN, scrambled, unit
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.physics.droplets import SMALLEST_MM, Drops
 from skidpad.physics.optics import LidarAir
 from skidpad.sensors.ranging.clouds import Sprayed, no_spray
-
-Floats = NDArray[np.float64]
 
 WHITE = 0.9  # reflectivity that is just noticed at the lidar's range (LISA)
 DIVERGENCE = 3e-3  # rad, full angle of the beam (LISA)

@@ -7,13 +7,13 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.frames import RadarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import kernel
 from skidpad.core.specs import RadarSpec
 from skidpad.sensors.ranging.beam import Beam, direction
 from skidpad.sensors.raster.live_scene import LiveScene
-from skidpad.sensors.raster.projection import Floats
 from skidpad.sensors.raster.rasteriser import Actors
 from skidpad.sensors.raster.rays import Hits, Rays, make_hits, make_rays
 from skidpad.sensors.raster.view import View, world_to_camera

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from skidpad.core.arrays import Floats
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind
-from skidpad.sensors.raster.projection import Floats
 from skidpad.sensors.raster.rasteriser import Actors
 from skidpad.sensors.scene.bodies import body_mesh
 from skidpad.sensors.scene.mesh import Mesh

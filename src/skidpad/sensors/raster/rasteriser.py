@@ -14,12 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints32
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.sensors.raster.projection import (
     BEHIND,
-    Floats,
-    Ints,
     Scratch,
     clip_near,
     composed,
@@ -42,12 +41,12 @@ class Actors(NamedTuple):
     """n actors to draw, with the meshes of all of them one after the other."""
 
     vertices: Floats  # (V, 3) body frame
-    triangles: Ints  # (T, 3) relative to the actor's first vertex
-    key: Ints  # (T,) class << 8 | material
-    vertex_start: Ints  # (n,)
-    vertex_count: Ints
-    triangle_start: Ints
-    triangle_count: Ints
+    triangles: Ints32  # (T, 3) relative to the actor's first vertex
+    key: Ints32  # (T,) class << 8 | material
+    vertex_start: Ints32  # (n,)
+    vertex_count: Ints32
+    triangle_start: Ints32
+    triangle_count: Ints32
     radius: Floats  # (n,) around the origin
     rotation: Floats  # (n, 3, 3) body to world
     position: Floats  # (n, 3)
@@ -70,7 +69,7 @@ def _fill(
     end_row: int,
     ramp: NDArray[np.float32],
     inverse: NDArray[np.float32],
-    key: Ints,
+    key: Ints32,
 ) -> None:
     """Draw one projected triangle: columns x, rows y, inverse depths w at its corners."""
     width = inverse.shape[1]
@@ -122,8 +121,8 @@ def _fill(
 
 @inner_kernel
 def _draw_block(
-    triangles: Ints,
-    keys: Ints,
+    triangles: Ints32,
+    keys: Ints32,
     first: int,
     count: int,
     instance: int,
@@ -131,7 +130,7 @@ def _draw_block(
     scratch: Scratch,
     clipped: Floats,
     inverse: NDArray[np.float32],
-    key: Ints,
+    key: Ints32,
 ) -> None:
     """Draw triangles whose vertices `project_block` has prepared."""
     screen, code, ramp = scratch.screen, scratch.code, scratch.ramp
@@ -201,14 +200,14 @@ def chunk_level(centre: Floats, radius: float, view: View, level: int) -> int:
 @kernel
 def raster(
     chunks: Chunks,
-    static_key: Ints,
+    static_key: Ints32,
     actors: Actors,
     hidden: int,
     view: View,
     level: int,
     scratch: Scratch,
     inverse: NDArray[np.float32],
-    key: Ints,
+    key: Ints32,
 ) -> None:
     """Draw the view's rows into `inverse` (H, W) and `key` (H, W), cleared there first.
 

@@ -12,11 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from skidpad.core.arrays import Floats, Ints32
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.sensors.raster.projection import (
     BEHIND,
-    Floats,
-    Ints,
     Scratch,
     clip_near,
     composed,
@@ -37,15 +36,15 @@ class Rays(NamedTuple):
 
     column: Floats  # (n,) on screen
     row: Floats  # (n,)
-    start: Ints  # (width * height + 1,) rays of cell i are order[start[i]:start[i + 1]]
-    order: Ints  # (n,)
+    start: Ints32  # (width * height + 1,) rays of cell i are order[start[i]:start[i + 1]]
+    order: Ints32  # (n,)
 
 
 class Hits(NamedTuple):
     """What n rays met."""
 
     inverse: Floats  # (n,) 1/m, planar; 0 where nothing was met
-    key: Ints  # (n,) as in the images
+    key: Ints32  # (n,) as in the images
     cosine: Floats  # (n,) of the angle of incidence, in [0, 1]
 
 
@@ -178,8 +177,8 @@ def _incidence(a: float, b: float, w: float, px: float, py: float, view: View) -
 
 @inner_kernel
 def _meet_block(
-    triangles: Ints,
-    keys: Ints,
+    triangles: Ints32,
+    keys: Ints32,
     first: int,
     count: int,
     instance: int,
@@ -214,7 +213,7 @@ def _meet_block(
 @kernel
 def cast(
     chunks: Chunks,
-    static_key: Ints,
+    static_key: Ints32,
     actors: Actors,
     hidden: int,
     view: View,

@@ -9,10 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
+from skidpad.core.arrays import Floats, Ints32
 
 SIZE = 16  # triangles: 16 m of one lane at full detail
 MARGIN = 1e-6  # m, more than rounding can put a vertex outside its sphere
@@ -22,16 +20,16 @@ class Clusters(NamedTuple):
     """K runs of at most SIZE triangles with V vertices of their own and T triangles in all."""
 
     vertices: Floats  # (V, 3) world, m
-    triangles: Ints  # (T, 3) indices relative to the cluster's first vertex
+    triangles: Ints32  # (T, 3) indices relative to the cluster's first vertex
     centre: Floats  # (K, 3)
     radius: Floats  # (K,)
-    vertex_start: Ints  # (K,)
-    vertex_count: Ints  # (K,)
-    triangle_start: Ints  # (K,)
-    triangle_count: Ints  # (K,)
+    vertex_start: Ints32  # (K,)
+    vertex_count: Ints32  # (K,)
+    triangle_start: Ints32  # (K,)
+    triangle_count: Ints32  # (K,)
 
 
-def cluster(vertices: Floats, triangles: Ints, block_size: Ints) -> tuple[Clusters, Ints]:
+def cluster(vertices: Floats, triangles: Ints32, block_size: Ints32) -> tuple[Clusters, Ints32]:
     """Cut blocks of consecutive triangles into clusters; also how many each block has.
 
     vertices: (V, 3); triangles: (T, 3) indices into them; block_size: (B,) triangles, T in all.

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats32
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.sensors.scene.materials import MATERIALS, Material
-
-Float32 = NDArray[np.float32]
 
 NO_GRAIN = np.zeros((0, 3), dtype=np.float32)
 
@@ -31,7 +29,7 @@ GRAIN: dict[Material, tuple[float, float, float]] = {
 LEAVES, WALLS = (0.70, 0.70, 0.26), (0.08, 0.50, 0.14)
 
 
-def grain_table(boxes: Iterable[tuple[int, int]]) -> Float32:
+def grain_table(boxes: Iterable[tuple[int, int]]) -> Floats32:
     """(256, 3) strengths by material; boxes: class and material of what stands beside the road."""
     table = np.zeros((MATERIALS, 3), dtype=np.float32)
     for material, strengths in GRAIN.items():

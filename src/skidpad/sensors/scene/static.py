@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints32
 from skidpad.core.vocabulary import LightState
 from skidpad.roads.lanes import LaneSamples, LaneTable
 from skidpad.roads.roadside import Roadside, Shape
@@ -21,9 +22,6 @@ from skidpad.sensors.scene.materials import MATERIALS, Material, base_palette
 from skidpad.sensors.scene.mesh import Mesh, merge
 from skidpad.sensors.scene.road_mesh import LEVELS, ChunkKey, road_pieces
 from skidpad.sensors.scene.street_light import StreetLight, street_light_of
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
 
 # A lamp lights up in its own colour; everything else is dark.
 LIT: dict[LightState, tuple[int, Material]] = {
@@ -37,21 +35,21 @@ class Chunks(NamedTuple):
     """C chunks of T triangles in all; level l of chunk c is a block of them, cut into clusters."""
 
     clusters: Clusters
-    key: Ints  # (T,) class << 8 | material
+    key: Ints32  # (T,) class << 8 | material
     centre: Floats  # (C, 3)
     radius: Floats  # (C,)
-    triangle_start: Ints  # (C, LEVELS)
-    triangle_count: Ints  # (C, LEVELS)
-    cluster_start: Ints  # (C, LEVELS)
-    cluster_count: Ints  # (C, LEVELS)
+    triangle_start: Ints32  # (C, LEVELS)
+    triangle_count: Ints32  # (C, LEVELS)
+    cluster_start: Ints32  # (C, LEVELS)
+    cluster_count: Ints32  # (C, LEVELS)
 
 
 class Lamps(NamedTuple):
     """Where in `Chunks.key` the triangles of the signal lamps are."""
 
-    signal: Ints  # (n,) signal id
-    place: Ints  # (n,) 0 red, 1 yellow, 2 green
-    triangle: Ints  # (n,) row of Chunks.key
+    signal: Ints32  # (n,) signal id
+    place: Ints32  # (n,) 0 red, 1 yellow, 2 green
+    triangle: Ints32  # (n,) row of Chunks.key
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +62,7 @@ class StaticScene:
     street_light: StreetLight
     grain: NDArray[np.float32]  # unevenness by material; of dressed maps only
 
-    def lamp_keys(self, lights: Mapping[int, LightState]) -> NDArray[np.int32]:
+    def lamp_keys(self, lights: Mapping[int, LightState]) -> Ints32:
         """(n,) keys of the lamp triangles while the lights show these states."""
         keys = (self.chunks.key[self.lamps.triangle] & ~0xFF) | int(Material.LAMP_DARK)
         for signal, state in lights.items():
@@ -72,7 +70,7 @@ class StaticScene:
                 place, material = LIT[state]
                 lit = (self.lamps.signal == signal) & (self.lamps.place == place)
                 keys[lit] = (keys[lit] & ~0xFF) | int(material)
-        result: NDArray[np.int32] = keys.astype(np.int32)
+        result: Ints32 = keys.astype(np.int32)
         return result
 
 
@@ -132,7 +130,7 @@ def pack(blocks: Iterable[list[Mesh]]) -> Chunks:
     )
 
 
-def pixel_key(mesh: Mesh) -> Ints:
+def pixel_key(mesh: Mesh) -> Ints32:
     """(m,) class << 8 | material; the instance is added when drawn."""
     return mesh.label.astype(np.int32) << 8 | mesh.material.astype(np.int32)
 

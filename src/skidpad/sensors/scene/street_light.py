@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from skidpad.roads.roadside import Box, Shape
 
-Floats = NDArray[np.float64]
-
 REACH = 30.0  # m beyond which a lamp lights nothing
 HEIGHT = 7.0  # m of a lamp above the ground that it lights
 BRIGHT = 0.85  # below a lamp, where a white surface at clear noon has 1; by eye

@@ -8,14 +8,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Bytes, Floats32
 from skidpad.core.frames import LidarPoints, RadarPoints
 from skidpad.core.jit import kernel
 from skidpad.core.lefthanded import angles_to_carla, vectors_to_carla
 from skidpad.core.specs import CameraSpec
 from skidpad.core.vocabulary import SemanticClass
 
-Bytes = NDArray[np.uint8]
-Float32 = NDArray[np.float32]
 SKY = int(SemanticClass.SKY)
 
 
@@ -37,7 +36,7 @@ def packed_rgb(bgra: Bytes, out: NDArray[np.uint32]) -> None:
 
 @kernel
 def hide_beyond(
-    sight: float, focal: float, cx: float, cy: float, inverse: Float32, labels: Bytes, sky: int
+    sight: float, focal: float, cx: float, cy: float, inverse: Floats32, labels: Bytes, sky: int
 ) -> None:
     """Turn the class of pixels whose ray is longer than `sight` to `sky`; inverse: (H, W) 1/m."""
     for y in range(labels.shape[0]):
@@ -50,7 +49,7 @@ def hide_beyond(
 
 
 @kernel
-def cut_depth(sight: float, focal: float, cx: float, cy: float, inverse: Float32) -> None:
+def cut_depth(sight: float, focal: float, cx: float, cy: float, inverse: Floats32) -> None:
     """Removes depths along rays longer than `sight`, where nothing is measured."""
     for y in range(inverse.shape[0]):
         v = (y + 0.5 - cy) / focal
@@ -61,12 +60,12 @@ def cut_depth(sight: float, focal: float, cx: float, cy: float, inverse: Float32
                 inverse[y, x] = 0.0
 
 
-def limit_labels(camera: CameraSpec, sight: float, inverse: Float32, labels: Bytes) -> None:
+def limit_labels(camera: CameraSpec, sight: float, inverse: Floats32, labels: Bytes) -> None:
     """Hide what the weather hides from a camera that classifies (decision M-1)."""
     hide_beyond(sight, camera.focal, camera.cx, camera.cy, inverse, labels, SKY)
 
 
-def limit_depth(camera: CameraSpec, sight: float, inverse: Float32) -> None:
+def limit_depth(camera: CameraSpec, sight: float, inverse: Floats32) -> None:
     """The same for a camera that measures depth."""
     cut_depth(sight, camera.focal, camera.cx, camera.cy, inverse)
 

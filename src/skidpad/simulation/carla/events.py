@@ -8,8 +8,9 @@ from collections.abc import Sequence
 from math import hypot
 from typing import Any
 
+from skidpad.core.arrays import Floats
 from skidpad.core.lefthanded import vector_from_carla
-from skidpad.core.states import ActorStates, ContactEvent, Floats, LaneInvasion
+from skidpad.core.states import ActorStates, ContactEvent, LaneInvasion
 from skidpad.roads.lanes import Marking
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.carla.actor_rows import ActorRow

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from math import inf
 from typing import Any
 
+from skidpad.core.arrays import Floats
 from skidpad.core.frames import LidarPoints, RadarPoints
 from skidpad.core.setup import Setup
 from skidpad.core.specs import LidarSpec, RadarSpec
-from skidpad.core.states import ActorStates, ActorTable, Floats
+from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LightState, RangeModel, SensorLevel
 from skidpad.physics.optics import radar_range
 from skidpad.roads.queries import RoadMap

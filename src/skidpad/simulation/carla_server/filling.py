@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Flags
 from skidpad.core.geometry import kmh_from_mps
 from skidpad.core.lefthanded import (
     poses_to_carla,
@@ -22,7 +23,6 @@ from skidpad.simulation.carla_server.snapshot import NO_LIGHT_STATE, Rows
 from skidpad.simulation.carla_server.vehicles.vehicles import Vehicles
 
 Signals = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 
 BY_COLUMNS = (Family.VEHICLE, Family.TRAFFIC_LIGHT, Family.TRAFFIC_SIGN)

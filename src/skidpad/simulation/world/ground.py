@@ -6,8 +6,8 @@ from math import atan, cos, sin, tan
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.jit import Held, inner_kernel, kernel
 from skidpad.roads.kernels import (
     WIDTH,
@@ -27,9 +27,6 @@ from skidpad.roads.queries import RoadMap
 from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.rows import Rows
 from skidpad.simulation.world.traffic.path import uniform
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 ROAD_NOISE = 1.0e-4  # rad of cross slope, uniform: breaks perfect symmetry (decision M-11)
 NOISE_SALT = 7
@@ -112,7 +109,7 @@ class RoadSigns(NamedTuple):
     """What the road tells n drivers; arrays (n,)."""
 
     limit: Floats  # m/s, NaN where the map gives none
-    signal: NDArray[np.int64]  # row of the governing light's signal, -1: none
+    signal: Ints  # row of the governing light's signal, -1: none
 
 
 @kernel

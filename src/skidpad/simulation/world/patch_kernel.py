@@ -5,16 +5,12 @@ from __future__ import annotations
 from math import cos, isnan, sin, sqrt
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.jit import Held, inner_kernel, kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics.grip import grip_of_row, mu_at, stiffness_at
 from skidpad.roads.kernels import LaneArrays, project_kernel, s_road_kernel, sample_kernel
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 NO_PATCH = -1.0  # stiffness and film where no patch says them
 ANY = 2**40  # a lane id that means all lanes, a road id that means none
 BOTH, LEFT, RIGHT = range(3)  # halves of a lane

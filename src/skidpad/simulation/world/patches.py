@@ -9,6 +9,7 @@ from math import cos, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import hold
@@ -30,7 +31,6 @@ from skidpad.simulation.world.patch_kernel import (
 
 __all__ = ["NO_PATCH", "FrictionZone", "LaneFrictions", "Patches", "in_zone"]
 
-Floats = NDArray[np.float64]
 # by road and lane: from and to along the road in m, and the share of the friction there
 LaneFrictions = dict[tuple[int, int], list[tuple[float, float, float]]]
 

@@ -9,15 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Flags, Floats
 from skidpad.core.randomness import stream_key
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind
 from skidpad.physics.contact import Bodies, bodies
 from skidpad.physics.types import VehicleType
 from skidpad.simulation.world.placed import Places, places_for
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Flags, Floats
 from skidpad.core.jit import Held, inner_kernel, kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics.contact import Bodies, ContactLaw, Contacts, resolve_contacts
@@ -29,10 +30,6 @@ from skidpad.simulation.world.traffic.occupancy import Occupancy
 from skidpad.simulation.world.traffic.path import wrapped
 from skidpad.simulation.world.traffic.state import Drivers, Streets, View
 from skidpad.simulation.world.traffic.zebras import note_walkers
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-
 
 DECIDE, MOVE, SETTLE = 1, 2, 4  # stages of a step; a scenario's words come before MOVE
 

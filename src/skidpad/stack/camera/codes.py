@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats32
+
 AHEAD = (6.0, 12.0, 20.0, 30.0, 45.0)  # m along the lane, where its offset is told
 OFFSET_SCALE = 8.0  # of an angle in rad
 GAP_SCALE, GAP_SHIFT = 8.0, 6.0  # m: 1.33 at a touch, 0.12 at 60 m
 SEEN = 60.0  # m, farthest gap that is told
 OUTPUTS = len(AHEAD) + 2  # offsets, whether somebody is there, how near
-Floats = NDArray[np.float32]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,14 +31,14 @@ def mosaic(images: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
     return np.concatenate([centre, np.concatenate([left, right], axis=1)], axis=0)
 
 
-def network_input(picture: NDArray[np.uint8]) -> Floats:
+def network_input(picture: NDArray[np.uint8]) -> Floats32:
     """(1, 3, 96, 128) of a mosaic, -0.5 to 0.5."""
     planes = picture.transpose(2, 0, 1)[None].astype(np.float32)
-    scaled: Floats = planes / np.float32(255.0) - np.float32(0.5)
+    scaled: Floats32 = planes / np.float32(255.0) - np.float32(0.5)
     return scaled
 
 
-def coded(label: Label) -> Floats:
+def coded(label: Label) -> Floats32:
     """(OUTPUTS,) what the network should say; presence is 1, 0, or 0.5 where it does not matter."""
     offsets = [OFFSET_SCALE * y / d for y, d in zip(label.offsets, AHEAD, strict=True)]
     if label.gap is None:
@@ -47,7 +48,7 @@ def coded(label: Label) -> Floats:
     return np.array([*offsets, present, near], dtype=np.float32)
 
 
-def decoded(output: Floats) -> Label:
+def decoded(output: Floats32) -> Label:
     """What the network says; the presence is a logit."""
     offsets = tuple(float(v) * d / OFFSET_SCALE for v, d in zip(output, AHEAD, strict=False))
     logit, near = float(output[-2]), float(output[-1])

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import require_choice, require_range
 from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import kmh_from_mps
@@ -37,7 +38,6 @@ SAMPLES = 5  # of which the median counts, as in the published fusion (A-061)
 CONFIRMED = 3  # of them that must hold somebody
 NEARER = 0.5  # of lane centring's look-ahead, which cuts bends by 0.5 m; a path is surest near
 REST = 0.2  # share of the old path that remains: 0.03 s at 20 Hz
-Floats = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 FUNCTIONS = frozenset({Function.ACC, Function.LCA})
 

@@ -10,7 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.stack.camera.codes import Floats, Label, decoded, network_input
+from skidpad.core.arrays import Floats32
+from skidpad.stack.camera.codes import Label, decoded, network_input
 
 WEIGHTS = "weights.onnx"
 
@@ -27,5 +28,5 @@ def seen(picture: NDArray[np.uint8]) -> Label:
     """What the network makes of a mosaic of the three images."""
     net = _network()
     net.setInput(network_input(picture))
-    output: Floats = np.asarray(net.forward(), dtype=np.float32).reshape(-1)
+    output: Floats32 = np.asarray(net.forward(), dtype=np.float32).reshape(-1)
     return decoded(output)

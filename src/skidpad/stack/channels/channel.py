@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import cos, hypot, inf, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame, ChannelView
 from skidpad.core.geometry import footprint
 from skidpad.core.states import VehicleCommand
@@ -19,8 +19,6 @@ from skidpad.stack.channels.prediction import predict
 from skidpad.stack.channels.route import SEARCH, STEP, Line, RoutePath, locate
 from skidpad.stack.channels.settings import CarModel, ChannelSettings
 from skidpad.stack.channels.tracking import Tracker
-
-Floats = NDArray[np.float64]
 
 CYCLE = 0.1  # s (C-022)
 LINE_REACH = 100.0  # m in which lines on the path matter

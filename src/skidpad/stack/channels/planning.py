@@ -11,12 +11,10 @@ from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.stack.channels.route import PathPoints, locate
-
-Floats = NDArray[np.float64]
 
 ROLL_STEP = 0.25  # s
 A_HARDEST = -8.0  # m/s^2

@@ -7,11 +7,10 @@ from math import cos, hypot, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.jit import kernel
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.kernels import LaneArrays, advance_point, project_point
-
-Floats = NDArray[np.float64]
 
 V_MOVING = 0.5  # m/s, slower objects are predicted to stay
 ALIGNED = 0.87  # cosine of 30 deg between motion and lane

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import mps_from_kmh
 from skidpad.core.jit import kernel
 from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import RoadMap
 
-Floats = NDArray[np.float64]
 STEP = 1.0  # m between two points
 UNSIGNED_LIMIT = mps_from_kmh(50.0)  # urban default where the map gives none (Vienna Convention)
 SEARCH = 40  # points around the last place in which the next one is looked for

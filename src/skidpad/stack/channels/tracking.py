@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelView
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.stack.channels.settings import ChannelSettings
-
-Floats = NDArray[np.float64]
 
 GATE = 2.5  # m: a car at 40 m/s may accelerate by 6 m/s^2 for 0.5 s unseen, and errs by 3 sigma
 SIGMA_MEASURED = 0.2  # m per axis

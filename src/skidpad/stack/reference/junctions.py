@@ -5,14 +5,11 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skidpad.core.geometry import wrap_angle
 from skidpad.core.sight import SeenActors
 from skidpad.roads.queries import LanePoint, RoadMap
 from skidpad.stack.channels.route import STEP, PathPoints
-
-Floats = NDArray[np.float64]
 
 LOOK_FROM = 30.0  # m before a line from which others are looked at
 THROUGH = 30.0  # m beyond the line within which ways are looked at for crossing

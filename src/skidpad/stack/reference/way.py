@@ -7,15 +7,13 @@ from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import kernel
 from skidpad.core.sight import SeenActors
 from skidpad.roads.queries import LanePoint, RoadMap
 from skidpad.stack.channels.route import STEP, PathPoints, RoutePath, locate, route_path
-
-Floats = NDArray[np.float64]
 
 LENGTH = 700.0  # m of way that is known
 AT_LEAST = 350.0  # m, then it is drawn anew

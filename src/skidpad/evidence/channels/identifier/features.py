@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.jit import kernel
 from skidpad.evidence.channels.hazards import Signal, SignalReadings
 from skidpad.evidence.channels.indicators.catalogue import (
@@ -19,7 +20,6 @@ from skidpad.evidence.channels.indicators.catalogue import (
 from skidpad.evidence.channels.indicators.layout import IndicatorReadings
 from skidpad.evidence.channels.risk import RiskMatrix
 
-Floats = NDArray[np.float64]
 WINDOW = 5.0  # s
 SHORT = 1.0  # s
 CAPACITY = 51  # cycles of 0.1 s in the window, both ends

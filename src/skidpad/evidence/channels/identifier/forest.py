@@ -5,24 +5,21 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.errors import FileError
 from skidpad.core.jit import kernel
-
-Floats = NDArray[np.float64]
-Whole = NDArray[np.int64]
 
 
 class Forest(NamedTuple):
     """Nodes of all trees in one table. A leaf has feature -1; x <= threshold goes left."""
 
-    roots: Whole  # (trees,) first node of each tree
-    feature: Whole  # (nodes,)
+    roots: Ints  # (trees,) first node of each tree
+    feature: Ints  # (nodes,)
     threshold: Floats  # (nodes,)
-    left: Whole  # (nodes,)
-    right: Whole
-    missing_left: Whole  # (nodes,) 1: a value that was not evaluated goes left
+    left: Ints  # (nodes,)
+    right: Ints
+    missing_left: Ints  # (nodes,) 1: a value that was not evaluated goes left
     value: Floats  # (nodes,) of leaves, log-odds
     baseline: Floats  # (1,) log-odds without any tree
 

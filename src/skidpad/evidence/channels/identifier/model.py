@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.reading import UNUSABLE, read_arrays, read_bytes, unusable
 from skidpad.core.vocabulary import HazardType
@@ -25,7 +26,6 @@ from skidpad.evidence.channels.identifier.features import (
 from skidpad.evidence.channels.identifier.forest import Forest, check_forest, probabilities
 from skidpad.evidence.channels.timefilter import PAUSE, SAME_TIME
 
-Floats = NDArray[np.float64]
 VERSION = 2  # of a file; the forests' features are rows of the card's own list
 KNOWN_VERSIONS = (1, 2)  # in the first the list was always the whole one
 ALL_ROUTES = "all"

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skidpad import __version__
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError, MissingExtra
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.hazards import SCORED_HAZARDS
@@ -25,7 +25,6 @@ from skidpad.evidence.channels.identifier.model import (
 )
 from skidpad.evidence.channels.matching import Span, tally
 
-Floats = NDArray[np.float64]
 THIN = 8  # of the cycles without the hazard each eighth is used, with that weight
 EVENTS_MIN = 4  # a hazard with fewer true events is not learned
 TREES, LEAVES, RATE, LEAF_SAMPLES, SHRINK = 60, 12, 0.1, 40, 1.0

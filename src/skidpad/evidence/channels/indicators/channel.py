@@ -9,8 +9,8 @@ from itertools import islice, takewhile
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.channels import ChannelFrame
 from skidpad.evidence.channels.frames import Usable
 from skidpad.evidence.channels.indicators import comfort, prediction, similarity
@@ -19,8 +19,6 @@ from skidpad.evidence.channels.indicators.comfort import Form
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.paths import sample_plan, sample_predictions
 
-Floats = NDArray[np.float64]
-Counts = NDArray[np.int64]
 Values = Mapping[Indicator, float]
 GAP_MAX = 0.35  # s, a longer silence of a channel forgets its history
 JERK_SPAN = 1.0  # s between two fitted accelerations
@@ -41,7 +39,7 @@ class ChannelIndicators:
         self.ways: Floats = np.empty((prediction.WAYPOINTS, 2))  # its plan, sampled
         self.inside = 0  # way-points within the plan's duration
         self.object_ways: Floats = np.empty((0, prediction.WAYPOINTS, 2))
-        self.object_inside: Counts = np.empty(0, np.int64)
+        self.object_inside: Ints = np.empty(0, np.int64)
         self._poses: deque[tuple[float, float, float, float]] = deque(maxlen=32)
         self._fits: deque[tuple[float, float]] = deque(maxlen=32)  # t, acceleration along
         self._plans: deque[tuple[float, Floats, Floats]] = deque(maxlen=settings.plan_history)

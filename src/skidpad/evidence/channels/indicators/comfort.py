@@ -6,11 +6,10 @@ from enum import Enum
 from math import exp, tanh
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.jit import kernel
 
-Floats = NDArray[np.float64]
 STEEPNESS = 0.2  # per m/s^2 and per m/s^3 (C-045)
 MIN_POINTS = 4  # three differences give one jerk (C-041)
 FIT_WINDOW = 1.0  # s, decision C-16

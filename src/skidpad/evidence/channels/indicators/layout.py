@@ -8,8 +8,8 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.errors import ConfigError
 from skidpad.evidence.channels.indicators.catalogue import (
     CHANNEL_INDICATORS,
@@ -19,9 +19,6 @@ from skidpad.evidence.channels.indicators.catalogue import (
     IndicatorType,
     Scope,
 )
-
-Floats = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 
 class Place(NamedTuple):
@@ -63,7 +60,7 @@ class Layout:
             places += [Place(indicator, subject) for subject in subjects]
         return cls(tuple(channels), pairs, tuple(places), span, added)
 
-    def indices(self, indicators: Iterable[AnyIndicator]) -> Counts:
+    def indices(self, indicators: Iterable[AnyIndicator]) -> Ints:
         """Places of all subjects of `indicators`, in their order."""
         row = np.arange(len(self.places))
         return np.concatenate([row[self.span[i]] for i in indicators])
@@ -75,7 +72,7 @@ class IndicatorReadings:
 
     layout: Layout
     values: Floats  # (len(layout.places),), NaN: not evaluated
-    matched: tuple[Counts | None, ...]  # per pair rows (k, 2) of the objects that both report
+    matched: tuple[Ints | None, ...]  # per pair rows (k, 2) of the objects that both report
 
     def __getitem__(self, indicator: AnyIndicator) -> Floats:
         view: Floats = self.values[self.layout.span[indicator]]

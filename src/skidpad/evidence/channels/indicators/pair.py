@@ -6,8 +6,8 @@ from collections import deque
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Ints
 from skidpad.core.channels import ChannelFrame
 from skidpad.evidence.channels.indicators import prediction, similarity
 from skidpad.evidence.channels.indicators.catalogue import Indicator
@@ -20,7 +20,6 @@ from skidpad.evidence.channels.indicators.channel import (
 )
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 
-Counts = NDArray[np.int64]
 SHIFT_SHORT = 0.5  # s, decision C-6
 SHIFT_LONG = 10.0  # s
 AGREEING = (  # their mean is the agreement of two channels
@@ -43,7 +42,7 @@ class PairIndicators:
         self, a: ChannelIndicators, b: ChannelIndicators, settings: IndicatorSettings
     ) -> None:
         self.a, self.b, self.settings = a, b, settings
-        self.matched: Counts | None = None  # rows (k, 2) of the objects that both report
+        self.matched: Ints | None = None  # rows (k, 2) of the objects that both report
         window = similarity.VARIANCE_WINDOW
         self._locations = deque([NAN] * window, window)
         self._paths = deque([NAN] * window, window)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.evidence.channels.frames import Usable
 from skidpad.evidence.channels.indicators.catalogue import Scope
 from skidpad.evidence.channels.indicators.channel import ChannelIndicators, Values
@@ -14,7 +14,6 @@ from skidpad.evidence.channels.indicators.layout import IndicatorReadings, Layou
 from skidpad.evidence.channels.indicators.pair import PairIndicators
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 
-Floats = NDArray[np.float64]
 Lap = Callable[[str], None]
 
 

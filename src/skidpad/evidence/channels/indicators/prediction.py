@@ -6,13 +6,11 @@ Kernels return NaN for "not evaluated"; the panel turns it into a mask.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.jit import kernel
 from skidpad.evidence.channels.indicators.similarity import pair_points
 
-Floats = NDArray[np.float64]
-Counts = NDArray[np.int64]
 WAYPOINT_DECAY = 0.95  # per way-point (C-070)
 WAYPOINT_STEP = 0.2  # s between way-points
 WAYPOINTS = 26  # plans are compared over 5 s at most
@@ -37,7 +35,7 @@ def trajectory_similarity(a: Floats, b: Floats, decay: float) -> float:
 
 @kernel
 def object_trajectory_similarity(
-    ways_a: Floats, inside_a: Counts, ways_b: Floats, inside_b: Counts, pairs: Counts, decay: float
+    ways_a: Floats, inside_a: Ints, ways_b: Floats, inside_b: Ints, pairs: Ints, decay: float
 ) -> float:
     """Mean over pairs of the similarity of their predictions (C-073).
 
@@ -118,10 +116,10 @@ def weighted_history(scores: Floats, decay: float) -> float:
 @kernel
 def follow_up(
     predicted: Floats,
-    inside: Counts,
-    ids_then: Counts,
+    inside: Ints,
+    ids_then: Ints,
     actual: Floats,
-    ids_now: Counts,
+    ids_now: Ints,
     tolerance: float,
     search: float,
 ) -> tuple[int, int, int]:

@@ -8,13 +8,11 @@ from __future__ import annotations
 from math import hypot
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.jit import kernel
 
-Floats = NDArray[np.float64]
-Counts = NDArray[np.int64]
 VARIANCE_WINDOW = 5  # samples (C-052)
 PAIRING_DISTANCE = 4.0  # m (C-054)
 
@@ -49,7 +47,7 @@ def count_similarity(n_a: int, n_b: int) -> float:
 
 
 @kernel
-def pair_points(a: Floats, b: Floats, max_distance: float) -> Counts:
+def pair_points(a: Floats, b: Floats, max_distance: float) -> Ints:
     """One-to-one pairs (p, 2) of rows of a (n, >=2) and b (m, >=2), nearest pair first (C-054).
 
     No pair is further apart than `max_distance`, in m; ties go to the earlier rows.
@@ -91,9 +89,9 @@ def pair_points(a: Floats, b: Floats, max_distance: float) -> Counts:
     return pairs[:k]
 
 
-def match_points(a: Floats, b: Floats, max_distance: float) -> Counts:
+def match_points(a: Floats, b: Floats, max_distance: float) -> Ints:
     """`pair_points`, or the best assignment where taking the nearest first leaves a pair out."""
-    pairs: Counts = pair_points(a, b, max_distance)
+    pairs: Ints = pair_points(a, b, max_distance)
     if len(pairs) == min(len(a), len(b)):
         return pairs
     squares = ((a[:, None, :2] - b[None, :, :2]) ** 2).sum(axis=2)
@@ -102,11 +100,11 @@ def match_points(a: Floats, b: Floats, max_distance: float) -> Counts:
         return pairs
     cost = np.where(far, max_distance * max_distance * (len(a) + len(b) + 1.0), squares)
     rows, columns = linear_sum_assignment(cost)
-    best: Counts = np.column_stack([rows, columns])[~far[rows, columns]].astype(np.int64)
+    best: Ints = np.column_stack([rows, columns])[~far[rows, columns]].astype(np.int64)
     if len(best) <= len(pairs):
         return pairs
     order = np.argsort(squares[best[:, 0], best[:, 1]], kind="stable")
-    ordered: Counts = best[order]
+    ordered: Ints = best[order]
     return ordered
 
 
@@ -121,7 +119,7 @@ def polygon_area(polygon: Floats, size: int) -> float:
 
 
 @kernel
-def polygon_areas(polygons: Floats, size: Counts) -> Floats:
+def polygon_areas(polygons: Floats, size: Ints) -> Floats:
     """Areas (n,) of polygons (n, k, 2) with `size` (n,) vertices each."""
     out = np.empty(len(size))
     for i in range(len(size)):
@@ -140,7 +138,7 @@ def area_ratio(a: float, b: float) -> float:
 
 @kernel
 def object_similarity(
-    objects_a: Floats, areas_a: Floats, objects_b: Floats, areas_b: Floats, pairs: Counts
+    objects_a: Floats, areas_a: Floats, objects_b: Floats, areas_b: Floats, pairs: Ints
 ) -> tuple[float, float, float]:
     """Location, orientation and area similarity: means over pairs (C-055, C-057, C-058).
 
@@ -165,7 +163,7 @@ def object_similarity(
 
 
 @kernel
-def class_agreement(classes_a: Counts, classes_b: Counts, pairs: Counts) -> float:
+def class_agreement(classes_a: Ints, classes_b: Ints, pairs: Ints) -> float:
     """Share of pairs with equal classes among those where both channels name one (C-097)."""
     known = equal = 0
     for k in range(pairs.shape[0]):

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import Cycle
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.hazards import Rule, Signal
 from skidpad.evidence.channels.matching import Span, match
 
-Floats = NDArray[np.float64]
 REACH = 1.0  # s around a hazard that is looked at
 V_STANDING = 2.0  # m/s
 YAW_RATE_TURN = 0.12  # rad/s, 7 m/s on a radius of 58 m

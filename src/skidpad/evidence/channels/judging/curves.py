@@ -12,8 +12,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame, Cycle
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.frames import usable
@@ -24,7 +24,6 @@ from skidpad.evidence.channels.tracked.distance import SafeDistance
 from skidpad.evidence.channels.tracked.tracks import Lookout, Seen
 from skidpad.evidence.channels.tracked.vote import Tracked
 
-Floats = NDArray[np.float64]
 Table = Mapping[Signal, Floats]  # of a drive, (k,) each; NaN: not evaluated
 Sweep = Mapping[float, Sequence[Span]]  # what is found, by limit
 LIMITS = tuple(np.round(np.arange(0.05, 0.96, 0.05), 2).tolist())  # of a probability

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.told import on_a_line
 from skidpad.core.vocabulary import HazardType, Stratum
@@ -31,7 +31,6 @@ from skidpad.evidence.channels.matching import (
     tally,
 )
 
-Floats = NDArray[np.float64]
 NONE: Floats = np.zeros(0)
 LABEL_COLUMNS = ("hazard", "start_s", "end_s", "world", "annotator", "note")
 

@@ -10,6 +10,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.evidence.channels.hazards import Signal
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.evidence.channels.indicators.layout import Place
@@ -19,7 +20,6 @@ from skidpad.evidence.channels.recorder import CycleEvidence
 from skidpad.evidence.channels.timefilter import Event
 from skidpad.evidence.channels.timing import BUDGET_MS, MODULES, time_figures, time_shares
 
-Floats = NDArray[np.float64]
 COMPARED = MODULES[:3]  # those of C-232
 TIMED = ("total", *COMPARED)
 MANY_OBJECTS = 5  # objects of the busiest channel (C-238)

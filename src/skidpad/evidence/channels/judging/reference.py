@@ -15,8 +15,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import Cycle, TruthFrame
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.judging.truth.marks import (
@@ -29,7 +29,6 @@ from skidpad.evidence.channels.judging.truth.marks import (
 from skidpad.evidence.channels.judging.truth.simulator import MIN_DURATION, tail_marks
 from skidpad.evidence.channels.matching import Span, merge_spans
 
-Floats = NDArray[np.float64]
 NEAR = 3.0  # m between an object and the actor that it is
 WINDOW = 10  # cycles before and after: 1 s each way
 LEAST = 5  # cycles seen in the window, else the actor is not known

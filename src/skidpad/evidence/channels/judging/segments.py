@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import Cycle
 from skidpad.core.vocabulary import HazardType, Stratum
 from skidpad.evidence.channels.hazards import (
@@ -54,7 +54,6 @@ from skidpad.evidence.channels.timefilter import TimeFilter
 from skidpad.evidence.channels.timing import Stopwatch
 from skidpad.evidence.channels.tracked.distance import GRIPS, NOMINAL_GRIP
 
-Floats = NDArray[np.float64]
 Signals = Sequence[tuple[float, dict[Signal, float]]]
 TOLD = "tracked, told the grip"
 CURVE_FACTORS = (0.5, 0.67, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0)

@@ -13,13 +13,12 @@ from collections.abc import Sequence
 from math import hypot
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame
 from skidpad.core.constants import G
 from skidpad.evidence.channels.tracked.distance import GRIPS
 
-Floats = NDArray[np.float64]
 WINDOW = 0.8  # s over which an acceleration is measured
 SHORT = 0.6  # share of the wanted acceleration below which a car gets too little
 ASK_BRAKE, ASK_DRIVE = -1.5, 0.8  # m/s^2 that every plan asks for at least

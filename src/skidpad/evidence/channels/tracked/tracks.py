@@ -15,7 +15,6 @@ from skidpad.core.vocabulary import SemanticClass
 from skidpad.evidence.channels.tracked.distance import SafeDistance
 from skidpad.evidence.channels.tracked.way import Placed, Way
 
-Floats = NDArray[np.float64]
 # Measurement and motion noise are assumptions of the order of the channels' sensors.
 SIGMA_GAP, SIGMA_V = 0.5, 0.7  # m, m/s of one report
 SIGMA_A = 2.0  # m/s^2 by which an object's speed may change unseen

@@ -7,11 +7,10 @@ from math import cos, dist, isfinite, sin
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame
 
-Floats = NDArray[np.float64]
 STEP = 1.0  # m between points
 BEHIND = AHEAD = 80.0  # m
 FAR = 1e7  # m from the origin: what lies beyond is no place of a car

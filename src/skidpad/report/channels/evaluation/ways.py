@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import SkidpadError
 from skidpad.core.wording import count_text
 from skidpad.recording.channels.drives import read_records
@@ -18,7 +18,6 @@ from skidpad.roads.bundled import kept_map
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import RoadMap
 
-Floats = NDArray[np.float64]
 Way = Sequence[Sequence[float]]  # x, y in m
 LANE_STEP = 4  # samples of a lane from one point of its line to the next
 BESIDE = 3  # maps in one figure

@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.sensing.images import Camera, make_camera
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
 from skidpad.simulation.carla_server.sensing.surroundings import Surroundings
 
-Floats = NDArray[np.float64]
 EVENT = np.dtype([("x", "<u2"), ("y", "<u2"), ("t", "<i8"), ("polarity", "?")])  # 13 bytes, packed
 GREY = np.array([0.2989, 0.587, 0.114])  # of red, green, blue: ITU-R BT.601
 LEAST_CONTRAST = 0.01  # below which noise brings no threshold

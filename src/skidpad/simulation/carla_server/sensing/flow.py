@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.sensors.raster.passes import Pass
 from skidpad.sensors.raster.view import View
 from skidpad.simulation.carla_server.actors.registry import Actor
@@ -20,7 +21,6 @@ from skidpad.simulation.carla_server.sensing.images import Camera, make_camera
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
 from skidpad.simulation.carla_server.sensing.surroundings import Pictured, Surroundings
 
-Floats = NDArray[np.float64]
 NEAREST = 1e-3  # share of a pixel's depth before which it lay beside the last picture's plane
 
 

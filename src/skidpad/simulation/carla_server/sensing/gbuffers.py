@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Bytes, Floats32
 from skidpad.sensors.pictures.blocks import GLOSS, WETTABLE
 from skidpad.sensors.raster.view import View
 from skidpad.sensors.scene.materials import Material
@@ -32,8 +32,6 @@ from skidpad.simulation.carla_server.sensing.occlusion import ambient_occlusion
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
 from skidpad.simulation.carla_server.sensing.surroundings import Pictured, Surroundings
 
-Bytes = NDArray[np.uint8]
-Floats = NDArray[np.float32]
 WHITE = 255.0
 FARTHEST = 160.0  # m, white: 16 000 cm of FReadSurfaceDataFlags
 STILL, PER_SCREEN = 32767.0 / 65535.0, 0.499 * 0.5  # EncodeVelocityToTexture; 0 is "does not move"
@@ -119,9 +117,9 @@ def _depth(_: Pictured, __: View, camera: Camera, out: Bytes) -> None:
     out[..., :3] = np.rint(WHITE * srgb(share))[..., None]
 
 
-def srgb(linear: Floats) -> Floats:
+def srgb(linear: Floats32) -> Floats32:
     """Returns linear light of 0 to 1 encoded as sRGB of 0 to 1 (IEC 61966-2-1)."""
-    encoded: Floats = np.where(
+    encoded: Floats32 = np.where(
         linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055
     )
     return encoded
@@ -151,7 +149,7 @@ def _base_colour(scene: Pictured, _: View, camera: Camera, out: Bytes) -> None:
     out[..., 2::-1] = np.rint(WHITE * np.sqrt(np.minimum(colours, 1.0)) * solid)
 
 
-def _velocity(flow: Floats, camera: Camera, out: Bytes) -> None:
+def _velocity(flow: Floats32, camera: Camera, out: Bytes) -> None:
     """Red: to the right, green: up, in half pictures per reading, -2 to 2; of actors alone."""
     encoded = np.rint(WHITE * np.clip(STILL + PER_SCREEN * flow, 0.0, 1.0))
     out[..., 2:0:-1] = encoded * (camera.drawn.instances > 0)[..., None]

@@ -11,6 +11,7 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.lefthanded import vectors_to_carla
 from skidpad.sensors.raster.view import View
@@ -19,7 +20,6 @@ from skidpad.simulation.carla_server.sensing.images import Camera
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
 from skidpad.simulation.carla_server.sensing.surroundings import Surroundings
 
-Floats = NDArray[np.float64]
 HALF = 127.5  # grey level of zero
 
 

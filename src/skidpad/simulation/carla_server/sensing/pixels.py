@@ -6,9 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Bytes
 from skidpad.core.jit import kernel
-
-Bytes = NDArray[np.uint8]
 
 
 def bgra_from_rgb(packed: NDArray[np.uint32], out: Bytes) -> None:

@@ -9,6 +9,7 @@ from math import inf, radians, tan
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.geometry import Pose
 from skidpad.core.lefthanded import angles_to_carla, vectors_to_carla
 from skidpad.core.randomness import stream_key
@@ -22,7 +23,6 @@ from skidpad.simulation.carla_server.protocol import wire
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
 from skidpad.simulation.carla_server.sensing.surroundings import Surroundings
 
-Floats = NDArray[np.float64]
 MAX_POINTS = 2_000_000  # per second and sensor
 MAX_CHANNELS = 256
 SEMANTIC_POINT = np.dtype(

@@ -6,8 +6,8 @@ from math import cos
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints32
 from skidpad.core.jit import inner_kernel
 from skidpad.simulation.world.traffic import occupancy as occ_
 from skidpad.simulation.world.traffic.care import (
@@ -45,9 +45,6 @@ from skidpad.simulation.world.traffic.right_of_way import (
 from skidpad.simulation.world.traffic.state import CHANGE_TIME, Drivers, View
 from skidpad.simulation.world.traffic.tracking import pedals, steer
 from skidpad.simulation.world.traffic.zebras import zebra_gap
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
 
 REACH_AHEAD = 150.0  # m
 REACH_BEHIND = 120.0  # m
@@ -115,7 +112,7 @@ def character_of(view: View, d: Drivers, i: int, v: float) -> Character:
 
 @inner_kernel
 def acceleration_along(
-    view: View, d: Drivers, i: int, path: Ints, s: float, v_desired: float
+    view: View, d: Drivers, i: int, path: Ints32, s: float, v_desired: float
 ) -> tuple[float, float, int]:
     """IDM acceleration of i on `path` at `s`, the gap to its leader there, and that one."""
     leader, gap = occ_.find_ahead(view.streets.net, view.occ, view.placed, path, s, i, REACH_AHEAD)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Ints32
 from skidpad.core.geometry import mps_from_kmh
 from skidpad.roads.lanes import (
     LaneKind,
@@ -15,9 +16,6 @@ from skidpad.roads.lanes import (
     SignalKind,
     SignalTable,
 )
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
 
 DRIVABLE = (LaneKind.DRIVING, LaneKind.RAMP)
 UNSIGNED_LIMIT = mps_from_kmh(50.0)  # where the map gives none: urban default, Vienna Convention
@@ -68,8 +66,8 @@ class Network(NamedTuple):
     point: NDArray[np.void]  # (N,) POINT
     lane: NDArray[np.void]  # (L,) LANE
     stop: NDArray[np.void]  # (M,) STOP
-    next_lane: Ints
-    prev_lane: Ints
+    next_lane: Ints32
+    prev_lane: Ints32
 
 
 def network(samples: LaneSamples, lanes: LaneTable, signals: SignalTable) -> Network:
@@ -113,12 +111,12 @@ def _signs(samples: LaneSamples, lanes: LaneTable, signals: SignalTable) -> NDAr
 def _straightest(
     samples: LaneSamples,
     lanes: LaneTable,
-    start: Ints,
-    branches: Ints,
+    start: Ints32,
+    branches: Ints32,
     drivable: NDArray[np.bool_],
     *,
     forward: bool,
-) -> Ints:
+) -> Ints32:
     """For each lane the branch whose heading changes least within the window, or -1."""
     best = np.full(len(lanes.first), -1, dtype=np.int32)
     for lane in range(len(best)):
@@ -135,7 +133,7 @@ def _straightest(
     return best
 
 
-def _stops(lanes: LaneTable, signals: SignalTable) -> tuple[Ints, NDArray[np.void]]:
+def _stops(lanes: LaneTable, signals: SignalTable) -> tuple[Ints32, NDArray[np.void]]:
     """Returns the first stop of each lane (lanes + 1,) and the stops at lights, sorted by lane and s."""
     rows = np.flatnonzero(signals.kind == SignalKind.LIGHT)
     rows = rows[np.lexsort((signals.s[rows], signals.lane[rows]))]

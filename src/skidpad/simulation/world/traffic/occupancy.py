@@ -6,14 +6,11 @@ from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints32
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.traffic.network import Network
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
 
 SLOTS = 4  # lanes on which one actor can stand at once
 NOBODY = -1
@@ -22,10 +19,10 @@ NOBODY = -1
 class Occupancy(NamedTuple):
     """Linked lists: lane l holds the slots head[l], next[head[l]], ... until -1."""
 
-    head: Ints  # (L,)
-    next: Ints  # (n * SLOTS,)
+    head: Ints32  # (L,)
+    next: Ints32  # (n * SLOTS,)
     s: Floats  # (n * SLOTS,) m along that lane
-    used: Ints  # (n,) slots in use
+    used: Ints32  # (n,) slots in use
 
 
 def occupancy(lanes: int, actors: int) -> Occupancy:
@@ -88,7 +85,7 @@ def fill(net: Network, placed: Places, occ: Occupancy) -> None:
 
 @inner_kernel
 def find_ahead(
-    net: Network, occ: Occupancy, placed: Places, path: Ints, s: float, me: int, reach: float
+    net: Network, occ: Occupancy, placed: Places, path: Ints32, s: float, me: int, reach: float
 ) -> tuple[int, float]:
     """Nearest actor ahead along `path` (lanes, -1 ends it): index or NOBODY, gap in m or inf.
 

@@ -16,8 +16,6 @@ RADIUS = 250.0  # m of road, ahead of the ego and behind it
 UNSEEN = 150.0  # m: no sensor reaches farther, neither the radar nor the object level
 FARTHEST = 240.0  # m of road at which somebody enters
 
-Floats = NDArray[np.float64]
-
 
 def ways(net: Network, lane: int, s: float, forward: bool) -> dict[int, float]:
     """Lanes met within RADIUS from a place on, or back from it, with the m of road from the place

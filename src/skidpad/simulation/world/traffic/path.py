@@ -5,13 +5,11 @@ from __future__ import annotations
 from math import cos, pi, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Ints32
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.splitmix import GOLDEN, scrambled, unit
 from skidpad.simulation.world.traffic.network import Network
-
-Ints = NDArray[np.int32]
 
 PATH = 12  # lanes remembered ahead, the present one first
 LOOKAHEAD = 250.0  # m of path that a driver knows
@@ -43,7 +41,7 @@ def choose_branch(net: Network, lane: int, key: np.uint64, turn: int, free_choic
 
 
 @inner_kernel
-def extend(net: Network, path: Ints, s: float, key: np.uint64, turn: int, free: bool) -> None:
+def extend(net: Network, path: Ints32, s: float, key: np.uint64, turn: int, free: bool) -> None:
     """Append lanes to `path` until it reaches LOOKAHEAD, is full, or the road ends."""
     known = -s
     for k in range(PATH - 1):
@@ -55,7 +53,7 @@ def extend(net: Network, path: Ints, s: float, key: np.uint64, turn: int, free: 
 
 
 @kernel
-def begin(path: Ints, lane: int) -> None:
+def begin(path: Ints32, lane: int) -> None:
     """Empties the path and begins it with `lane`."""
     for k in range(PATH):
         path[k] = -1
@@ -63,7 +61,7 @@ def begin(path: Ints, lane: int) -> None:
 
 
 @kernel
-def straight_path(net: Network, lane: int, out: Ints) -> None:
+def straight_path(net: Network, lane: int, out: Ints32) -> None:
     """Fill `out` with `lane` and its straightest successors."""
     for k in range(len(out)):
         out[k] = lane

@@ -11,10 +11,9 @@ from collections import defaultdict
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.roads.lanes import LaneKind, LaneSamples, LaneTable, SignalKind, SignalTable
 from skidpad.roads.roadside import Roadside
-
-Floats = NDArray[np.float64]
 
 CONFLICT = np.dtype(
     [

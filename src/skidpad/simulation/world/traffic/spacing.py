@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.states import ActorStates
 from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.traffic.care import FIRM_SHARE, REACTION, STOP_MARGIN, Care, grip_at
@@ -12,8 +12,6 @@ from skidpad.simulation.world.traffic.network import Network
 from skidpad.simulation.world.traffic.places import CLEARANCE
 from skidpad.simulation.world.traffic.right_of_way import WATCH
 from skidpad.simulation.world.traffic.state import Drivers, Streets
-
-Floats = NDArray[np.float64]
 
 # s to those ahead and behind of a vehicle that is moved, where it was and where it will be: 3 s, and
 # what speeds change in a tick.

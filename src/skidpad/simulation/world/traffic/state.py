@@ -8,14 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints32
 from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.traffic.care import Care
 from skidpad.simulation.world.traffic.network import Network
 from skidpad.simulation.world.traffic.occupancy import Occupancy
 from skidpad.simulation.world.traffic.path import PATH
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
 
 
 class Held(IntEnum):
@@ -90,8 +88,8 @@ class Drivers(NamedTuple):
 
     state: NDArray[np.void]  # (n,) DRIVER
     trait: NDArray[np.void]  # (n,) TRAIT
-    path: Ints  # (n, PATH) lanes to follow, the present one first
-    aside: Ints  # (4,) room for the lanes of another way
+    path: Ints32  # (n, PATH) lanes to follow, the present one first
+    aside: Ints32  # (4,) room for the lanes of another way
 
 
 class Streets(NamedTuple):

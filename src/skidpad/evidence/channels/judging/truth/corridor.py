@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections import deque
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from skidpad.core.arrays import Flags, Floats
+
 SAME_PATH = np.radians(45.0)  # heading along the path (decision R-9)
 REACH = 60.0  # m of the way behind and of its straight extensions
 SPACING = 0.5  # m between places of a trail

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.vocabulary import HazardType
 
-Floats = NDArray[np.float64]
 JUMP, JUMP_TIME = 1.0, 0.5  # m within s: a position that jumps
 DRIFT = 2.0  # m: a position that is off
 JUMP_KIND, DRIFT_KIND = "jump", "drift"

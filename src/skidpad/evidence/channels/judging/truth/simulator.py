@@ -9,6 +9,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely import affinity
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame, Cycle, TruthFrame
 from skidpad.core.constants import G
 from skidpad.core.vocabulary import HazardType, SemanticClass
@@ -21,7 +22,6 @@ from skidpad.evidence.channels.judging.truth.marks import (
     offsets,
 )
 
-Floats = NDArray[np.float64]
 BRAKE_LEADER = 6.0  # m/s^2, decision C-3
 REACTION_TIME = 1.0  # s
 MIN_DURATION = 0.5  # s

@@ -14,6 +14,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame, Cycle
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.judging.truth.corridor import Corridor, Trail
@@ -25,7 +26,6 @@ from skidpad.evidence.channels.judging.truth.marks import (
     merge_marks,
 )
 
-Floats = NDArray[np.float64]
 SWEEP_TIME = 3.0  # s, decision C-4
 SWEEP_STEP = 0.25  # s; the hull of two steps tells where to look closer
 SUBSTEPS = 5  # of a step, 0.05 s apart: hulls alone would join cars that follow each other closely

@@ -11,8 +11,9 @@ from skidpad.campaign.driving.drivers import STACK, find_driver
 from skidpad.campaign.driving.loop import Script
 from skidpad.campaign.driving.run_setup import StackAtWheel, stage_of
 from skidpad.campaign.recipes.files import runs_of
+from skidpad.campaign.runs.checkpoints import RunCheckpoint
 from skidpad.campaign.runs.run import OpenRun, Run
-from skidpad.core.errors import ConfigError, require_choice
+from skidpad.core.errors import CheckpointError, ConfigError, require_choice
 from skidpad.core.frames import SensorFrame
 from skidpad.core.run import (
     ActorMode,
@@ -139,6 +140,29 @@ class Scenario:
             known = ", ".join(self.player.scenario.entities)
             raise ConfigError(f"there is no actor {command.actor!r}; the file has {known}")
         self._sent.replace(command)
+
+    def save(self) -> RunCheckpoint:
+        """Returns the state after the last tick: actors, stack, story, random streams, log.
+
+        Raises:
+            CheckpointError: there was no step yet, or a class of yours holds state that cannot be
+                copied; such a scenario is played from its beginning again.
+
+        Example:
+            >>> scenario = Scenario("cut_in.xosc")
+            >>> _ = scenario.step(100)
+            >>> there = scenario.save()
+            >>> for brake in (0.2, 0.6, 1.0):
+            ...     scenario.restore(there)
+            ...     _ = scenario.step(40, VehicleCommand(brake=brake))
+        """
+        if self._truth is None:
+            raise CheckpointError("a scenario needs at least one step before its state is saved")
+        return RunCheckpoint(self, self._truth.tick)
+
+    def restore(self, checkpoint: RunCheckpoint) -> None:
+        """Goes on from a state that `save` gave, as often as you like."""
+        checkpoint.restore(self)
 
     @property
     def t(self) -> float:

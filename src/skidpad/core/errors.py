@@ -8,6 +8,7 @@ SkidpadError
 │   └── OutputError   an output folder that would be overwritten, a full disk
 ├── BackendError      a simulator that does not answer, or answers nonsense
 ├── StackError        the stack under test raised, or returned no command
+├── CheckpointError   the state of a run cannot be saved, or belongs to another run
 └── MissingExtra      an optional dependency that is not installed
 """
 
@@ -55,6 +56,10 @@ class BackendError(SkidpadError):
 
 class StackError(SkidpadError):
     """The stack under test failed; this is the outcome of its run."""
+
+
+class CheckpointError(SkidpadError):
+    """The state of a run that cannot be saved, or that belongs to another run."""
 
 
 class MissingExtra(SkidpadError, ImportError):

@@ -69,6 +69,8 @@ class PixelSuite:
     the sight of one of them only.
     """
 
+    UNSAVED = ("_rgb",)
+
     def __init__(
         self,
         map: SceneMap,

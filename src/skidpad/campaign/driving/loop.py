@@ -12,7 +12,7 @@ What the sinks keep is the only result. Whatever is said about a drive later is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -143,46 +143,66 @@ def loop(
 
     Returns None, or how the driver failed, which ends the run before the sinks see that moment.
     """
-    moments = ticks(backend, frame, driver, supervisor, script, sinks)
-    while True:
-        try:
-            next(moments)
-        except StopIteration as end:
-            failure: StackError | None = end.value
-            return failure
+    stepper = Stepper(backend, frame, driver, supervisor, script, sinks)
+    while stepper.step() is not None:
+        pass
+    return stepper.failure
 
 
-def ticks(
-    backend: Backend,
-    frame: SensorFrame,
-    driver: Driver,
-    supervisor: Supervising,
-    script: Script,
-    sinks: Sequence[Sink],
-) -> Generator[Moment, None, StackError | None]:
-    """The loop, stopped after each tick: what the script says of the tick is known by then."""
-    truth = backend.truth()
-    driver.begin(truth.table)
-    for sink in sinks:
-        sink.begin(truth.table)
-    while True:
-        phase = supervisor.observe(truth)
+class Stepper:
+    """The loop, stopped after each tick: what the script says of the tick is known by then.
+
+    Attributes:
+        failure: how the driver failed, which ended the run; None: it did not.
+    """
+
+    def __init__(
+        self,
+        backend: Backend,
+        frame: SensorFrame,
+        driver: Driver,
+        supervisor: Supervising,
+        script: Script,
+        sinks: Sequence[Sink],
+    ) -> None:
+        self.backend, self.driver, self.supervisor = backend, driver, supervisor
+        self.script, self.sinks = script, sinks
+        self._first: SensorFrame | None = frame
+        self.failure: StackError | None = None
+        self.action: Action | None = None  # of the last tick; None before the first one
+        self.words: Sequence[ActorCommand] = ()  # what the script said in it
+        table = backend.truth().table
+        driver.begin(table)
+        for sink in sinks:
+            sink.begin(table)
+
+    def step(self) -> Moment | None:
+        """Drives one tick and returns its moment; None when the run is over."""
+        if self.failure is not None:
+            return None
+        action = self.action
+        if action is None:
+            assert self._first is not None
+            frame, self._first = self._first, None
+        else:
+            if self.script.ended:
+                return None
+            if action.relocate is not None:
+                self.backend.relocate(action.relocate.pose, action.relocate.v)
+            frame = self.backend.step(action.command, self.words)
+        truth = self.backend.truth()
+        phase = self.supervisor.observe(truth)
         if phase is not Supervision.NONE:
             frame = replace(frame, supervision=phase)
         try:
-            command = driver.act(frame)
-            report = driver.report
+            command = self.driver.act(frame)
+            report = self.driver.report
         except StackError as failure:
-            return failure
-        action = supervisor.act(command, report)
-        moment = Moment(frame, truth, driver, command, report, action)
-        for sink in sinks:
-            sink.see(moment)
-        words = script.step(truth)
-        yield moment
-        if script.ended:
+            self.failure = failure
             return None
-        if action.relocate is not None:
-            backend.relocate(action.relocate.pose, action.relocate.v)
-        frame = backend.step(action.command, words)
-        truth = backend.truth()
+        self.action = self.supervisor.act(command, report)
+        moment = Moment(frame, truth, self.driver, command, report, self.action)
+        for sink in self.sinks:
+            sink.see(moment)
+        self.words = self.script.step(truth)
+        return moment

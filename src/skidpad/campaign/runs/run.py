@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from skidpad.campaign.cells.matrix import describe_run
 from skidpad.campaign.driving.backends import make_backend
 from skidpad.campaign.driving.drivers import describe_driver
-from skidpad.campaign.driving.loop import Driver, Moment, Sink, ticks
+from skidpad.campaign.driving.loop import Driver, Moment, Sink, Stepper
 from skidpad.campaign.driving.outdoors import ChangedBackend, FileChanges
 from skidpad.campaign.driving.readings import ReadingsRecorder
 from skidpad.campaign.driving.run_setup import (
@@ -26,8 +26,9 @@ from skidpad.campaign.driving.run_setup import (
     with_sensors,
 )
 from skidpad.campaign.driving.snapshots import Snapshots
+from skidpad.campaign.runs.checkpoints import RunCheckpoint
 from skidpad.campaign.takeover.desk import Desk, DeskBackend, DeskDriver, DeskScript, DeskSupervisor
-from skidpad.core.errors import StackError, require_choice
+from skidpad.core.errors import CheckpointError, StackError, require_choice
 from skidpad.core.run import (
     DriverSpec,
     Roads,
@@ -266,11 +267,35 @@ class OpenRun:
         self.failure: StackError | None = None
         if desk is not None:
             at_wheel = partial(DeskDriver, desk=desk)
-        self._ticks = self._drive(kind, at_wheel)
+        self._kind, self._at_wheel = kind, at_wheel
+        self.driver: StackAtWheel | None = None
+        self.stepper: Stepper | None = None
+        self.over = False
 
     def step(self) -> Moment | None:
-        """Go on by one tick; None when the run is over."""
-        return next(self._ticks, None)
+        """Go on by one tick; None when the run is over; a stack that fails ends it with a notice."""
+        if self.over:
+            return None
+        if self.stepper is None:
+            self.stepper = self._begin()
+        moment = None if self.stepper is None else self.stepper.step()
+        if moment is None:
+            self._end()
+        return moment
+
+    def save(self) -> RunCheckpoint:
+        """Returns the state after the last tick, to which `restore` goes back.
+
+        Raises:
+            CheckpointError: nothing was driven yet, or a part holds state that cannot be copied.
+        """
+        if self.stepper is None:
+            raise CheckpointError("a run needs at least one step before its state is saved")
+        return RunCheckpoint(self, self.backend.truth().tick)
+
+    def restore(self, checkpoint: RunCheckpoint) -> None:
+        """Goes back to a state that `save` gave, or forward again; moments before are void."""
+        checkpoint.restore(self)
 
     def close(self) -> None:
         """Release the backend."""
@@ -292,20 +317,18 @@ class OpenRun:
             None if self.recorder is None else self.recorder.finish(),
         )
 
-    def _drive(
-        self, kind: type[Stack] | None, at_wheel: Callable[[StackAtWheel], Driver] | None
-    ) -> Iterator[Moment]:
-        """Drives the run and yields each moment; a stack that fails ends it with a notice."""
+    def _begin(self) -> Stepper | None:
+        """Builds driver and world and returns their loop; None where the stack cannot be built."""
         stage, backend = self.stage, self.backend
         try:
-            driver = driver_of(self.spec, stage, kind)
+            driver = driver_of(self.spec, stage, self._kind)
             setup = with_sensors(stage.setup, driver.stack)
-        except StackError as error:  # it could not even be built
+        except StackError as error:
             backend.reset(stage.setup, self.spec.seed)
             for sink in self.sinks:
                 sink.begin(backend.truth().table)
             self._failed(error)
-            return
+            return None
         recorder = ReadingsRecorder(setup, driver.stack.stack)
         sinks = self.sinks
         if recorder.is_needed:
@@ -313,11 +336,18 @@ class OpenRun:
             for sink in self.sinks:
                 sink.follow_readings(lambda: recorder.latest)
         frame = backend.reset(setup, self.spec.seed)
-        wheel = driver if at_wheel is None else at_wheel(driver)
-        failure = yield from ticks(backend, frame, wheel, stage.supervisor, stage.script, sinks)
-        driver.stack.close()
-        if failure is not None:
-            self._failed(failure)
+        self.driver = driver
+        wheel = driver if self._at_wheel is None else self._at_wheel(driver)
+        return Stepper(backend, frame, wheel, stage.supervisor, stage.script, sinks)
+
+    def _end(self) -> None:
+        """Closes the stack, and notes in the log how it failed, if it did."""
+        self.over = True
+        if self.stepper is None or self.driver is None:
+            return
+        self.driver.stack.close()
+        if self.stepper.failure is not None:
+            self._failed(self.stepper.failure)
 
     def _failed(self, failure: StackError) -> None:
         """Keeps the stack's failure and notes it in the log at the present tick."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields
 from operator import attrgetter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +72,23 @@ class TickLog:
 
     def __len__(self) -> int:
         return self._n
+
+    def copy_state(self) -> tuple[Any, ...]:
+        """Returns a copy of the ticks and events so far, for a checkpoint."""
+        k = self._n
+        ticks = self._tick[:k].copy(), self._row[:k].copy(), self._actors[:, :k].copy()
+        more = self._present[:k].copy(), self._mu[:k].copy()
+        events = self._events.copy(), dict(self._lights), self._weathers.copy(), self._weather
+        return (*ticks, *more, *events)
+
+    def restore_state(self, state: tuple[Any, ...]) -> None:
+        """Takes back what `copy_state` gave."""
+        tick, row, actors, present, mu, events, lights, weathers, weather = state
+        k = self._n = len(tick)
+        self._tick[:k], self._row[:k], self._actors[:, :k] = tick, row, actors
+        self._present[:k], self._mu[:k] = present, mu
+        self._events, self._lights = events.copy(), dict(lights)
+        self._weathers, self._weather = weathers.copy(), weather
 
     def append(
         self,

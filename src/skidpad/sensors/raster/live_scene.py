@@ -47,6 +47,8 @@ def scene_of(map: SceneMap) -> StaticScene:
 class LiveScene:
     """Triangles of the map and of its actors; whoever moves the world tells it what changed."""
 
+    UNSAVED = ("static", "key", "actors", "_scratch")  # of the map, or set by `place` and `show`
+
     def __init__(self, map: SceneMap, table: ActorTable, widest: int = 1) -> None:
         """widest: columns in px of the widest image."""
         self.static = scene_of(map)

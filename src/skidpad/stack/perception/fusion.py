@@ -75,6 +75,8 @@ def roof_corridor(camera: CameraSpec, flat: bool = False, wanted: Labels = VEHIC
 class CameraPair:
     """A depth and a semantic camera with one view, read through a corridor."""
 
+    UNSAVED = ("scratch",)
+
     def __init__(self, depth: CameraSpec, semantic: CameraSpec, keep: Corridor) -> None:
         if (depth.width, depth.height) != (semantic.width, semantic.height):
             raise ConfigError(

@@ -35,6 +35,8 @@ def find_candidates(map: RoadMap, net: Network) -> NDArray[np.intp]:
 class FreePlaces:
     """Draws samples of driving lanes at which a vehicle can be put."""
 
+    UNSAVED = ("lane", "z", "candidates", "net")  # as the map has them
+
     def __init__(
         self, map: RoadMap, net: Network, candidates: NDArray[np.intp], rng: np.random.Generator
     ) -> None:

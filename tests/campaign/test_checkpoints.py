@@ -1,0 +1,178 @@
+"""A run that goes back to a checkpoint and on has the content hash of one that was not cut (T-13)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import skidpad
+from skidpad.campaign.cells.matrix import describe_run
+from skidpad.campaign.driving.drivers import describe_driver
+from skidpad.campaign.runs.run import OpenRun
+from skidpad.campaign.runs.run import run as drive
+from skidpad.core.errors import CheckpointError
+from skidpad.core.run import Roads, RunSpec
+from skidpad.core.settings import load_profile
+from skidpad.core.states import VehicleCommand
+from skidpad.core.vocabulary import SensorLevel, TrafficStart
+from skidpad.physics.presets import find_weather
+from skidpad.recording.run.log_files import log_hash
+
+SCRIPTS = ("ghost_cut_in", "lead_slowdown", "front_accident")
+
+
+def spec_of(map, configuration, *, level=SensorLevel.OBJECTS, duration=40.0, weather="rain-night"):
+    course = Roads(map=map, vehicles=20, allow_fewer=True, traffic=TrafficStart.FIXED)
+    template = RunSpec(
+        course=course,
+        duration=duration,
+        sensors=level,
+        settings=load_profile("recommended", {}),
+    )
+    return describe_run(describe_driver(configuration, {}), find_weather(weather), 3, template)
+
+
+def go_on(run, ticks=None):
+    """Drives so many ticks, or to the end."""
+    while ticks is None or ticks > 0:
+        if run.step() is None:
+            return
+        ticks = None if ticks is None else ticks - 1
+
+
+@pytest.mark.parametrize(
+    ("map", "configuration", "weather"),
+    [
+        ("figure8", 0, "icy_100"),
+        ("figure8", 2, "clear-noon"),
+        ("figure8", 4, "rain-night"),
+        ("town", 1, "icy_100"),
+        ("town", 4, "clear-noon"),
+        ("motorway", 3, "rain-night"),
+    ],
+)
+def test_a_restored_run_goes_on_as_the_one_that_was_not_cut(map, configuration, weather):
+    spec = spec_of(map, configuration, weather=weather)
+    whole = log_hash(drive(spec).log)
+    rng = np.random.default_rng(configuration)
+    at = sorted(int(k) for k in rng.choice(700, 3, replace=False) + 1)
+    run, saved = OpenRun(spec), []
+    for k in at:
+        go_on(run, k - len(run.log.log) if saved else k)
+        saved.append(run.save())
+        assert saved[-1].tick == k - 1
+    go_on(run)
+    assert log_hash(run.finish().log) == whole, "saving changes nothing"
+    for checkpoint in (saved[0], saved[2], saved[1]):
+        run.restore(checkpoint)
+        assert len(run.log.log) == checkpoint.tick + 1
+        go_on(run)
+        assert log_hash(run.finish().log) == whole, f"from tick {checkpoint.tick}"
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_a_restored_scenario_goes_on_as_the_one_that_was_not_cut(script):
+    def begin():
+        return skidpad.Scenario(script, stack=2, weather="icy_30", seed=5, duration=20.0)
+
+    def end(scenario):
+        while scenario.step():
+            pass
+        return log_hash(scenario.finish().log), scenario.elements, scenario.conditions
+
+    whole = end(begin())
+    scenario = begin()
+    scenario.step(int(np.random.default_rng(len(script)).integers(1, 200)))
+    early = scenario.save()
+    scenario.step(37)
+    late = scenario.save()
+    scenario.step(20, VehicleCommand(brake=1.0))  # another future
+    other = end(scenario)
+    assert other != whole
+    for checkpoint in (early, late, early):
+        scenario.restore(checkpoint)
+        assert scenario.t == pytest.approx(checkpoint.tick * 0.05)
+        assert end(scenario) == whole
+
+
+def test_pixels_go_on_too():
+    spec = spec_of("figure8", 4, level=SensorLevel.PIXELS, duration=3.0)
+    run = OpenRun(spec)
+    go_on(run, 21)
+    there = run.save()
+    go_on(run)
+    whole = log_hash(run.finish().log)
+    run.restore(there)
+    go_on(run)
+    assert log_hash(run.finish().log) == whole == log_hash(drive(spec).log)
+
+
+def test_a_checkpoint_of_another_run_or_of_none_is_refused():
+    runs = [OpenRun(spec_of("figure8", 0)) for _ in range(2)]
+    with pytest.raises(CheckpointError, match="at least one step"):
+        runs[0].save()
+    for run in runs:
+        run.step()
+    with pytest.raises(CheckpointError, match="only in the run that it was taken of"):
+        runs[1].restore(runs[0].save())
+
+
+STACKS = '''
+from skidpad.core.states import VehicleCommand
+
+class Counting:
+    """Says more throttle with every tick."""
+
+    def __init__(self, specs, map, settings):
+        self.ticks = [0]
+
+    def tick(self, frame):
+        self.ticks[0] += 1
+        return VehicleCommand(throttle=min(self.ticks[0] / 400.0, 1.0))
+
+
+class Reading(Counting):
+    """Holds an open file."""
+
+    def __init__(self, specs, map, settings):
+        super().__init__(specs, map, settings)
+        self.file = open(__file__)
+
+
+class Giving(Reading):
+    """Says what of it is to be saved."""
+
+    def __getstate__(self):
+        return self.ticks
+
+    def __setstate__(self, ticks):
+        self.ticks = ticks
+'''
+
+
+@pytest.mark.parametrize("name", ["Counting", "Giving"])
+def test_a_stack_of_the_user_goes_on_too(tmp_path, name):
+    spec = spec_of("figure8", _stacks(tmp_path, name), duration=4.0)
+    run = OpenRun(spec)
+    go_on(run, 30)
+    there = run.save()
+    go_on(run)
+    whole = log_hash(run.finish().log)
+    run.restore(there)
+    go_on(run)
+    assert log_hash(run.finish().log) == whole
+
+
+def test_a_stack_whose_state_python_does_not_show_is_refused(tmp_path):
+    run = OpenRun(spec_of("figure8", _stacks(tmp_path, "Reading")))
+    run.step()
+    with pytest.raises(CheckpointError, match=r"_io\.TextIOWrapper.*__getstate__"):
+        run.save()
+
+
+def _stacks(folder: Path, name: str) -> str:
+    file = folder / "stacks.py"
+    file.write_text(STACKS)
+    return f"{file}:{name}"

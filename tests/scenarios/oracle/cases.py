@@ -80,6 +80,7 @@ MOST = tuple(ACTIONS)
 PLAN: dict[str, tuple[str, ...]] = {
     "straight": MOST,
     "curve": tuple(a for a in MOST if a not in ("speed_rate", "speed_factor", "lane_offset_step")),
+    "arc": MOST,
     "hill": MOST,
     "reverse": tuple(a for a in MOST if a != "lane_change_way"),  # esmini looks along the motion
     "on_foot": tuple(a for a in MOST if a not in ("lane_change", "lane_offset")),

@@ -16,10 +16,11 @@ from tests.scenarios.files import (
     time,
     to,
     trajectory,
+    vehicle,
 )
 from tests.scenarios.oracle.actions import beside, gap, limits, profile, timing
 from tests.scenarios.oracle.conditions import collision_time, headway
-from tests.scenarios.oracle.settings import BEGIN, SETTINGS, Case, case
+from tests.scenarios.oracle.settings import BEGIN, SETTINGS, Case, case, moving
 
 # places that refer to the ego, by name
 PLACES = {
@@ -51,6 +52,27 @@ def places() -> Iterator[Case]:
     for setting in SETTINGS:
         for name, place in PLACES.items():
             yield case(f"place_{name}", setting, teleport(place), end=5.0)
+    for name, lane, ds in (("out", 2, 20), ("back", -2, -20)):
+        place = f'<RelativeLanePosition entityRef="ego" dLane="1" ds="{ds}" offset="0.5"/>'
+        parts = case("x", "arc", teleport(place)).parts
+        begin = moving("ego", on_lane(lane, 150), 12) + moving("other", on_lane(-1, 190), 10)
+        yield Case(f"place_relative_lane_{name}_arc", "curve", parts | {"init": begin}, 5.0)
+    yield from places_beyond_a_road()
+
+
+def places_beyond_a_road() -> Iterator[Case]:
+    """Places that lie on the next road, and on the one before."""
+    for name, road, s, ds in (("next", 1, 70, 50), ("before", 2, 20, -70)):
+        for kind, shift in (("lane", 'dLane="0"'), ("road", 'dt="0.5"')):
+            tag = f"Relative{kind.title()}Position"
+            action = teleport(f'<{tag} entityRef="ego" ds="{ds}" {shift}/>')
+            parts = {
+                "entities": vehicle("ego") + vehicle("other"),
+                "init": moving("ego", on_lane(-1, s, road=road), 10)
+                + moving("other", on_lane(-1, 40), 8),
+                "stories": story(event("e", private(action), time(BEGIN))),
+            }
+            yield Case(f"place_relative_{kind}_{name}_fork", "fork", parts, 3.0)
 
 
 def meetings() -> Iterator[Case]:

@@ -70,6 +70,12 @@ SETTINGS: dict[str, tuple[str, bool, str, str]] = {
         moving("ego", on_lane(-2, 60), 12),
         moving("other", on_lane(-1, 90), 10),
     ),
+    "arc": (
+        "curve",
+        False,
+        moving("ego", on_lane(-2, 150), 12),
+        moving("other", on_lane(-1, 180), 10),
+    ),
     "hill": (
         "hill",
         False,

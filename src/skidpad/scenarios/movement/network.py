@@ -222,18 +222,22 @@ class Network:
     def ahead_on_roads(
         self, point: LanePoint, distance: float, roads: tuple[int, ...]
     ) -> LanePoint:
-        """The place so many m of road s further along the traffic of a lane, at most its end."""
+        """Returns the place so many m of road s further along a lane's traffic, at most the end of the lane.
+
+        A negative distance goes back.
+        """
+        sense, left = (1.0, distance) if distance >= 0.0 else (-1.0, -distance)
         while True:
             s, ends = self.map.s_road(point), self._ends(point.lane)
-            room = ends[1] - s if self.forward(point) else s - ends[0]
-            way = min(distance, room)
-            there = s + way if self.forward(point) else s - way
-            distance -= way
+            up = self.forward(point) == (sense > 0.0)
+            way = min(left, ends[1] - s if up else s - ends[0])
+            there = s + way if up else s - way
+            left -= way
             point = self.map.on_lane(point.road, point.lane_id, min(max(there, ends[0]), ends[1]))
-            further = self.ahead(point, STEP, roads) if distance > STEP else None
+            further = self.ahead(point, sense * STEP, roads) if left > STEP else None
             if further is None or further.lane == point.lane:
                 return point
-            point = further
+            point, left = further, left - STEP
 
     def _wanted(self, lane: int, forward: bool, roads: tuple[int, ...]) -> int | None:
         """The lane after this one that is on the way; else one through a junction to a road of it."""

@@ -127,7 +127,8 @@ def _facing(place: Place, facing: Orientation) -> Place:
 class RelativeLane:
     """A place some metres along and some lanes aside of an entity.
 
-    along_lane: ds, dLane and offset count in the driving direction, else in that of the road.
+    along_lane: ds is measured along the lane, and ds, dLane and offset count in its driving
+    direction; else ds is measured along the road's reference line, and all count as the road runs.
     """
 
     other: str
@@ -148,7 +149,11 @@ class RelativeLane:
         forward = network.forward(here)
         backwards = not (forward or self.along_lane)
         sign = -1 if self.along_lane and not forward else 1
-        point = network.map.ahead(here, -self.ds if backwards else self.ds) or here
+        way = -self.ds if backwards else self.ds
+        if self.along_lane:
+            point = network.map.ahead(here, way) or here
+        else:
+            point = network.ahead_on_roads(here, way, ())
         if self.lanes:
             point = network.beside(point, next_lane_id(here.lane_id, sign * self.lanes)) or point
         aligned = network.forward(point)
@@ -169,13 +174,21 @@ class RelativeRoad:
     facing: Orientation
 
     def place(self, scene: Scene) -> Place:
-        """Seen from the entity now; the road's end ends the shift."""
+        """Seen from the entity now; the shift goes on along connecting roads and ends with the last one."""
         network, pose = scene.network, scene.actors[self.other].pose
-        at = network.coordinates(pose)
-        if at is None:
+        at, here = network.coordinates(pose), network.place_of(pose).lane
+        if at is None or here is None:
             return Place(pose.moved(forward=self.ds, left=self.dt))
-        s = min(max(at.s + self.ds, 0.0), network.roads[at.road].length)
-        return _facing(network.on_road(at.road, s, at.t + self.dt), self.facing)
+        t, s = at.t + self.dt, at.s + self.ds
+        if 0.0 <= s <= network.roads[at.road].length:
+            return _facing(network.on_road(at.road, s, t), self.facing)
+        forward = network.forward(here)
+        point = network.ahead_on_roads(here, self.ds if forward else -self.ds, ())
+        turns = network.forward(point) is not forward  # the next road runs the other way
+        found = network.on_road(point.road, network.map.s_road(point), -t if turns else t)
+        if turns:
+            found = replace(found, pose=replace(found.pose, yaw=wrap_angle(found.pose.yaw + pi)))
+        return _facing(found, self.facing)
 
 
 @dataclass(frozen=True, slots=True)

@@ -202,6 +202,14 @@ def test_distances_and_times_to_others(tmp_path, body, t):
     assert fired(tmp_path, by_entity(body), init=FASTER) == pytest.approx(t, abs=0.06)
 
 
+@pytest.mark.parametrize("axes", ["road", "lane", "entity"])
+def test_a_distance_across_the_road_that_is_not_reached_does_not_fire(tmp_path, axes):
+    body = f"""<RelativeDistanceCondition entityRef="other" relativeDistanceType="lateral" value="1"
+freespace="false" rule="lessThan" coordinateSystem="{axes}"/>"""
+    begin = at("ego", -2, 100, 20) + at("other", -1, 130, 10)
+    assert fired(tmp_path, by_entity(body), init=begin) is None
+
+
 def test_there_is_no_headway_to_one_behind(tmp_path):
     body = """<TimeHeadwayCondition entityRef="other" value="99" freespace="false" rule="lessThan"
 relativeDistanceType="longitudinal" coordinateSystem="entity"/>"""

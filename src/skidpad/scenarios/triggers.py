@@ -47,9 +47,8 @@ class AnyEntity:
     def _holds(self, scene: Scene) -> bool:
         """Returns whether the condition holds for any (or all) of the entities; absent ones count as no."""
         for name in self.names:
-            if (
-                scene.actors[name].present and self.condition.holds(scene, name)
-            ) is not self.of_all:
+            held = scene.actors[name].present and bool(self.condition.holds(scene, name))
+            if held is not self.of_all:
                 return not self.of_all
         return self.of_all
 
@@ -97,7 +96,7 @@ class Watched:
 
     def _result(self, scene: Scene) -> bool:
         """Returns whether the condition, with its edge applied, held `delay` seconds ago."""
-        now = self.probe(scene)
+        now = bool(self.probe(scene))  # a value of NumPy would be neither True nor False
         before, self.before = self.before, now
         edge = self.timed.edge
         if edge is not Edge.NONE:

@@ -136,7 +136,7 @@ class Network:
         at = road_place(self.roads[point.road], s, 0.0)
         dx, dy = pose.x - at.x, pose.y - at.y
         t = (dy * cos(at.heading) - dx * sin(at.heading)) / self.lean(point)
-        return RoadCoordinates(point.road, s, t, wrap_angle(pose.yaw - at.heading))
+        return RoadCoordinates(point.road, float(s), float(t), wrap_angle(pose.yaw - at.heading))
 
     def is_void(self, point: LanePoint) -> bool:
         """Returns whether a lane is of OpenDRIVE's type `none`: space beside the road, with nothing."""

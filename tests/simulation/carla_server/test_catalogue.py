@@ -58,6 +58,15 @@ def test_values_are_checked(name: str, value: str) -> None:
         choose_attributes(blueprint, {name: value})
 
 
+def test_a_float_of_c_plus_plus_is_kept_as_one_that_all_sensors_read() -> None:
+    """`5.9f` was accepted and kept, and a camera that read its fov ended in an internal error."""
+    blueprint = load_catalogue()["sensor.camera.rgb"]
+    assert choose_attributes(blueprint, {"fov": "5.9f"})["fov"] == "5.9"
+    for wrong in ("inf", "5.9ff", "f"):
+        with pytest.raises(WireError, match="fov"):
+            choose_attributes(blueprint, {"fov": wrong})
+
+
 def test_every_vehicle_has_physics_of_its_size() -> None:
     for blueprint in load_catalogue().values():
         if blueprint.family is Family.VEHICLE:

@@ -254,7 +254,7 @@ class Episode:
     def _mark_zones(self) -> None:
         """Friction triggers act on every tyre inside."""
         self.moving.zones = [
-            FrictionZone(t.pose, t.half, float(t.attributes["friction"].rstrip("f")))
+            FrictionZone(t.pose, t.half, float(t.attributes["friction"]))
             for t in self.actors.of(Family.TRIGGER)
         ]
 

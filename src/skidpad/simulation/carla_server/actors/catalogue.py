@@ -257,14 +257,16 @@ def choose_attributes(blueprint: Blueprint, given: Mapping[str, str]) -> dict[st
 
 
 def _check_value(id: str, attribute: Attribute, value: str) -> str:
-    """The text of a value that its type can be read from; `64.0` is an int to clients."""
+    """Returns a value's text as its type is read from it: `64.0` is an int to clients, `5.9f` a float."""
     try:
         if attribute.type is AttributeType.FLOAT:
-            wire.number(float(value.rstrip("f")), f"{id}: {attribute.id}")
-        elif attribute.type is AttributeType.INT:
+            text = value.strip().removesuffix("f")
+            wire.number(float(text), f"{id}: {attribute.id}")
+            return text
+        if attribute.type is AttributeType.INT:
             number = int(float(value))
             return str(wire.integer(number, f"{id}: {attribute.id}", -(2**31), 2**31 - 1))
-        elif attribute.type is AttributeType.COLOUR:
+        if attribute.type is AttributeType.COLOUR:
             parts = [int(v) for v in value.split(",")]
             if len(parts) != 3 or not all(0 <= v <= 255 for v in parts):
                 raise ValueError

@@ -11,6 +11,7 @@ from svg_values import curves_of, texts
 from skidpad.evidence.grip.study import METRICS, ORIGINAL, REDUCED, CellSeries, Distance, Pair
 from skidpad.evidence.statistics import Interval
 from skidpad.report.elements.figures import PALETTE
+from skidpad.report.grip import figures
 from skidpad.report.grip.data import scenario_title
 from skidpad.report.grip.figures import across_weathers, both_modes, trajectories
 from skidpad.report.grip.tables import completion_tables, distance_tables
@@ -233,6 +234,57 @@ def test_ways_lie_where_ego_and_ghost_drove():
         lower = [way for way in drawn_ways if not np.isnan(way).any()]
         assert len(lower) == 4, "the panels share the axis below the last of them"
         assert [way[-1][0] for way in lower] == pytest.approx([39.5] * 4, abs=0.05)
+
+
+def lateral_ends(svg, colour):
+    """By panel, where the ways of a colour end across the road."""
+    ends = {}
+    for panel, way in curves_of(svg, colour):
+        if len(way) > 10:
+            ends.setdefault(panel, set()).add(round(float(way[-1][1]), 1))
+    return [ends[panel] for panel in sorted(ends)]
+
+
+@pytest.mark.req("B-124", "B-146")
+def test_each_panel_has_the_ways_of_its_own_friction_and_variant():
+    """Egos that end 1 to 5 m left, so that no two panels can be exchanged."""
+    offsets = {
+        ("icy_30", ORIGINAL): 1.0, ("icy_30", REDUCED): 2.0,
+        ("original", ORIGINAL): 3.0, ("unfixed", ORIGINAL): 4.0, ("fixed", ORIGINAL): 5.0,
+    }  # fmt: skip
+
+    def ways_of(of, friction):
+        name = of.weather if of.weather == "icy_30" else of.cutin
+        left = -np.tile(np.linspace(0.0, offsets[name, friction], 80), (2, 1))
+        return CellSeries(series(10.0, runs=2).values | {"x": left})
+
+    variants = {name: pair("rain_0", 2, 2, cutin=name) for name in ("fixed", "original", "unfixed")}
+    cells = campaign([pair("icy_30", 2, 3)], variants=variants, series=ways_of)
+    modes, three = trajectories(cells)
+    assert lateral_ends(modes.svg, PALETTE[1]) == [{-1.0}, {-2.0}]
+    assert lateral_ends(three.svg, PALETTE[1]) == [{-3.0}, {-4.0}, {-5.0}]
+
+
+@pytest.mark.req("B-140")
+def test_the_density_is_that_of_steering_and_bands_hold_eight_runs_of_ten(monkeypatch):
+    """Ten runs whose speeds are 0 to 9 m/s; steering is spread evenly to the left, or to both sides."""
+    drawn_charts = []
+    monkeypatch.setattr(figures, "curves", lambda charts, **_: drawn_charts.extend(charts) or "")
+    lowest = {ORIGINAL: 0.0, REDUCED: -0.4}
+
+    def cell(friction):
+        values = {name: np.full((10, 400), 50.0) for name in METRICS + ("npc_x", "npc_y")}
+        values["v"] = np.tile(np.arange(10.0)[:, None], (1, 400))
+        values["steer"] = np.tile(np.linspace(lowest[friction], 0.4, 400), (10, 1))
+        return CellSeries(values)
+
+    both_modes(campaign([pair("icy_100", 2, 14)], series=lambda _, friction: cell(friction)))
+    _, speed, _, density = drawn_charts
+    assert (density.log, [c.name for c in density.curves]) == (True, [ORIGINAL, REDUCED])
+    for curve, left, right in zip(density.curves, (1e-3, 1.25), (2.5, 1.25), strict=True):
+        assert np.interp((-0.2, 0.2), curve.x, curve.y) == pytest.approx((left, right), rel=0.05)
+    low, high = speed.curves[0].band
+    assert (low[0], speed.curves[0].y[0], high[0]) == pytest.approx((0.9, 4.5, 8.1))
 
 
 @pytest.mark.req("B-147")

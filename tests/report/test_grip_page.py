@@ -273,7 +273,7 @@ def test_the_density_is_that_of_steering_and_bands_hold_eight_runs_of_ten(monkey
     lowest = {ORIGINAL: 0.0, REDUCED: -0.4}
 
     def cell(friction):
-        values = {name: np.full((10, 400), 50.0) for name in METRICS + ("npc_x", "npc_y")}
+        values = {name: np.full((10, 400), 50.0) for name in (*METRICS, "npc_x", "npc_y")}
         values["v"] = np.tile(np.arange(10.0)[:, None], (1, 400))
         values["steer"] = np.tile(np.linspace(lowest[friction], 0.4, 400), (10, 1))
         return CellSeries(values)

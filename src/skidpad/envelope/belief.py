@@ -44,7 +44,10 @@ COLD_PRIOR = ((0.12, 0.25, 0.25), (0.3, 0.3, 0.5), (0.7, 0.25, 0.25))
 
 @lru_cache(maxsize=8)
 def prior_of(stage: int, is_cold: bool) -> Floats:
-    """Returns the (n,) probabilities of GRIP that rain sensor and thermometer let expect."""
+    """Returns the (n,) probabilities of the n grips in GRIP before any evidence.
+
+    stage: of the rain sensor, 0 (dry) to 3, index into RAIN_PRIORS; is_cold: below COLD_C.
+    """
     parts = COLD_PRIOR if is_cold else RAIN_PRIORS[stage]
     wet = RAIN_PRIORS[stage][0][0] if is_cold and stage else 1.0
     p = np.zeros(len(GRIP))
@@ -61,7 +64,10 @@ def quantile(p: Floats, share: float) -> float:
 
 
 def prior_grip(stage: int, air_c: float) -> float:
-    """Returns the grip that rain sensor and thermometer let a careful driver expect."""
+    """Returns the grip that a careful driver expects: the CAUTION quantile of `prior_of`.
+
+    stage: of the rain sensor, 0: dry; air_c: air in deg C.
+    """
     return quantile(prior_of(stage, air_c < COLD_C), CAUTION)
 
 
@@ -84,7 +90,10 @@ class GripBelief:
         self.p = np.outer(self.prior, STIFFNESS_PRIOR)
 
     def forget(self, way: float, prior: Floats) -> None:
-        """Lets the surface have changed on the way of so many m; at first, takes the prior."""
+        """Mixes the belief with `prior` by the chance that the surface changed on a way of so many m.
+
+        The first call replaces it by the prior. `confidence` is measured against the last prior given here.
+        """
         way, self.is_new, self.prior = 1e9 if self.is_new else way, False, prior
         share = 1.0 - exp(-way / CHANGE)
         self.p = (1.0 - share) * self.p + share * np.outer(prior, STIFFNESS_PRIOR)
@@ -92,7 +101,10 @@ class GripBelief:
     def see_slip(
         self, force: float, slip: float, stiffness: float, sigma_slip: float, sigma_force: float
     ) -> None:
-        """Takes force over load and slip, both >= 0 when they work as meant, with their errors."""
+        """Updates the belief by force over load and slip with their standard deviations.
+
+        Both are >= 0 when they work as meant. stiffness: force over load per unit slip of the design's tyre.
+        """
         stiff = stiffness * STIFFNESS_SHARES
         sigma = np.minimum(stiff * abs(slip) / (3.0 * GRIP[:, None]), 1.0)
         left = 1.0 - sigma
@@ -105,17 +117,20 @@ class GripBelief:
         self._multiply(likelihood, REPEATED if is_repeated else TEMPER)
 
     def see_least(self, use: float, sigma: float) -> None:
-        """Takes what the car got, over gravity: its road has at least that much."""
+        """Updates the belief by a lower bound: the car got `use`, over gravity, with error sigma."""
         edge = (GRIP - use) / (sigma * sqrt(2.0))
         self._multiply(np.array([0.5 * (1.0 + erf(x)) for x in edge.tolist()])[:, None])
 
     def see_limit(self, grip: float, spread: float) -> None:
-        """Takes what the car got at its limit, with the relative spread of that reading."""
+        """Updates the belief by the grip that a car at its limit showed; spread: its relative error."""
         error = (LOG_GRIP - log(max(grip, 1e-3))) / spread
         self._multiply(np.exp(-0.5 * error * error)[:, None])
 
     def _multiply(self, likelihood: Floats, exponent: float = TEMPER) -> None:
-        """Multiplies the belief by a likelihood to a power and makes it sum to 1 again."""
+        """Multiplies the belief by a likelihood to a power and makes it sum to 1 again.
+
+        No likelihood counts for less than WILD of the greatest one; all zeros change nothing.
+        """
         likely = likelihood / likelihood.max() if likelihood.max() > 0.0 else 1.0
         self.p = self.p * np.maximum(likely, WILD) ** exponent
         self.p /= self.p.sum()
@@ -128,7 +143,7 @@ class GripBelief:
 
     @property
     def softness(self) -> float:
-        """Mean of one over the stiffness, over that of the design."""
+        """Mean over the belief of the design's stiffness over the stiffness; 1 for the tyre of the design."""
         return float(self.p.sum(axis=0) @ (1.0 / STIFFNESS_SHARES))
 
     @property
@@ -138,6 +153,6 @@ class GripBelief:
 
 
 def _compute_spread(p: Floats) -> float:
-    """Returns the standard deviation of the logarithm of grip under the probabilities p."""
+    """Returns the standard deviation of the logarithm of grip under the (n,) probabilities; at least 3e-5."""
     mean = p @ LOG_GRIP
     return sqrt(max(float(p @ (LOG_GRIP - mean) ** 2), 1e-9))

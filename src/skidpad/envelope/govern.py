@@ -120,7 +120,7 @@ class Allowed:
     v: float = 0.0  # m/s that the car drives
 
     def numbers(self) -> dict[str, float]:
-        """Returns the columns of the recording."""
+        """Returns what the envelope said as the columns of its recording."""
         return {
             "speed_mps": self.speed, "binding": float(self.binding), "grip": self.grip.value,
             "confidence": self.grip.confidence, "prior": self.grip.prior, "reach_m": self.reach,
@@ -141,12 +141,18 @@ class Envelope:
         self.bus = CarBus(settings.seed, settings.bus, self.grip.car.steer_max)
 
     def reset(self) -> None:
-        """Forgets what was seen and felt at another place."""
+        """Forgets what was seen and felt at another place.
+
+        Keeps the radar's reach and the belief of the grip.
+        """
         self.sight.reset()
         self.grip.reset()
 
     def update(self, frame: SensorFrame, applied: VehicleCommand) -> Allowed:
-        """Returns what is allowed in this tick; applied: the command before it."""
+        """Takes one frame and returns what is allowed in its tick; to be called once in every tick.
+
+        applied: the command of the tick before. The frame's `extra` must hold RAIN_ID and AIR_ID.
+        """
         set_to, ego, v = self.settings, frame.ego, max(frame.ego.speed, 0.0)
         stage, air_c = int(frame.extra[RAIN_ID]), float(frame.extra[AIR_ID])
         way = way_ahead(self.map, ego.pose)
@@ -180,7 +186,10 @@ class Envelope:
     def _limits(
         self, frame: SensorFrame, way: Way | None, grip: Grip, stage: int, v: float
     ) -> tuple[dict[Binding, float], float]:
-        """Returns the speed limits in m/s by their cause, and the way seen to be clear in m."""
+        """Returns the speed limits in m/s by their cause, and the m that are seen to be clear.
+
+        Off every lane (way None) only water limits, and nothing is seen: 0 m. stage: of the rain sensor.
+        """
         set_to = self.settings
         braking = set_to.share * grip.value * G
         limits = {Binding.WATER: floating_speed(FILMS[stage])}
@@ -203,7 +212,11 @@ class Envelope:
 def lower(
     command: VehicleCommand, v: float, allowed: float, approach: float, a_brake: float
 ) -> VehicleCommand:
-    """Returns the command with less acceleration where v is near or above the allowed speed."""
+    """Returns the command with less throttle above `allowed` - SOFT m/s and more brake above `allowed`.
+
+    Unchanged when backing up, below V_CREEP, or where it asks for no more. approach: m/s^2 of braking at
+    most; a_brake: m/s^2 of full brake.
+    """
     if v <= max(allowed - SOFT, V_CREEP) or command.reverse:
         return command
     share = min(max((allowed - v) / SOFT, 0.0), 1.0)
@@ -221,7 +234,11 @@ class BrakePulses:
         self.dt, self.way, self.left = dt, 0.0, 0.0
 
     def update(self, ego: EgoEstimate, allowed: Allowed, has_lead: bool) -> float:
-        """Returns m/s^2 to brake with in this tick; 0: none."""
+        """Returns m/s^2 to brake with in this tick, PULSE_BRAKE in a pulse, else 0; call it in every tick.
+
+        A pulse lasts PULSE_TIME s and comes after PULSE_EVERY m. None comes from confidence PULSE_BELOW on,
+        behind a lead, at PULSE_V_LEAST or slower, or from PULSE_AY_MOST on.
+        """
         self.way += max(ego.speed, 0.0) * self.dt
         is_free = not has_lead and ego.speed > PULSE_V_LEAST and abs(ego.ay) < PULSE_AY_MOST
         if allowed.grip.confidence >= PULSE_BELOW or not is_free:
@@ -247,34 +264,38 @@ class GovernedStack:
         self.pulses = BrakePulses(settings.dt) if settings.pulses else None
 
     def sensors(self) -> tuple[SensorSpec, ...]:
-        """Returns what the stack asks for, and the two sensors of the envelope."""
+        """Returns the specs of what the stack itself asks for, and the two sensors of the envelope."""
         ask = getattr(self.inner, "sensors", None)
         return (*(() if ask is None else ask()), *SENSORS)
 
     @property
     def report(self) -> StackReport:
-        """What the stack says about its last tick."""
+        """What the stack says about its last tick; an empty report where it says nothing."""
         return getattr(self.inner, "report", None) or StackReport()
 
     @property
     def mode(self) -> str:
-        """The stack's mode in its own words."""
+        """The stack's mode in its own words; "" for a stack without one."""
         return str(getattr(self.inner, "mode", ""))
 
     def __getattr__(self, name: str) -> Any:
-        """Returns what else the stack has, such as the switches of its functions."""
+        """Returns any other attribute of the stack, such as a switch; AttributeError where it has none."""
         if name == "inner":  # it could not be built
             raise AttributeError(name)
         return getattr(self.inner, name)
 
     def close(self) -> None:
-        """Tells the stack that its run is over."""
+        """Calls the stack's `close` where it has one."""
         close = getattr(self.inner, "close", None)
         if callable(close):
             close()
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
-        """Returns the stack's command, with less acceleration where the envelope asks for it."""
+        """Returns the stack's command, with less acceleration where the envelope asks for it.
+
+        Unchanged while a supervisor has the car, and with `watches`. A stack that has `limit_speed` is told
+        the allowed speed first. A change of supervision resets the envelope.
+        """
         if frame.supervision is not self.supervision:
             self.envelope.reset()
             self.supervision = frame.supervision
@@ -304,7 +325,10 @@ class GovernedStack:
 
 
 def govern(stack: type[Stack], settings: EnvelopeSettings | None = None) -> type[Stack]:
-    """Returns a class like `stack` whose stacks stay inside the envelope."""
+    """Returns a class like `stack`, of the same name, whose stacks stay inside the envelope.
+
+    Defaults of EnvelopeSettings hold where none are given.
+    """
     set_to = settings or EnvelopeSettings()
 
     class Governed(GovernedStack):

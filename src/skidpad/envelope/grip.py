@@ -59,7 +59,7 @@ class Car:
     steer_max: float = 1.22  # rad
 
     def drive_at(self, throttle: float, v: float) -> float:
-        """Returns the m/s^2 that the throttle asks for."""
+        """Returns the m/s^2 that a throttle of 0 to 1 asks for at v in m/s."""
         return throttle * min(self.a_drive, self.power_per_mass / max(v, V_LEAST))
 
 
@@ -83,7 +83,11 @@ class SpeedObserver:
     braking: float = 0.0  # s since the pedal was pressed
 
     def update(self, signals: CarSignals, grade: float, dt: float) -> None:
-        """Takes one message; grade: of the map, uphill is > 0."""
+        """Takes one message and moves `v` and `offset` on by dt s; grade: of the map, uphill is > 0.
+
+        While brakes are pressed, up to BRAKING_MOST s, `v` follows the inertial unit alone; below V_LEAST it
+        is the speed of the rear wheels.
+        """
         rear = 0.5 * (signals.wheels[2] + signals.wheels[3])
         if self.v < 0.0 or (rear < V_LEAST and self.braking == 0.0):
             self.v = rear
@@ -103,7 +107,7 @@ class SpeedObserver:
 
     @property
     def sigma_offset(self) -> float:
-        """m/s^2 that the offset may be wrong by."""
+        """Error in m/s^2 that `offset` may have; it falls with the time of learning."""
         return OFFSET_LEFT + OFFSET_FIRST * exp(-self.learned / (0.4 * OFFSET_TIME))
 
 
@@ -118,13 +122,19 @@ class GripEstimator:
         self.reset()
 
     def reset(self) -> None:
-        """Forgets the signals of another place; what was learned stays."""
+        """Forgets speed and window of another place.
+
+        Keeps the belief, the unit's offset and the wheel ratio.
+        """
         self.rows: deque[tuple[float, ...]] = deque(maxlen=WINDOW)
         known = getattr(self, "speed", None) or SpeedObserver()
         self.speed = SpeedObserver(offset=known.offset, learned=known.learned)
 
     def update(self, signals: CarSignals, stage: int, air_c: float, grade: float = 0.0) -> Grip:
-        """Returns the estimate after a tick; grade: of the map, uphill is > 0."""
+        """Takes the signals of a tick and returns the estimate; the belief changes every WINDOW ticks.
+
+        stage: of the rain sensor, 0: dry; air_c: air in deg C; grade: of the map, uphill is > 0.
+        """
         self.speed.update(signals, grade, self.dt)
         v = self.speed.v
         self.belief.forget(v * self.dt, prior_of(stage, air_c < COLD_C))
@@ -145,7 +155,7 @@ class GripEstimator:
         self, v: float, ax: float, ay: float, front: float, rear: float, asked: float,
         steer: float, yaw_rate: float,
     ) -> None:  # fmt: skip
-        """Updates the belief from one window: slip against force, limits reached and force used."""
+        """Updates the belief from one window's means: slip against force, limits reached, force used."""
         force = ax + self.car.drag * v * v  # what the tyres give, over the mass
         use = sqrt(force * force + ay * ay) / G
         steady = self._is_steady()
@@ -168,7 +178,10 @@ class GripEstimator:
     def _drive_slip(
         self, v: float, ax: float, force: float, front: float, rear: float
     ) -> tuple[float, float, float]:
-        """Force over load and slip of the driven front wheels, and the slip's error."""
+        """Returns force over load and slip of the driven front wheels, and the slip's error.
+
+        Learns the ratio of front to rear rolling radii where the force is small.
+        """
         load = self.car.front_share - self.car.height_ratio * ax / G
         along = (force / G + self.car.rolling * (1.0 - load)) / load
         measured = front / max(rear, V_LEAST) - 1.0
@@ -185,13 +198,13 @@ class GripEstimator:
     def _brake_slip(
         self, v: float, force: float, front: float, rear: float
     ) -> tuple[float, float, float]:
-        """Force over load and slip of all wheels, and the slip's error."""
+        """Returns force over load and slip of all wheels, braking positive, and the slip's error."""
         slip = (v - 0.5 * (front / (1.0 + self.ratio) + rear)) / v
         drift = (self.speed.sigma_offset + 0.02 * abs(force)) * self.speed.braking
         return -force / G, slip, sqrt((0.01 + drift) ** 2 / (v * v) + 0.25 * self.ratio_variance)
 
     def _is_steady(self) -> bool:
-        """Tells whether pedals hold still in the window, or slip and force belong to two moments."""
+        """Returns whether pedals ask for more than ASK_LEAST in the window, moving less than STEADY of it."""
         asked = [row[5] for row in self.rows]
         most = max(map(abs, asked))
         return most > ASK_LEAST and max(asked) - min(asked) < STEADY * most
@@ -199,7 +212,7 @@ class GripEstimator:
     def _see_limit_along(
         self, asked: float, force: float, along: float, slip: float, steady: bool
     ) -> bool:
-        """Sees a car that gets much less than its pedals ask for, with wheels that slip for sure."""
+        """Returns whether the pedals ask for much more than the car gets; if so, updates the belief."""
         got = force if asked > 0.0 else -force
         short = 0.0 < got < SHORT * abs(asked) and abs(asked) - got > SHORT_LEAST
         # so little that neither engine nor brakes can be the cause
@@ -212,7 +225,7 @@ class GripEstimator:
         return found
 
     def _see_limit_across(self, v: float, ay: float, steer: float, yaw_rate: float) -> bool:
-        """Sees a car that turns much less than its wheels are turned."""
+        """Returns whether the car turns much less than its wheels are turned; if so, updates the belief."""
         wanted = v * steer / (self.car.wheelbase * (1.0 + (v / V_CHARACTERISTIC) ** 2))
         short = abs(wanted) * v > TURN_ASK and abs(yaw_rate) < TURN_SHORT * abs(wanted)
         found = short and wanted * yaw_rate > 0.0
@@ -221,7 +234,11 @@ class GripEstimator:
         return found
 
     def _estimate(self, v: float, stage: int) -> Grip:
-        """Returns the grip at v in m/s; the median is None while the confidence is 0.1 or less."""
+        """Returns the grip at v in m/s; `shown` is None while the confidence is 0.1 or less.
+
+        stage: of the rain sensor, 0: dry. When wet and more than RISE m/s above the speed of the evidence,
+        `value` is at most the prior's.
+        """
         belief = self.belief
         careful, prior = quantile(belief.grips, CAUTION), quantile(belief.prior, CAUTION)
         if stage and v > self.v_shown + RISE:  # water takes more at a higher speed

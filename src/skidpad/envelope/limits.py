@@ -28,7 +28,7 @@ class Binding(IntEnum):
 
 
 def sight_speed(distance: float, deceleration: float, delay: float) -> float:
-    """Returns the highest speed from which a car stops within `distance`.
+    """Returns the highest speed from which a car stops within `distance`; 0 where that is not above 0.
 
     Solves d = v t + v^2 / (2 a) for v: stopping sight distance, AASHTO, A Policy on Geometric Design
     of Highways and Streets (2011), equation 3-2, with the delay in the place of the reaction time.
@@ -92,22 +92,26 @@ def rss_speed(gap: float, v_lead: float, constants: RssParameters) -> float:
 
 
 def bend_speed(curvature: float, lateral: float) -> float:
-    """Returns the speed at which a bend takes `lateral` m/s^2: v^2 times curvature.
+    """Returns the speed at which a bend takes `lateral` m/s^2; inf below a curvature (1/m) of STRAIGHT.
 
-    The balance of a point mass, AASHTO's simplified curve formula, without superelevation.
+    v^2 times curvature: the balance of a point mass, AASHTO's simplified curve formula, without
+    superelevation.
     """
     return sqrt(lateral / abs(curvature)) if abs(curvature) > STRAIGHT else inf
 
 
 def speed_before_bend(v_bend: float, distance: float, approach: float) -> float:
-    """Returns the speed `distance` before a bend from which `approach` m/s^2 slows to v_bend."""
+    """Returns the speed `distance` before a bend from which `approach` m/s^2 slows to v_bend; inf for inf."""
     return sqrt(v_bend * v_bend + 2.0 * approach * max(distance, 0.0)) if v_bend < inf else inf
 
 
 def bends_speed(
     places: Iterable[tuple[float, float]], lateral: float, approach: float, delay: float, v: float
 ) -> float:
-    """Returns the speed that all bends of (distance, curvature) allow; v drives on for the delay."""
+    """Returns the speed that all bends allow, inf without any; `v` drives on for the delay before braking.
+
+    places: (m ahead, curvature in 1/m) of points of the lane.
+    """
     return min(
         (
             speed_before_bend(bend_speed(curvature, lateral), distance - v * delay, approach)

@@ -38,7 +38,7 @@ class Way:
 
 
 def way_ahead(map: RoadMap, pose: Pose) -> Way | None:
-    """Returns the lane ahead of a pose; None off every lane."""
+    """Returns the lane ahead of a pose every STEP m, up to REACH m or its end; None off every lane."""
     here = map.project(pose.x, pose.y, pose.z)
     if here is None:
         return None
@@ -73,11 +73,15 @@ class Sight:
         self.unseen = inf  # s since the last return of the lead
 
     def reset(self) -> None:
-        """Forgets the lead of another place."""
+        """Forgets the lead of another place; the distances of first sight are kept."""
         self.lead, self.unseen = None, inf
 
     def look(self, points: RadarPoints, pose: Pose, way: Way, v: float) -> Lead | None:
-        """Returns the lead of the tick, held for a second without a return."""
+        """Returns the lead of this tick, None without one; call it once per tick. v: own speed in m/s.
+
+        A lead without a return is carried on for HOLD s. A return JOIN m or more beyond a held lead does not
+        replace it. First distances of leads that come nearer are noted for `reach`.
+        """
         found = self._find(points, pose, way, v)
         held = self._carry_lead(v)
         if found is None:
@@ -92,13 +96,16 @@ class Sight:
 
     @property
     def reach(self) -> float:
-        """m at which leads are first seen: a low quantile, or the prior before there were enough."""
+        """Distance in m at which leads are first seen: the SEEN_SHARE quantile of those noted.
+
+        SEEN_PRIOR before SEEN_LEAST were noted, and half of it at least.
+        """
         if len(self.first_seen) < SEEN_LEAST:
             return SEEN_PRIOR
         return max(float(np.quantile(self.first_seen, SEEN_SHARE)), SEEN_PRIOR / 2.0)
 
     def clear_way(self, pose: Pose, way: Way) -> float:
-        """Returns how far the lane is in the radar's view; its bends lead out of it."""
+        """Returns the m of lane ahead that lie in the radar's field of view; SEEN_PRIOR without a radar."""
         if self.radar is None:
             return SEEN_PRIOR
         bearing = np.arctan2(way.y - pose.y, way.x - pose.x) - pose.yaw
@@ -108,7 +115,10 @@ class Sight:
         return float(min(seen, self.radar.range))
 
     def _carry_lead(self, v: float) -> Lead | None:
-        """Returns the last lead moved on by one step; None without one or when it is unseen for too long."""
+        """Returns the last lead moved on by one step, whose time counts as unseen.
+
+        None without a lead, or when it is unseen for more than HOLD s.
+        """
         self.unseen += self.dt
         if self.lead is None or self.unseen > HOLD:
             return None
@@ -116,7 +126,10 @@ class Sight:
         return Lead(max(gap, 0.0), self.lead.speed)
 
     def _find(self, points: RadarPoints, pose: Pose, way: Way, v: float) -> Lead | None:
-        """Returns the lead (m, m/s) at the nearest radar point in the lane; None where there is none."""
+        """Returns the lead at the nearest radar point in the lane, not slower than 0.
+
+        None where there is none.
+        """
         if self.radar is None or not len(points.range) or len(way.s) < 2:
             return None
         mount = self.radar.mount

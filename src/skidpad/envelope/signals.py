@@ -89,7 +89,10 @@ class CarBus:
     def read(
         self, ego: EgoEstimate, command: VehicleCommand, drive: float, grade: float
     ) -> CarSignals:
-        """Returns the newest message; command: the one applied; drive: m/s^2 that its throttle asks for."""
+        """Writes a message with errors and returns the one that is `delay` ticks old; call it once per tick.
+
+        command: the one applied; drive: m/s^2 that its throttle asks for; grade: of the road, uphill > 0.
+        """
         m, n = self.model, self._draw()
         fl, fr, rl, rr = (
             _round(w * r + m.wheel_noise * u, m.wheel_step)

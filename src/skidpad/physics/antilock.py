@@ -36,9 +36,10 @@ def regulate(
     m: Floats, omega: Floats, radius: float, half_track: float, yaw_rate: float, slows: float,
     pedal: bool, h: float,
 ) -> None:  # fmt: skip
-    """Pressures h seconds later, into `m` (MEMORY,).
+    """Moves the anti-lock brakes of a vehicle on by h seconds: pressures, phases, reference speed in `m`.
 
-    omega (4,): spins of the wheels in rad/s, of this radius in m. slows: deceleration of the body in m/s^2.
+    m (MEMORY,): columns as above. omega (4,): spins of the wheels in rad/s, of this radius in m. slows:
+    deceleration of the body in m/s^2. Without a pedal, pressures return to 1.
     """
     fastest = 0.0
     for w in range(4):
@@ -64,7 +65,7 @@ def regulate(
 
 @inner_kernel
 def _turn_phase(m: Floats, w: int, rim: float, speed: float, h: float) -> None:
-    """Phase and pressure of one wheel; speed: of the road below it."""
+    """Updates phase and pressure of wheel w in `m`; rim: its speed in m/s, speed: of the road below it."""
     slip = 1.0 - rim / speed
     gains = (rim - m[RIM + w]) / h
     m[RIM + w] = rim
@@ -87,7 +88,10 @@ def _turn_phase(m: Floats, w: int, rim: float, speed: float, h: float) -> None:
 
 @inner_kernel
 def _limit_lead(m: Floats, h: float) -> None:
-    """The front wheel with more pressure leads the other one by the gap at most."""
+    """Lowers the front wheel with more pressure to what the other has and the gap, which grows by h seconds.
+
+    Nothing changes before the first cycle.
+    """
     if m[CYCLES] == 0.0:
         return
     low, high = (0, 1) if m[PRESSURE] < m[PRESSURE + 1] else (1, 0)

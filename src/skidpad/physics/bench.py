@@ -20,7 +20,7 @@ US = 1.0e-3  # per ns
 
 
 def run(ticks: int = TICKS) -> dict[str, float]:
-    """Median CPU time in us per vehicle and tick, by number of vehicles, kernels warm."""
+    """Returns the median CPU time in us per vehicle and tick, by number of vehicles, kernels warm."""
     return {f"fleet of {n}": _cost(n, ticks) for n in FLEETS}
 
 

@@ -72,7 +72,7 @@ class Contacts(NamedTuple):
 
     @classmethod
     def room(cls, capacity: int = 512) -> Contacts:
-        """Empty arrays for up to `capacity` contacts."""
+        """Returns empty arrays for up to `capacity` contacts."""
         ints = [np.full(capacity, -1, dtype=np.int64) for _ in range(3)]
         near = np.empty(NEAR, dtype=np.int64)
         return cls._make([*ints, *np.zeros((7, capacity)), near, corners_room()])
@@ -81,7 +81,10 @@ class Contacts(NamedTuple):
 def bodies(
     length: Floats, width: Floats, height: Floats, mass: Floats, yaw_inertia: Floats, x_cog: Floats
 ) -> Bodies:
-    """Bodies from sizes (m), masses (kg; inf cannot be moved) and yaw inertias (kg m^2)."""
+    """Returns bodies from sizes (m), masses (kg; inf cannot be moved) and yaw inertias (kg m^2), each (n,).
+
+    x_cog: m of the centre of gravity ahead of the footprint's centre.
+    """
     return Bodies(
         0.5 * length, 0.5 * width, height.copy(), 1.0 / mass, 1.0 / yaw_inertia, x_cog.copy()
     )
@@ -95,14 +98,14 @@ def _restitution(law: ContactLaw, v: float) -> float:
 
 @inner_kernel
 def _point_velocity(states: ActorStates, i: int, x: float, y: float) -> tuple[float, float]:
-    """Velocity of actor i's body at a world point."""
+    """Returns the velocity in m/s of actor i's body at a world point."""
     r = states.yaw_rate[i]
     return states.vx[i] - r * (y - states.y[i]), states.vy[i] + r * (x - states.x[i])
 
 
 @inner_kernel
 def _arm(states: ActorStates, b: Bodies, i: int, x: float, y: float) -> tuple[float, float]:
-    """Returns the arm from actor i's centre of gravity to a world point."""
+    """Returns the vector in m from actor i's centre of gravity to a world point."""
     x_cog = b.x_cog[i]
     return (
         x - states.x[i] - x_cog * cos(states.yaw[i]),
@@ -112,7 +115,10 @@ def _arm(states: ActorStates, b: Bodies, i: int, x: float, y: float) -> tuple[fl
 
 @inner_kernel
 def _push(states: ActorStates, b: Bodies, i: int, x: float, y: float, jx: float, jy: float) -> None:
-    """Impulse (jx, jy) in N s at a world point on actor i; the state's velocity is the centre's."""
+    """Changes velocity and yaw rate of actor i by an impulse (jx, jy) in N s at a world point.
+
+    The velocity in `states` is that of the footprint's centre.
+    """
     arm_x, arm_y = _arm(states, b, i, x, y)
     d_r = (arm_x * jy - arm_y * jx) * b.inverse_inertia[i]
     states.vx[i] += jx * b.inverse_mass[i] + d_r * b.x_cog[i] * sin(states.yaw[i])
@@ -124,7 +130,7 @@ def _push(states: ActorStates, b: Bodies, i: int, x: float, y: float, jx: float,
 def _yielding(
     states: ActorStates, b: Bodies, i: int, x: float, y: float, nx: float, ny: float
 ) -> float:
-    """Velocity that a unit impulse along (nx, ny) at the point gives that point, 1/kg."""
+    """Returns the velocity that a unit impulse along (nx, ny) at the point gives that point, 1/kg."""
     arm_x, arm_y = _arm(states, b, i, x, y)
     cross = arm_x * ny - arm_y * nx
     return float(b.inverse_mass[i] + cross * cross * b.inverse_inertia[i])
@@ -132,7 +138,10 @@ def _yielding(
 
 @inner_kernel
 def _exchange(states: ActorStates, b: Bodies, c: Contacts, k: int, law: ContactLaw) -> float:
-    """Apply the impulse of contact k; returns its closing speed before."""
+    """Applies the impulse of contact k and returns its closing speed before; none where it does not close.
+
+    Changes `states`; adds the normal part to `c.impulse[k]`.
+    """
     i, j, x, y, nx, ny = c.i[k], c.j[k], c.x[k], c.y[k], c.nx[k], c.ny[k]
     vx, vy = _point_velocity(states, i, x, y)
     if j >= 0:
@@ -164,7 +173,7 @@ def _exchange(states: ActorStates, b: Bodies, c: Contacts, k: int, law: ContactL
 
 @inner_kernel
 def _separate(states: ActorStates, b: Bodies, c: Contacts, k: int) -> None:
-    """Move the bodies of contact k apart, the lighter one further."""
+    """Moves the bodies of contact k apart until DEPTH_KEPT m of overlap are left, the lighter one further."""
     i, j = c.i[k], c.j[k]
     share = b.inverse_mass[i]
     total = share + (b.inverse_mass[j] if j >= 0 else 0.0)
@@ -183,7 +192,10 @@ def _record(
     c: Contacts, count: int, i: int, j: int, segment: int,
     found: tuple[bool, float, float, float, float, float],
 ) -> int:  # fmt: skip
-    """Write one contact; returns the new count. A full table drops the rest."""
+    """Writes one contact at index `count` and returns the new count; unchanged where the table is full.
+
+    found: as `box_box` returns it; not touching: nothing is written.
+    """
     if not found[0] or count >= c.i.shape[0]:
         return count
     c.i[count], c.j[count], c.segment[count] = i, j, segment
@@ -197,7 +209,11 @@ def _record(
 def find_contacts(
     states: ActorStates, b: Bodies, segments: Segments, dt: float, out: Contacts
 ) -> int:
-    """All touching pairs, in order of i, then j, then segment; returns their number."""
+    """Fills `out` with all touching pairs, in order of i, then j, then segment, and returns their number.
+
+    Pairs of which neither can move, or that share less than Z_OVERLAP m of height, do not touch. dt: s of
+    the step that led here.
+    """
     boxes = Boxes(states.x, states.y, states.yaw, b.half_length, b.half_width, out.corners)
     n = states.x.shape[0]
     count = 0
@@ -237,7 +253,7 @@ def resolve_contacts(
     dt: float,
     out: Contacts,
 ) -> int:
-    """Find the contacts after a step of dt seconds, exchange impulses, move bodies apart.
+    """Finds the contacts after a step of dt seconds, exchanges impulses and moves the bodies apart.
 
     Changes velocities, yaw rates and positions in `states`; fills `out` and returns how many.
     """

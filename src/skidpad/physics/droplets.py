@@ -28,24 +28,24 @@ class Drops(NamedTuple):
 
 
 def fresnel(index: float) -> float:
-    """Share of light that a surface of this index of refraction returns at normal incidence."""
+    """Returns the share of light that a surface of this index of refraction reflects at normal incidence."""
     return ((index - 1.0) / (index + 1.0)) ** 2
 
 
 def rain_drops(rate: float) -> Drops:
-    """Return the drops of rain of `rate` mm/h."""
+    """Returns the drops of rain of `rate` mm/h; of density 0 where it does not rain."""
     if rate <= 0.0:
         return Drops()
     return Drops(8000.0, 4.1 * rate**-0.21, fresnel(RAIN_INDEX))
 
 
 def snow_flakes(rate: float) -> Drops:
-    """Return the flakes of snowfall of `rate` mm/h of water."""
+    """Returns the flakes of snowfall of `rate` mm/h of water; of density 0 where it does not snow."""
     if rate <= 0.0:
         return Drops()
     return Drops(7.6e3 * rate**-0.87, 2.55 * rate**-0.48, fresnel(ICE_INDEX))
 
 
 def drop_extinction(drops: Drops) -> float:
-    """Extinction in 1/m: the integral of 2 pi/4 D^2 over all drops."""
+    """Returns the extinction in 1/m: the integral of 2 pi/4 D^2 over all drops."""
     return pi * drops.density / drops.slope**3 * 1e-6

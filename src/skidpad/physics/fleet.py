@@ -88,14 +88,17 @@ class Fleet:
         return len(self.types)
 
     def set_step(self, dt: float) -> None:
-        """s by which one step advances from now on."""
+        """Sets the s by which one `step` advances from now on, and its number of equal substeps."""
         self.dt = dt
         self.steps = max(1, round(dt / self.substep))
         if self.steps * self.substep < dt - 1e-9:
             self.steps += 1
 
     def place(self, i: int, pose: Pose, v: float = 0.0) -> None:
-        """Put vehicle i at `pose` with speed v along its heading, wheels straight and rolling."""
+        """Puts vehicle i at `pose` with speed v along its heading, wheels straight and rolling, and present.
+
+        What its controls and tyres remember starts anew.
+        """
         s = self.states
         s.x[i], s.y[i], s.z[i] = pose.x, pose.y, pose.z
         s.roll[i], s.pitch[i], s.yaw[i] = pose.roll, pose.pitch, wrap_angle(pose.yaw)
@@ -118,12 +121,13 @@ class Fleet:
         bank: Floats | None = None,
         active: NDArray[np.bool_] | None = None,
     ) -> None:
-        """Advance the active vehicles by dt.
+        """Advances the active vehicles by dt, in place.
 
         commands (n, 5): throttle, brake, steer (left positive), handbrake, reverse. mu (n, 4) of a
         tyre with tire_friction 3.5 at FL, FR, RL, RR; each wheel's own scale is applied here, once.
         `stiffness` and `water` are as they were set.
-        grade, bank (n,): rad, uphill and left side up positive. active: None means all present.
+        grade, bank (n,): rad, uphill and left side up positive; None: flat. active: None means all present.
+        Raises ConfigError for other shapes of commands or mu.
         """
         if commands.shape != (len(self), 5) or mu.shape != (len(self), 4):
             raise ConfigError(
@@ -149,7 +153,7 @@ class Fleet:
     def apply_impulse(
         self, i: int, impulse: tuple[float, float], point: tuple[float, float]
     ) -> None:
-        """Impulse (N s) at a point (m), both in world axes, on vehicle i."""
+        """Changes the motion of vehicle i by an impulse (N s) at a point (m), both in world axes."""
         s, p = self.states, self.params
         c, sn = cos(s.yaw[i]), sin(s.yaw[i])
         x_cog = s.x[i] + p.x_cog[i] * c
@@ -161,21 +165,21 @@ class Fleet:
         s.yaw_rate[i] += d_r
 
     def on_side(self) -> NDArray[np.bool_]:
-        """(n,) which vehicles lie on their side."""
+        """Returns (n,) which vehicles lie on their side."""
         return np.asarray(self.wheels.memory[:, OVER] > 0.0)
 
     def wheel_speeds(self, i: int) -> tuple[float, float, float, float]:
-        """Rim speeds of vehicle i in m/s: FL, FR, RL, RR."""
+        """Returns the rim speeds of vehicle i in m/s: FL, FR, RL, RR."""
         fl, fr, rl, rr = (self.wheels.omega[i] * self.params.wheel_radius[i]).tolist()
         return fl, fr, rl, rr
 
     def speed(self, i: int) -> float:
-        """Speed of vehicle i along its body in m/s, negative in reverse."""
+        """Returns the speed of vehicle i along its body in m/s, negative in reverse."""
         s = self.states
         return float(s.vx[i] * cos(s.yaw[i]) + s.vy[i] * sin(s.yaw[i]))
 
     def slip_angles(self) -> Floats:
-        """(n,) side slip of the centres of gravity in rad, left positive; 0 below 1 m/s."""
+        """Returns (n,) side slip of the centres of gravity in rad, left positive; 0 below 1 m/s."""
         s, x_cog = self.states, self.params.x_cog
         c, sn = np.cos(s.yaw), np.sin(s.yaw)
         u = s.vx * c + s.vy * sn
@@ -183,10 +187,10 @@ class Fleet:
         return np.where(np.hypot(u, v) > 1.0, np.arctan2(v, u), 0.0)
 
     def gear(self, i: int, reverse: bool = False) -> int:
-        """Gear that the box of vehicle i shows, see `shown_gear`."""
+        """Returns the gear that the box of vehicle i shows, see `shown_gear`."""
         return shown_gear(self.speed(i), reverse)
 
 
 def shown_gear(speed: float, reverse: bool) -> int:
-    """Gear that an automatic box shows: -1 in reverse, else 1 to 6 by speed in m/s."""
+    """Returns the gear that an automatic box shows: -1 in reverse, else 1 to 6 by speed in m/s."""
     return -1 if reverse else 1 + bisect_left(GEAR_UP_V, abs(speed))

@@ -103,12 +103,12 @@ class GripParams(NamedTuple):
 
 
 def rain_rate(weather: Weather) -> float:
-    """Rain in mm/h, linear in precipitation. Source of the full scale: see RAIN_FULL."""
+    """Returns the rain in mm/h, linear in precipitation; source of the full scale: see RAIN_FULL."""
     return RAIN_FULL * weather.precipitation / 100.0
 
 
 def runoff_film(rain_mm_h: float) -> float:
-    """Depth in mm of rain flowing off the road, above its texture.
+    """Returns the depth in mm of rain flowing off the road, above its texture; 0 where the texture holds it.
 
     After Gallaway, Schiller and Rose, TTI report 138-5 (1971), which relates these quantities; the
     numbers in d = 0.01485 T^0.11 L^0.43 I^0.59 / S^0.42 - T were not found in a public text.
@@ -118,10 +118,10 @@ def runoff_film(rain_mm_h: float) -> float:
 
 
 def road_surface(weather: Weather) -> RoadSurface:
-    """Water, ice and snow on the road (decision M-10).
+    """Returns the water, ice and snow on the road (decision M-10).
 
-    Film: a wetted texture by wetness, standing water by deposits, runoff by the rain that falls.
-    Ice: linear, 20 mm at 100 (B-017). Sources at the constants above.
+    Film: a wetted texture by wetness, standing water by deposits, runoff by the rain that falls; 0 where
+    ice on a road below 0 C gets no rain. Ice: linear, 20 mm at 100 (B-017). Sources at the constants above.
     """
     rain = rain_rate(weather)
     film = FILM_WET * weather.wetness / 100.0
@@ -137,22 +137,22 @@ def road_surface(weather: Weather) -> RoadSurface:
 
 
 def rain_ratio(weather: Weather) -> float:
-    """Equation 3.1 of the friction study (B-030): wetness w and deposits p."""
+    """Returns the share of dry grip by wetness and deposits: equation 3.1 of the friction study (B-030)."""
     w = weather.wetness / 100.0
     p = weather.precipitation_deposits / 100.0
     return 0.6 * exp(-0.916 * w) * (1.0 - w) ** 3 + 0.4 - 0.1 * p
 
 
 def ice_ratio(weather: Weather) -> float:
-    """Equation 3.2 of the friction study (B-031): ice thickness i."""
+    """Returns the share of dry grip by ice thickness: equation 3.2 of the friction study (B-031)."""
     i = weather.ice_thickness / 100.0
     return 0.85 * exp(-1.89711 * i) * (1.0 - i) ** 3 + 0.15
 
 
 def statistical_ratio(weather: Weather) -> float:
-    """The published ratio: ice alone decides when there is ice, else the rain formula (B-040).
+    """Returns the published share of dry grip: by ice alone when there is ice, else by rain (B-040).
 
-    Rain together with ice is refused: the study defines no ratio for it (B-002).
+    ConfigError for rain together with ice, for which the study defines no ratio (B-002), and for snow.
     """
     if weather.rain_with_ice:
         raise ConfigError(
@@ -169,14 +169,14 @@ def statistical_ratio(weather: Weather) -> float:
 
 
 def ice_mu(road_temperature_c: float, wet: bool) -> float:
-    """Friction of sheet ice; water on it makes it as slippery as at the melting point."""
+    """Returns the friction of sheet ice; water on it makes it as slippery as at the melting point."""
     temperature = 0.0 if wet else min(road_temperature_c, 0.0)
     low, high = ICE_MU_RANGE
     return min(max(ICE_MU + ICE_MU_PER_C * (temperature - ICE_MU_REF_C), low), high)
 
 
 def dry_friction(tyres: Tyres) -> float:
-    """Friction of these tyres on the dry road on which new winter tyres have MU_REF."""
+    """Returns the friction of these tyres on the dry road on which new winter tyres have MU_REF."""
     return tyres.dry * (1.0 + (WORN_DRY - 1.0) * tyres.wear)
 
 
@@ -188,7 +188,7 @@ def physical_params(
     stiffness: bool = False,
     drag: bool = False,
 ) -> GripParams:
-    """Grip of a surface from measurements.
+    """Returns the grip of a surface by the physical model, from measurements.
 
     Wet: a loss that saturates with the film; water lifts the contact with the square of speed, and
     what the tread cannot take does so suddenly. Ice covers as it fills the texture; snow hides what
@@ -220,14 +220,17 @@ def physical_params(
 
 
 def _on_ice(surface: RoadSurface, tyres: Tyres, *, wet: bool) -> float:
-    """Friction on sheet ice: that of the winter tyre, scaled by what these tyres have at -5 C."""
+    """Returns the friction on sheet ice: that of the winter tyre, scaled by what these tyres have at -5 C."""
     own = tyres.ice if tyres.tread_mm > ICE_TREAD_MM else tyres.worn_ice
     ice = ice_mu(surface.road_temperature_c, wet=wet or surface.rain_mm_h > 0.0)
     return ice * (own / ICE_MU)
 
 
 def _on_snow(tyres: Tyres) -> float:
-    """Friction on packed snow; worn to 1.6 mm, that of a summer tyre, linear between: an assumption."""
+    """Returns the friction on packed snow.
+
+    At 1.6 mm of tread that of a summer tyre, linear between (assumed).
+    """
     worn = min(tyres.snow, find_tyres("summer").snow)
     return tyres.snow + (worn - tyres.snow) * tyres.wear
 
@@ -247,7 +250,11 @@ class Road:
     drag: bool = False  # wheels push water aside
 
     def params(self, tyres: str | None = None, surface: RoadSurface | None = None) -> GripParams:
-        """Grip of vehicles with these tyres. surface: what lies there, by the physical model."""
+        """Returns the grip of vehicles with these tyres, by default the run's.
+
+        surface: what lies there, then by the physical model whatever the run's. ConfigError for unknown tyres
+        and for weather that the statistical model does not know.
+        """
         kind = find_tyres(self.tyres if tyres is None else tyres)
         if surface is None and self.model is not GripModel.PHYSICAL:
             ratio = 1.0 if self.model is GripModel.NONE else statistical_ratio(self.weather)
@@ -259,7 +266,7 @@ class Road:
 
 
 def road_of(setup: Setup) -> Road:
-    """The road of a set-up."""
+    """Returns the road of a set-up, for the grip outside of patches."""
     return Road(
         setup.weather, setup.grip, setup.mu_ref, setup.tyres, setup.tyre_stiffness,
         setup.water_drag,
@@ -267,44 +274,44 @@ def road_of(setup: Setup) -> Road:
 
 
 def grip_params(weather: Weather, model: GripModel, mu_ref: float = MU_REF) -> GripParams:
-    """Grip of this weather under this model on new winter tyres, for `mu_at`."""
+    """Returns the grip of this weather under this model on new winter tyres, for `mu_at`."""
     return Road(weather, model, mu_ref).params()
 
 
 @inner_kernel
 def dry_ratio(params: GripParams, v: float) -> float:
-    """Friction of the same road when dry at speed v in m/s, over mu_ref."""
+    """Returns the friction of the same road when dry at speed v in m/s, over mu_ref."""
     return 1.0 + params.fall * (V_REFERENCE - min(v, V_FALL))
 
 
 @inner_kernel
 def afloat(params: GripParams, v: float) -> float:
-    """Share of its grip that water leaves a tyre at speed v in m/s."""
+    """Returns the share of its grip that water leaves a tyre at speed v in m/s, FLOATING at least."""
     lifted, wedged = params.lift * v * v, params.wedge * v * v
     return max(1.0 / ((1.0 + lifted) * (1.0 + wedged * wedged * wedged)), FLOATING)
 
 
 @kernel
 def ratio_at(params: GripParams, v: float) -> float:
-    """Friction at speed v in m/s over mu_ref."""
+    """Returns the friction at speed v in m/s over mu_ref."""
     return params.firm + params.bare * dry_ratio(params, v) * afloat(params, v)
 
 
 @kernel
 def left_at(params: GripParams, v: float) -> float:
-    """Share that the weather leaves of the friction of the same road when dry, at speed v in m/s."""
+    """Returns the share that the weather leaves of the same road's friction when dry, at v in m/s."""
     return ratio_at(params, v) / dry_ratio(params, v)
 
 
 @kernel
 def mu_at(params: GripParams, v: float) -> float:
-    """Friction coefficient at speed v in m/s of a tyre with tire_friction 3.5."""
+    """Returns the friction coefficient at speed v in m/s of a tyre with tire_friction 3.5."""
     return params.mu_ref * ratio_at(params, v)
 
 
 @kernel
 def stiffness_at(params: GripParams, v: float) -> float:
-    """Slip stiffness at speed v in m/s over that on a dry road, along and across.
+    """Returns the slip stiffness at speed v in m/s over that on a dry road, along and across.
 
     Water keeps a share of the contact's length off the road; the rest carries load and shears. A
     brush's stiffness is 2 c a^2 with half the length a, so it falls with the square of the share
@@ -318,16 +325,16 @@ def stiffness_at(params: GripParams, v: float) -> float:
 
 @inner_kernel
 def grip_of_row(grips: NDArray[np.float64], i: int) -> GripParams:
-    """Row i of an array whose columns are the fields of GripParams."""
+    """Returns row i of an array whose columns are the fields of GripParams."""
     g = grips[i]
     return GripParams(g[0], g[1], g[2], g[3], g[4], g[5], g[6], g[7], g[8])
 
 
 @inner_kernel
 def water_drag(film: float, width: float, behind: bool) -> float:
-    """Drag of a wheel that pushes aside water of this depth in m, N over the square of the speed.
+    """Returns the drag of a wheel that pushes water aside, in N over the square of the speed in m/s.
 
-    behind: in the track that another wheel has cleared.
+    film: m deep; width: m of the tyre; behind: in the track that another wheel has cleared.
     """
     depth = film * CLEARED if behind else film
     return 0.5 * WATER_DRAG * WATER_DENSITY * width * depth
@@ -337,11 +344,14 @@ def water_drag(film: float, width: float, behind: bool) -> float:
 def fill_mu(
     params: GripParams, vx: NDArray[np.float64], vy: NDArray[np.float64], out: NDArray[np.float64]
 ) -> None:
-    """mu of all four tyres of n vehicles by their speeds. vx, vy (n,); out (n, 4)."""
+    """Writes mu of all four tyres of n vehicles by their speeds into out (n, 4). vx, vy (n,): m/s."""
     for i in range(vx.shape[0]):
         out[i, :] = mu_at(params, sqrt(vx[i] * vx[i] + vy[i] * vy[i]))
 
 
 def friction_ratio(weather: Weather, model: GripModel, v: float = 0.0) -> float:
-    """Share of dry grip that this weather leaves at speed v in m/s; 1 under GripModel.NONE."""
+    """Returns the share of dry grip that this weather leaves at v in m/s; 1 under GripModel.NONE.
+
+    ConfigError for weather that the statistical model does not know.
+    """
     return float(left_at(grip_params(weather, model), v))

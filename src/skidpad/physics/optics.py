@@ -40,7 +40,7 @@ NIGHT_LUX = 0.05  # moonless sky with skyglow beside a road
 
 
 def fog_extinction(weather: Weather) -> float:
-    """Extinction of fog and clear air in 1/m; sight falls geometrically with fog density.
+    """Returns the extinction of fog and clear air in 1/m; sight falls geometrically with fog density.
 
     Koschmieder: sight = ln(1 / contrast) / beta.
     """
@@ -50,7 +50,7 @@ def fog_extinction(weather: Weather) -> float:
 
 
 def rain_extinction(rain_mm_h: float) -> float:
-    """Extinction of rain in 1/m; 0 without rain. See RAIN_SIGHT_KM."""
+    """Returns the extinction of rain in 1/m; 0 without rain. See RAIN_SIGHT_KM."""
     if rain_mm_h <= 0.0:
         return 0.0
     sight = 1000.0 * RAIN_SIGHT_KM * rain_mm_h**RAIN_SIGHT_EXPONENT
@@ -58,22 +58,22 @@ def rain_extinction(rain_mm_h: float) -> float:
 
 
 def extinction(weather: Weather) -> float:
-    """Extinction of visible light in 1/m by fog, clear air and rain together."""
+    """Returns the extinction of visible light in 1/m by fog, clear air and rain together."""
     return fog_extinction(weather) + rain_extinction(rain_rate(weather))
 
 
 def sight(weather: Weather) -> float:
-    """Meteorological optical range in m (5 % contrast of a black target by day)."""
+    """Returns the meteorological optical range in m (5 % contrast of a black target by day)."""
     return -log(CONTRAST_SEEN) / extinction(weather)
 
 
 def visibility(weather: Weather) -> float:
-    """Estimate of visibility in m as automatic headlights read it, at most 1000 m (A-220)."""
+    """Returns the estimate of visibility in m that automatic headlights use, at most 1000 m (A-220)."""
     return min(sight(weather), VISIBILITY_MOST)
 
 
 def transmission(weather: Weather, distance: float) -> float:
-    """Share of light left after `distance` m; fog begins at the weather's fog_distance."""
+    """Returns the share of light left after `distance` m; fog begins at the weather's fog_distance."""
     fog = fog_extinction(weather) * max(distance - weather.fog_distance, 0.0)
     return exp(-fog - rain_extinction(rain_rate(weather)) * distance)
 
@@ -89,12 +89,12 @@ class LidarAir(NamedTuple):
 
 
 def snow_rate(weather: Weather) -> float:
-    """Snowfall in mm/h of water: precipitation in air at or below freezing, an assumption."""
+    """Returns snowfall in mm/h of water: precipitation in air of 0 C at most, an assumption; else 0."""
     return rain_rate(weather) if weather.air_temperature_c <= 0.0 else 0.0
 
 
 def lidar_air(weather: Weather) -> LidarAir:
-    """What this weather puts into a lidar's way.
+    """Returns what this weather puts into a lidar's way.
 
     Rain takes what it takes from visible light (`rain_extinction`): drops are far larger than both
     waves. Fog likewise: its extinction at 905 nm is taken as that of visible light.
@@ -107,7 +107,7 @@ def lidar_air(weather: Weather) -> LidarAir:
 
 
 def daylight(weather: Weather) -> float:
-    """Horizontal illuminance in lux of sun and sky.
+    """Returns the horizontal illuminance in lux of sun and sky; NIGHT_LUX from 12 degrees below on.
 
     Source: IES RP-21-84, clear (0.8 + 15.5 sqrt(sin h), c 0.21) and overcast sky (0.3 + 21 sin h),
     mixed by cloudiness. Between sun altitudes 0 and -12 degrees it fades by decades to night.
@@ -126,12 +126,12 @@ def daylight(weather: Weather) -> float:
 
 
 def _reach(beta: float, start: float, budget: float) -> float:
-    """Distance in m at which beta * (r - start) has used up `budget` nepers."""
+    """Returns the distance in m at which beta * (r - start) has used up `budget` nepers; inf for beta 0."""
     return start + budget / beta if beta > 0.0 else inf
 
 
 def depth_range(weather: Weather) -> float:
-    """Distance in m to which a camera still measures depth and tells classes by day.
+    """Returns the distance in m to which a camera still measures depth and tells classes by day.
 
     A car's contrast falls to the least seen one (Koschmieder); fog begins at fog_distance, rain at
     the lens.
@@ -146,9 +146,10 @@ def depth_range(weather: Weather) -> float:
 
 
 def label_range(weather: Weather, beam: Beam = Beam.LOW) -> float:
-    """Distance in m to which an unlit object is recognised: by contrast, and at night by light.
+    """Returns the distance in m to which an unlit object is recognised: by contrast, at night by light.
 
-    At night a beam must throw E_SEEN_LUX through the air onto it: I exp(-beta r) / r^2.
+    At night a beam must throw E_SEEN_LUX through the air onto it: I exp(-beta r) / r^2; 0 without one.
+    Night begins below 10 lux.
     """
     by_contrast = depth_range(weather)
     if daylight(weather) >= 10.0 * E_SEEN_LUX:
@@ -190,7 +191,7 @@ def _itu_curve(
 
 
 def rain_attenuation_db_km(rain_mm_h: float, frequency_ghz: float = RADAR_GHZ) -> float:
-    """Attenuation of a radio wave by rain in dB/km, one way, 1 to 1000 GHz (ITU-R P.838-3)."""
+    """Returns the attenuation of a radio wave by rain in dB/km, one way, 1 to 1000 GHz (ITU-R P.838-3)."""
     if rain_mm_h <= 0.0:
         return 0.0
     x = log10(frequency_ghz)
@@ -199,12 +200,12 @@ def rain_attenuation_db_km(rain_mm_h: float, frequency_ghz: float = RADAR_GHZ) -
 
 
 def radar_loss_db(weather: Weather, distance: float) -> float:
-    """Two-way loss in dB of a 77 GHz radar on a target at `distance` m; a few dB at 80 m (M-9)."""
+    """Returns the two-way loss in dB of a 77 GHz radar on a target at `distance` m (M-9)."""
     return 2.0 * rain_attenuation_db_km(rain_rate(weather)) * distance / 1000.0
 
 
 def radar_range(weather: Weather, nominal: float) -> float:
-    """Range in m at which a target returns what it returns at `nominal` m in dry air.
+    """Returns the range in m at which a target returns what it returns at `nominal` m in dry air.
 
     Received power falls with the fourth power of distance and by the rain: solved by bisection.
     """

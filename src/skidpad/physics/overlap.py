@@ -25,13 +25,16 @@ class Boxes(NamedTuple):
 
 
 def corners_room() -> Floats:
-    """Room for the two polygons between which one is clipped."""
+    """Returns arrays (2, 12, 2) for the two polygons between which one is clipped: `Boxes.corners`."""
     return np.empty((2, 12, 2))
 
 
 @inner_kernel
 def _clip(polygon: Floats, count: int, axis: int, limit: float, sign: float, out: Floats) -> int:
-    """Part of the polygon (count, 2) with sign * coordinate <= limit, into `out`."""
+    """Writes the part of a convex polygon with sign * coordinate <= limit into `out`; returns its corners.
+
+    polygon: its first `count` rows are valid; axis: 0 for x, 1 for y.
+    """
     kept = 0
     for k in range(count):
         p, q = polygon[k], polygon[(k + 1) % count]
@@ -49,7 +52,7 @@ def _clip(polygon: Floats, count: int, axis: int, limit: float, sign: float, out
 
 @inner_kernel
 def _middle(boxes: Boxes, i: int, j: int) -> tuple[float, float]:
-    """Mean corner of the overlap of boxes i and j, in the world."""
+    """Returns the mean corner of the overlap of boxes i and j, in the world; overwrites `boxes.corners`."""
     c, s = cos(boxes.yaw[j]), sin(boxes.yaw[j])
     ci, si = cos(boxes.yaw[i]), sin(boxes.yaw[i])
     here, there = boxes.corners[0], boxes.corners[1]
@@ -74,7 +77,7 @@ def _middle(boxes: Boxes, i: int, j: int) -> tuple[float, float]:
 
 @inner_kernel
 def _radius(boxes: Boxes, i: int, nx: float, ny: float) -> float:
-    """Half the extent of box i along a unit direction."""
+    """Returns half the extent of box i in m along a unit direction."""
     c, s = cos(boxes.yaw[i]), sin(boxes.yaw[i])
     along, across = abs(nx * c + ny * s), abs(ny * c - nx * s)
     return float(boxes.half_length[i] * along + boxes.half_width[i] * across)
@@ -82,7 +85,10 @@ def _radius(boxes: Boxes, i: int, nx: float, ny: float) -> float:
 
 @kernel
 def box_box(boxes: Boxes, i: int, j: int) -> Overlap:
-    """Overlap of boxes i and j by separating axes; the normal pushes i away from j."""
+    """Returns the overlap of boxes i and j by separating axes; the normal pushes i away from j.
+
+    All zeros and False where they do not touch.
+    """
     dx, dy = boxes.x[i] - boxes.x[j], boxes.y[i] - boxes.y[j]
     depth, nx, ny = inf, 0.0, 0.0
     for k in range(4):
@@ -103,7 +109,10 @@ def box_box(boxes: Boxes, i: int, j: int) -> Overlap:
 def _clipped_line(
     boxes: Boxes, i: int, line: tuple[float, float, float, float]
 ) -> tuple[float, float]:
-    """Shares of the line's length where it enters and leaves box i; enter > leave: it misses."""
+    """Returns the shares of a line's length, 0 to 1, where it enters and leaves box i.
+
+    line: ends (x0, y0, x1, y1) in the world. enter > leave: it misses.
+    """
     c, s = cos(boxes.yaw[i]), sin(boxes.yaw[i])
     ax, ay = line[0] - boxes.x[i], line[1] - boxes.y[i]
     dx, dy = line[2] - line[0], line[3] - line[1]
@@ -127,10 +136,11 @@ def _clipped_line(
 def box_segment(
     boxes: Boxes, i: int, line: tuple[float, float, float, float], back: tuple[float, float]
 ) -> Overlap:
-    """Overlap of box i with a line from (x0, y0) to (x1, y1); the normal pushes the box away.
+    """Returns the overlap of box i with a line from (x0, y0) to (x1, y1); the normal pushes the box away.
 
     back: where the box's centre was before the step. It tells the side of the line that the box
-    came from, so that a fast car is thrown back and not drawn through a guardrail.
+    came from, so that a fast car is thrown back and not drawn through a guardrail. All zeros and False
+    where they do not touch. A line of no length divides by 0.
     """
     enter, leave = _clipped_line(boxes, i, line)
     if enter > leave:

@@ -71,7 +71,10 @@ STIFFNESS, WATER, FEEL = 4, 8, 12
 
 
 def vehicle_params(types: Sequence[VehicleType]) -> VehicleParams:
-    """Parameters of these vehicles, in their order."""
+    """Returns the parameters of these vehicles, in their order.
+
+    Cycling, stability, sensed and tips are off.
+    """
 
     def column(values: list[float]) -> Floats:
         return np.array(values, dtype=np.float64)

@@ -20,7 +20,7 @@ SNOW = "snow"  # the one preset that only the physical grip model knows
 
 
 def _weather(fields: Any, where: str) -> Weather:
-    """A Weather from a mapping; an unknown key is an error."""
+    """Returns a Weather of a mapping; ConfigError, beginning with `where`, for anything else in it."""
     if not isinstance(fields, dict):
         raise ConfigError(
             f"{where} must be a mapping of weather fields, got one of type {type(fields).__name__}"
@@ -37,7 +37,7 @@ def _weather(fields: Any, where: str) -> Weather:
 
 @lru_cache(maxsize=1)
 def preset_groups() -> dict[str, dict[str, Weather]]:
-    """Presets by group (`matrix`, `grip`) and name, in the published order."""
+    """Returns presets by group (`matrix`, `grip`) and name, in the published order."""
     text = resources.files("skidpad.physics").joinpath("presets.yaml").read_bytes()
     groups = msgspec.yaml.decode(text, type=dict[str, dict[str, dict[str, Any]]])
     return {
@@ -63,26 +63,32 @@ def all_presets() -> dict[str, Weather]:
 
 
 def preset_name(text: str) -> str | None:
-    """The preset's own spelling of `text`, where `-` and `_` are one; None: no such preset."""
+    """Returns the preset's own spelling of `text`, in which case and `-` or `_` do not matter.
+
+    None: unknown.
+    """
     wanted = text.strip().lower().replace("_", "-")
     return next((name for name in WEATHERS.names() if name.replace("_", "-") == wanted), None)
 
 
 def preset(name: str) -> Weather:
-    """The preset with this name; ConfigError lists all names."""
+    """Returns the preset with this name, spelled as in `preset_name`; ConfigError lists all names."""
     known = preset_name(name)
     return WEATHERS.get(name if known is None else known)
 
 
 def load_weather(path: Path) -> Weather:
-    """Weather from a YAML file of fields; its name is the file's unless it gives one."""
+    """Returns a weather from a YAML file of fields; its name is the file's unless it gives one.
+
+    FileError where it cannot be read, ConfigError for what is not a weather.
+    """
     fields = decode_yaml(read_bytes(path, "weather file"), f"weather file {path}")
     weather = _weather(fields, f"weather file {path}")
     return weather if weather.name else replace(weather, name=path.stem)
 
 
 def find_weather(text: str) -> Weather:
-    """What a user may write for a weather: a preset's name, or a .yaml file."""
+    """Returns the weather that a user writes: a preset's name, or a .yaml file; raises what those raise."""
     path = Path(text)
     if path.suffix in (".yaml", ".yml"):
         return load_weather(path)
@@ -101,7 +107,7 @@ class WeatherManager:
 
     @property
     def current(self) -> Weather:
-        """The weather in force; its name and parameters."""
+        """The weather that is in force; its name and parameters."""
         return self.weathers[self.index]
 
     def apply(self, name: str) -> bool:

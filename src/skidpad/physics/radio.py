@@ -27,7 +27,10 @@ DROPS_MM = (0.05, 8.0)  # diameters that count; larger drops break
 
 
 def water_permittivity(ghz: float, celsius: float = 10.0) -> complex:
-    """Returns the complex permittivity of water, absorption positive (Liebe et al. 1991)."""
+    """Returns the complex relative permittivity of water at a frequency in GHz, absorption positive.
+
+    Source: Liebe et al. 1991.
+    """
     theta = 1.0 - 300.0 / (273.15 + celsius)
     low = 77.66 - 103.3 * theta
     middle, high = 0.0671 * low, 3.52 + 7.52 * theta
@@ -66,7 +69,7 @@ def mie_efficiencies(x: Floats, index: complex) -> tuple[Floats, Floats]:
 
 @cache
 def rain_scatter(rain_mm_h: float, ghz: float) -> tuple[float, float]:
-    """Returns attenuation in dB/km one way and radar reflectivity in m^2/m^3 of rain (Mie)."""
+    """Returns attenuation in dB/km one way and radar reflectivity in m^2/m^3 of rain (Mie); 0, 0 without."""
     drops = rain_drops(rain_mm_h)
     size = np.linspace(*DROPS_MM, 400)
     x = pi * size * 1e-3 * ghz * 1e9 / LIGHT
@@ -85,7 +88,7 @@ def film_loss_db(depth: float, ghz: float) -> float:
 
 
 def radome_film(rain_mm_h: float, speed: float) -> float:
-    """Returns the mean depth in m of the film on a radome that drives through rain at `speed` m/s."""
+    """Returns the mean depth in m of the film on a radome driven through rain at `speed` m/s; 0 at rest."""
     if rain_mm_h <= 0.0 or speed <= 0.0:
         return 0.0
     drops = rain_drops(rain_mm_h)
@@ -95,5 +98,5 @@ def radome_film(rain_mm_h: float, speed: float) -> float:
 
 
 def wet_radome_db(rain_mm_h: float, speed: float, ghz: float) -> float:
-    """Returns the two-way loss in dB of a wet radome at a speed in m/s."""
+    """Returns the two-way loss in dB of a wet radome driven through rain at a speed in m/s."""
     return 2.0 * film_loss_db(radome_film(rain_mm_h, speed), ghz)

@@ -60,7 +60,7 @@ def roll_inertias(types: Sequence[VehicleType]) -> Floats:
 
 @inner_kernel
 def left_arm(half_track: float, cog_height: float, roll_gradient: float, a_y: float) -> float:
-    """Half track that the leaning body leaves, m."""
+    """Returns the half track in m that the leaning body leaves at a_y in m/s^2; GAP of it at least."""
     lean = roll_gradient * min(abs(a_y), A_LEAN)
     return max(half_track - cog_height * lean, GAP * half_track)
 
@@ -69,8 +69,9 @@ def left_arm(half_track: float, cog_height: float, roll_gradient: float, a_y: fl
 def tip(
     m: Floats, a_y: float, down: float, arm: float, height: float, inertia: float, h: float
 ) -> None:
-    """The body's turn about its outer wheels h seconds later, into the memory `m`.
+    """Moves the body's turn about its outer wheels on by h seconds, in the memory `m`.
 
+    Sets OVER at 90 degrees. Nothing changes while all wheels are down and the turn does not lift one.
     a_y: lateral acceleration by the tyres, left positive. down: of the road on the body, both m/s^2.
     arm, height: m of the centre of gravity from the outer wheels. inertia: over the mass, m^2.
     """

@@ -37,7 +37,7 @@ def _cell_size(low: Floats, high: Floats) -> float:
 
 
 def _cells_of(i: Floats, origin: Floats, cell: float, shape: Ints) -> list[int]:
-    """Cells touched by the bounding box of one segment, x0 y0 x1 y1."""
+    """Returns the indices of grid cells that the bounding box of a segment `i` (x0, y0, x1, y1) touches."""
     low = np.floor((np.minimum(i[:2], i[2:]) - origin) / cell).astype(int)
     high = np.floor((np.maximum(i[:2], i[2:]) - origin) / cell).astype(int)
     nx = int(shape[0])
@@ -47,7 +47,7 @@ def _cells_of(i: Floats, origin: Floats, cell: float, shape: Ints) -> list[int]:
 
 
 def static_segments(lines: Floats, z_low: Floats, z_high: Floats) -> Segments:
-    """Segments from lines (m, 4) as x0 y0 x1 y1, each between two heights (m,).
+    """Returns segments from lines (m, 4) as x0 y0 x1 y1, each between two heights (m,), with their grid.
 
     Segments shorter than a millimetre have no direction and keep their index, but are never found.
     """
@@ -71,9 +71,9 @@ def static_segments(lines: Floats, z_low: Floats, z_high: Floats) -> Segments:
 
 @inner_kernel
 def candidates(s: Segments, x: float, y: float, reach: float, out: Ints) -> int:
-    """Indices of segments whose bounding boxes come within `reach` of a place, ascending.
+    """Writes indices of segments whose bounding boxes come within `reach` of a place, ascending.
 
-    Fills `out` as far as it goes and returns how many.
+    Fills `out` as far as it goes, the rest is dropped, and returns how many.
     """
     count = 0
     u_low = max(floor((x - reach - s.origin[0]) / s.cell), 0)

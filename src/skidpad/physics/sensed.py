@@ -52,7 +52,10 @@ def note_motion(
     m: Floats, omega: Floats, radius: float, half_track: float, yaw_rate: float, a_x: float,
     a_y: float, braked: bool, h: float,
 ) -> None:  # fmt: skip
-    """Speed and used grip h seconds later, into `m`. a_x, a_y: specific force, m/s^2."""
+    """Moves speed and used grip in `m` on by h seconds, from what the car measures.
+
+    omega (4,): rad/s; radius, half_track: m; a_x, a_y: specific force, m/s^2.
+    """
     slowest, fastest = 1.0e9, 0.0
     for w in range(4):
         arm = half_track if w % 2 == 0 else -half_track
@@ -73,7 +76,10 @@ def note_motion(
 def sensed_correction(
     m: Floats, model: Model, to_rear: float, yaw_rate: float, a_y: float, steer: float, h: float
 ) -> Correction:
-    """What stability control asks for by what it measured. to_rear: m from the middle to the rear axle."""
+    """Returns what stability control asks for by what it measured; moves side slip and turn in `m` on.
+
+    to_rear: m from the middle to the rear axle. Nothing is asked for below V_LEAST.
+    """
     u = m[SPEED]
     if u < V_LEAST:
         m[TURN] = m[SIDE] = 0.0
@@ -96,7 +102,10 @@ def limit_drive(
     m: Floats, omega: Floats, radius: float, half_track: float, yaw_rate: float, front: float,
     pedal: bool, h: float,
 ) -> float:  # fmt: skip
-    """Share of the drive that traction control leaves. front: share of the drive at the front axle."""
+    """Returns the share of the drive that traction control leaves h seconds later; keeps it in `m`.
+
+    front: share of the drive at the front axle. 1 without a pedal.
+    """
     spin = 0.0
     for w in range(4):
         if (front if w < 2 else 1.0 - front) > 0.0:

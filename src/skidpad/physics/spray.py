@@ -30,7 +30,10 @@ FILM_MAX = 0.002  # m, deeper counts as this
 
 @kernel
 def spray_density(film: float, speed: float, width: float, height: float) -> float:
-    """Water in kg/m^3 just behind a body of this width and height in m, at a film in m and a speed in m/s."""
+    """Returns the water in kg/m^3 just behind a body of this width and height in m; 0 up to V_FIRST.
+
+    film: m of water on the road, FILM_MAX at most; speed: m/s.
+    """
     share = SHARE_FULL * min(max((speed - V_FIRST) / (V_FULL - V_FIRST), 0.0), 1.0)
     thrown = 2.0 * TRACK * width * WATER * min(max(film, 0.0), FILM_MAX)  # kg per m of road
     return share * thrown / ((width + 2.0 * ASIDE) * min(height, HIGHEST))
@@ -38,5 +41,5 @@ def spray_density(film: float, speed: float, width: float, height: float) -> flo
 
 @kernel
 def spray_extinction(density: float) -> float:
-    """Extinction in 1/m of drops that together weigh so many kg in a m^3: 2 pi/4 D^2 of each."""
+    """Returns the extinction in 1/m of drops of `density` kg/m^3 together: 2 pi/4 D^2 of each."""
     return 3.0 * density / (WATER * DROP)

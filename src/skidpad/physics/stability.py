@@ -56,7 +56,7 @@ class Correction(NamedTuple):
 
 @inner_kernel
 def correction(m: Motion, model: Model) -> Correction:
-    """The yaw acceleration that brakes have to give."""
+    """Returns the yaw acceleration that brakes have to give; none below V_LEAST or within the dead bands."""
     if m.u < V_LEAST:
         return Correction(0.0, False, 1.0)
     wanted = m.u * m.steer / (model.wheelbase + model.understeer * m.u * m.u)

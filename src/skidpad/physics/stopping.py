@@ -38,7 +38,7 @@ class Stop:
 
 
 def mean_deceleration(v: NDArray[np.float64], s: NDArray[np.float64]) -> float:
-    """Mean fully developed deceleration in m/s^2 between 0.8 and 0.1 of the first speed.
+    """Returns the mean fully developed deceleration in m/s^2 between 0.8 and 0.1 of the first speed.
 
     v, s (k,): falling speed in m/s and distance in m. (v_b^2 - v_e^2) / (2 (s_e - s_b)), which is
     UN R13-H annex 3's (v_b^2 - v_e^2) / (25.92 (s_e - s_b)) with speeds in km/h.
@@ -55,7 +55,10 @@ def stops(
     *,
     anti_lock: bool = True,
 ) -> list[Stop]:
-    """Stops of one vehicle type (the ego's by default), each on its own surface from its own speed."""
+    """Returns stops of one vehicle type (the ego's by default), each on its own surface from its own speed.
+
+    params, v0: as many, v0 > 0 in m/s. ConfigError where one takes longer than STOP_TIME_MAX.
+    """
     n = len(params)
     fleet = Fleet([vehicle or vehicle_type(EGO_TYPE)] * n, TICK, anti_lock=anti_lock)
     for i in range(n):
@@ -94,7 +97,7 @@ def grip_rows(
     mu_ref: float = MU_REF,
     tyres: str = REFERENCE,
 ) -> list[GripRow]:
-    """Rows for all weathers and models, weather by weather, from one batch of stops.
+    """Returns rows for all weathers and models, weather by weather, from one batch of stops.
 
     A model that cannot say (ConfigError) leaves its row out.
     """

@@ -84,7 +84,7 @@ class VehicleType(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
     @property
     def x_front_axle(self) -> float:
-        """Front axle ahead of the footprint's centre, m."""
+        """Distance in m of the front axle ahead of the footprint's centre."""
         return 0.5 * self.length - self.front_overhang
 
     @property
@@ -94,7 +94,7 @@ class VehicleType(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
     @property
     def x_cog(self) -> float:
-        """Centre of gravity ahead of the footprint's centre, m."""
+        """Distance in m of the centre of gravity ahead of the footprint's centre."""
         return self.x_rear_axle + self.front_share * self.wheelbase
 
     @property
@@ -112,13 +112,13 @@ class VehicleType(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
     @property
     def a_brake(self) -> float:
-        """m/s^2 at full brake, before the tyres have their say."""
+        """Deceleration in m/s^2 of the brakes at full pedal, if the tyres give it."""
         torque = 2.0 * (self.brake_torque_front + self.brake_torque_rear)
         return torque / (self.wheel_radius * self.mass)
 
     @property
     def a_drive(self) -> float:
-        """m/s^2 at full throttle in the lowest gear."""
+        """Acceleration in m/s^2 at full throttle in the lowest gear."""
         return self.force_max / self.mass
 
     @property
@@ -147,18 +147,18 @@ EGO_TYPE = "mini_cooper_s"
 
 @lru_cache(maxsize=1)
 def vehicle_types() -> dict[str, VehicleType]:
-    """All types by id, sorted, so that lists made from them are reproducible (A-206)."""
+    """Returns all types by id, sorted, so that lists made from them are reproducible (A-206)."""
     text = resources.files("skidpad.physics").joinpath("vehicles.yaml").read_bytes()
     types = msgspec.yaml.decode(text, type=dict[str, VehicleType])
     return dict(sorted(types.items()))
 
 
 def vehicle_type(name: str) -> VehicleType:
-    """The type with this id; ConfigError lists the known ones."""
+    """Returns the type with this id; ConfigError lists the known ones."""
     types = vehicle_types()
     return types[require_choice("vehicle type", name, list(types))]
 
 
 def traffic_types() -> tuple[str, ...]:
-    """Ids of passenger cars for background traffic, sorted (A-206); the ego's type is among them."""
+    """Returns ids of passenger cars for background traffic, sorted (A-206), the ego's type among them."""
     return tuple(k for k, t in vehicle_types().items() if t.actor_kind is ActorKind.CAR)

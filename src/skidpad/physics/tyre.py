@@ -31,7 +31,7 @@ RELAXATION_RADII = 1.72  # PTY1 sin(2 atan(1 / PTY2)) of the 245/40R18: 0.59 m a
 
 @kernel
 def brush_curve(sigma: float) -> float:
-    """Force over mu * Fz against slip over the slip of full sliding, sigma >= 0; at most 1."""
+    """Returns force over mu * Fz against slip over the slip of full sliding, sigma >= 0; at most 1."""
     if sigma < 1.0:
         return sigma * (3.0 + sigma * (sigma - 3.0))
     beyond = (sigma - 1.0) / FALL_OFF_WIDTH
@@ -40,7 +40,7 @@ def brush_curve(sigma: float) -> float:
 
 @kernel
 def brush_secant(sigma: float) -> float:
-    """Force over (initial stiffness * slip) against sigma, sigma >= 0: 1 at first, then falling."""
+    """Returns force over (initial stiffness * slip) against sigma, sigma >= 0: 1 at first, then falling."""
     if sigma < 1.0:
         return 1.0 + sigma * (sigma / 3.0 - 1.0)
     return brush_curve(sigma) / (3.0 * sigma)
@@ -48,13 +48,13 @@ def brush_secant(sigma: float) -> float:
 
 @inner_kernel
 def grip_share(load: float) -> float:
-    """Friction over that at nominal load; load over nominal. Magic Formula: PD1 + PD2 dfz."""
+    """Returns friction over that at nominal load; load over nominal. Magic Formula: PD1 + PD2 dfz."""
     return max(1.0 - LOAD_GRIP * (load - 1.0), GRIP_LEAST)
 
 
 @inner_kernel
 def stiffness_share(load: float) -> float:
-    """Cornering stiffness per load over that at nominal load; load over nominal.
+    """Returns cornering stiffness per load over that at nominal load; load over nominal.
 
     Magic Formula: stiffness PKY1 Fz0 sin(2 atan(load / PKY2)), as sin(2 atan x) = 2 x / (1 + x^2).
     """

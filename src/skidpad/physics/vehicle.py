@@ -43,7 +43,7 @@ V_CURVE_1, V_CURVE_2, V_CURVE_3 = 20.0 / 3.6, 60.0 / 3.6, 120.0 / 3.6
 
 @kernel
 def steer_share(speed: float) -> float:
-    """Share of the largest road-wheel angle that full steer gives at this speed."""
+    """Returns the share of the largest road-wheel angle that full steer gives at this speed in m/s."""
     if speed < V_CURVE_1:
         return 1.0 - 0.1 * speed / V_CURVE_1
     if speed < V_CURVE_2:
@@ -171,7 +171,10 @@ def _car(i: int, p: VehicleParams, command: Floats, grade: float, bank: float) -
 
 @inner_kernel
 def _wheel_loads(car: Car, a_x: float, a_y: float, load: Floats) -> None:
-    """Quasi-static loads into `load` (4,); an axle or a wheel never pulls on the road."""
+    """Writes quasi-static loads in N into `load` (4,); no axle or wheel ever pulls on the road.
+
+    a_x, a_y: m/s^2 behind the load transfer.
+    """
     wheelbase = car.a + car.b
     front = (car.weight * car.b - car.mass * a_x * car.cog_height) / wheelbase
     front = min(max(front, 0.0), car.weight)
@@ -189,7 +192,10 @@ def _wheel_loads(car: Car, a_x: float, a_y: float, load: Floats) -> None:
 
 @inner_kernel
 def _share_loads(car: Car, front: float, moment: float, a_y: float, load: Floats) -> None:
-    """Loads where an axle whose inner wheel lifts leaves the rest of the moment (N) to the other one."""
+    """Writes the loads of a vehicle that can tip: what a lifted wheel does not take goes to the other axle.
+
+    front: N on the front axle; moment: N to move from the left to the right wheels.
+    """
     arm = left_arm(car.half_track, car.cog_height, car.lean, a_y)
     shift = 0.5 * car.weight * (1.0 - arm / car.half_track)
     moment = min(
@@ -205,7 +211,10 @@ def _share_loads(car: Car, front: float, moment: float, a_y: float, load: Floats
 
 @inner_kernel
 def _slide(car: Car, u: float, v: float, r: float, feel: Floats, h: float) -> Push:
-    """What the road does to a body that lies on its side, at the places of its axles."""
+    """Returns what the road does to a body that lies on its side, at the places of its axles.
+
+    u, v: m/s forward and left; r: rad/s; feel: friction of the wheels, of which SLIDING at most counts.
+    """
     force_x, force_y, moment = 0.0, 0.0, 0.0
     for axle in range(2):
         arm = car.a if axle == 0 else -car.b
@@ -223,7 +232,10 @@ def _slide(car: Car, u: float, v: float, r: float, feel: Floats, h: float) -> Pu
 
 @inner_kernel
 def _drive(car: Car, u: float, speed: float, omega: Floats) -> float:
-    """Force of the engine at all driven wheels in N, negative in reverse; none beyond its top speed."""
+    """Returns the force of the engine at all driven wheels in N, negative in reverse.
+
+    0 beyond its top speed, and in reverse while rolling forward at V_REVERSE_MAX or faster.
+    """
     spin = car.drive_front * (omega[0] + omega[1]) + (1.0 - car.drive_front) * (omega[2] + omega[3])
     v = max(speed, 0.5 * abs(spin) * car.front.radius, V_POWER_MIN)
     if v > car.speed_max or (car.reverse and u >= V_REVERSE_MAX):
@@ -236,7 +248,10 @@ def _drive(car: Car, u: float, speed: float, omega: Floats) -> float:
 def _stability_correction(
     car: Car, u: float, v: float, r: float, steer: float, mu: Floats
 ) -> Correction:
-    """What stability control asks for."""
+    """Returns what stability control asks for, told the friction `mu` (4,); nothing without such control.
+
+    u, v: m/s forward and left of the centre of gravity; r: rad/s.
+    """
     if not car.stability:
         return Correction(0.0, False, 1.0)
     mean = 0.25 * (mu[0] + mu[1] + mu[2] + mu[3])
@@ -248,7 +263,10 @@ def _stability_correction(
 def _sense(
     car: Car, memory: Floats, omega: Floats, r: float, a_load: Floats, steer: float, h: float
 ) -> Correction:
-    """What stability and traction control ask for by what they measure."""
+    """Returns what stability and traction control ask for from what the car measures; updates `memory`.
+
+    They know wheel speeds omega, yaw rate r, specific force a_load behind its lag, and steer, by h s.
+    """
     radius, half, pedal = car.front.radius, car.half_track, car.throttle > 0.0
     note_motion(memory, omega, radius, half, r, a_load[0], a_load[1], car.brake > 0.0, h)
     asked = sensed_correction(memory, car.model, car.b, r, a_load[1], steer, h)
@@ -262,8 +280,9 @@ def _push(
     steer: float, omega: Floats, slip_y: Floats, slide: Floats, load: Floats, feel: Floats,
     pressure: Floats, h: float,
 ) -> Push:  # fmt: skip
-    """All four wheels through h seconds; omega, slip_y and slide (4,) are written.
+    """Returns what all four wheels do to the body through h seconds; writes omega, slip_y and slide (4,).
 
+    u, v: m/s forward and left; r: rad/s; drive: N of the engine at all wheels.
     pressure: share of the brake torque that anti-lock brakes leave to each wheel, first four entries.
     """
     cd, sd = cos(steer), sin(steer)
@@ -325,8 +344,9 @@ def _advance(
     i: int, states: ActorStates, wheels: WheelStates, car: Car, feel: Floats, g_x: float,
     g_y: float, turn_max: float, wind_x: float, wind_y: float, h: float, steps: int,
 ) -> None:  # fmt: skip
-    """A vehicle through `steps` substeps of h seconds. feel (12,); g_x, g_y: m/s^2 of a slope.
+    """Moves vehicle i on through `steps` substeps of h seconds, in `states` and `wheels`.
 
+    feel (12,): as in `params`; g_x, g_y: m/s^2 of a slope; turn_max: rad of the road wheels per substep.
     wind_x, wind_y: m/s of the air in the world.
     """
     windy, memory = wind_x != 0.0 or wind_y != 0.0, wheels.memory[i]
@@ -386,7 +406,7 @@ def _advance(
 
 @inner_kernel
 def _body(i: int, states: ActorStates, x_cog: float) -> Body:
-    """Motion of vehicle i at its centre of gravity."""
+    """Returns the motion of vehicle i at its centre of gravity."""
     yaw, r = states.yaw[i], states.yaw_rate[i]
     c, s = cos(yaw), sin(yaw)
     return Body(
@@ -402,7 +422,7 @@ def _body(i: int, states: ActorStates, x_cog: float) -> Body:
 
 @inner_kernel
 def _keep(i: int, states: ActorStates, body: Body, x_cog: float, dt: float) -> None:
-    """Motion of vehicle i at its reference point, dt seconds after what is stored."""
+    """Writes the motion of vehicle i at its reference point, dt seconds after what is stored."""
     c, s = cos(body.yaw), sin(body.yaw)
     states.yaw[i] = pi - (pi - body.yaw) % (2.0 * pi)
     states.x[i] = body.x - x_cog * c
@@ -417,7 +437,10 @@ def _keep(i: int, states: ActorStates, body: Body, x_cog: float, dt: float) -> N
 
 @inner_kernel
 def _lean(lean: float, memory: Floats) -> float:
-    """Roll of a body that may tip: on its springs, or about its outer wheels; on its side it is at rest."""
+    """Returns the roll in rad of a body that may tip: on its springs, or about its outer wheels.
+
+    lean: rad on its springs, left out once it lies on its side.
+    """
     return float(memory[TILT]) + (0.0 if memory[OVER] > 0.0 else lean)
 
 
@@ -436,7 +459,7 @@ def step_vehicles(
     h: float,
     steps: int,
 ) -> None:
-    """All active vehicles through one tick of `steps` substeps of h seconds, in place.
+    """Moves all active vehicles on through one tick of `steps` substeps of h seconds, in place.
 
     commands (n, 5): throttle, brake, steer (left positive), handbrake, reverse. feel (n, 12): `params`.
     grade (n,): slope along the heading, rad, uphill positive. bank (n,): roll of the

@@ -75,7 +75,7 @@ class Turned(NamedTuple):
 
 @inner_kernel
 def turn(c: Contact, tyre: Tyre, q: Torques, h: float) -> Turned:
-    """The wheel h seconds later, and the force on it meanwhile."""
+    """Returns the wheel h seconds later, and the force on it meanwhile."""
     share = c.load / tyre.nominal
     mu = max(c.mu * grip_share(share), MU_MIN)
     grip = mu * c.load
@@ -123,7 +123,7 @@ def turn(c: Contact, tyre: Tyre, q: Torques, h: float) -> Turned:
 
 @inner_kernel
 def _traction(grip: float, f_y: float, spinning: bool) -> float:
-    """Most drive force beside the side force that idealised traction control lets through, N."""
+    """Returns the most drive force in N that ideal traction control lets through beside a side force f_y."""
     share = TRACTION_UTILISATION * (TRACTION_RELEASE if spinning else 1.0)
     return sqrt(max(share * share * grip * grip - f_y * f_y, 0.0))
 
@@ -133,7 +133,10 @@ def _spin(
     omega: float, drive: float, resist: float, k: float, v_x: float, radius: float, inertia: float,
     h: float,
 ) -> float:  # fmt: skip
-    """Wheel spin after h seconds: implicit in the tyre (k in N per m/s), Coulomb in `resist`."""
+    """Returns the spin in rad/s after h seconds: implicit in the tyre (k in N per m/s), Coulomb in `resist`.
+
+    drive, resist: N m. 0 where `resist` brings it to a stop within the step.
+    """
     denominator = inertia + h * radius * radius * k
     free = (inertia * omega + h * (drive + radius * k * v_x)) / denominator
     loss = h * resist / denominator

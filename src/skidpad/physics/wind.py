@@ -34,7 +34,10 @@ HURRICANE = 32.7  # m/s, least wind of Beaufort 12 (tcdata.typhoon.org.cn, exten
 
 
 def side_coefficients(types: Sequence[VehicleType]) -> Floats:
-    """Returns (n, 2): side force in N and yaw moment in N m over products of speeds in m/s."""
+    """Returns (n, 2): k of the side force F = -k V v in N, n of the yaw moment M = -n u v in N m.
+
+    Speeds against the air in m/s, as in the module's docstring.
+    """
     area = np.array([SIDE_FILL * t.length * t.height for t in types], dtype=np.float64)
     wheelbase = np.array([t.wheelbase for t in types], dtype=np.float64)
     per_area = 0.5 * AIR_DENSITY * FRONTAL / COMPACT_SIDE
@@ -60,7 +63,10 @@ class Gusts:
         self.wind = wind
 
     def advance(self, dt: float) -> tuple[float, float]:
-        """Returns the velocity of the air in m/s in world axes, dt seconds later."""
+        """Moves the gusts on by dt seconds and returns the velocity of the air in m/s in world axes.
+
+        Random numbers are drawn only where gusts and mean wind are above 0.
+        """
         wind = self.wind
         if wind.gusts > 0.0 and wind.speed > 0.0:
             keep = exp(-dt * wind.speed / GUST_LENGTH)

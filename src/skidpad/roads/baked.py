@@ -45,7 +45,10 @@ class BakedMap:
     ego_start: LanePosition | None = None
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """All content as named arrays, in a fixed order."""
+        """Returns all content as named arrays, in a fixed order: what is hashed and saved.
+
+        Names are "samples.x" and alike. Shape and variant of boxes are left out.
+        """
         out: dict[str, Any] = {}
         for prefix, table in (
             ("samples", self.samples),
@@ -57,7 +60,10 @@ class BakedMap:
         return out | _roadside_arrays(self.roadside)
 
     def content_hash(self) -> str:
-        """SHA-256 over names, types, shapes and values of all arrays (decisions X-1, L-6)."""
+        """Returns the SHA-256 in hex over names, types, shapes and values of all arrays (X-1, L-6).
+
+        Name, projection and ego's start are not part of it; -0.0 is 0.0 and every NaN the same.
+        """
         digest = hashlib.sha256()
         for name, values in self.arrays().items():
             kind = values.dtype.newbyteorder("<")
@@ -69,7 +75,7 @@ class BakedMap:
         return digest.hexdigest()
 
     def save(self, path: Path) -> None:
-        """Writes the map as compressed npz."""
+        """Writes the map as compressed npz to exactly this path."""
         start = self.ego_start
         about = {
             "format": FORMAT,
@@ -84,7 +90,7 @@ class BakedMap:
 
 
 def load_baked(path: Path) -> BakedMap:
-    """Read what `BakedMap.save` wrote; FileError for anything else."""
+    """Returns what `BakedMap.save` wrote; FileError for anything else, another FORMAT included."""
     where = f"baked map {path}"
     arrays = read_arrays(read_bytes(path, "baked map", SIZE_MAX), where, BAKED)
     try:
@@ -145,7 +151,10 @@ def _roadside_arrays(roadside: Roadside) -> dict[str, NDArray[Any]]:
 
 
 def _split_arrays(arrays: dict[str, NDArray[Any]], name: str) -> list[NDArray[np.float64]]:
-    """Returns the point arrays (n, 3) that `name.points` holds one after the other, split by `name.sizes`."""
+    """Returns the point arrays (n, 3) that `name.points` holds one after the other, split by `name.sizes`.
+
+    [] for none. ValueError where sizes are no numbers of points or do not add up.
+    """
     points, sizes = _rows(arrays, f"{name}.points", 3), arrays[f"{name}.sizes"]
     if sizes.dtype.kind not in "iu" or sizes.ndim != 1 or (sizes < 0).any():
         raise ValueError(f"{name}.sizes must hold numbers of points")
@@ -155,7 +164,7 @@ def _split_arrays(arrays: dict[str, NDArray[Any]], name: str) -> list[NDArray[np
 
 
 def _rows(arrays: dict[str, NDArray[Any]], name: str, width: int) -> NDArray[np.float64]:
-    """Returns a table (n, width) as float64; raises ValueError for another shape or numbers out of range."""
+    """Returns a table (n, width) as float64; ValueError for another shape or numbers beyond EXTENT."""
     table = arrays[name]
     if table.dtype.kind not in "iuf" or table.ndim != 2 or table.shape[1] != width:
         raise ValueError(f"{name} must hold rows of {width} numbers")
@@ -184,7 +193,7 @@ def _roadside(arrays: dict[str, NDArray[Any]]) -> Roadside:
 
 
 def _box(label: float, x: float, y: float, z: float, yaw: float, *rest: float) -> Box:
-    """Returns the box of a row of 12 numbers, positions and sizes in m and yaw in rad."""
+    """Returns the box of a row of 12 numbers: label, x, y, z (m), yaw (rad), sizes (m), solid, r, g, b."""
     length, width, height, solid, r, g, b = rest
     rgb = (int(r), int(g), int(b))
     return Box(int(label), x, y, z, yaw, length, width, height, bool(solid), rgb)

@@ -25,14 +25,17 @@ __all__ = [
 
 
 def kept_map(folder: Path, name: str, content_hash: str) -> RoadMap:
-    """The map of a drive: the file that the campaign's folder keeps of it, else a bundled one."""
+    """Returns the map of a drive: a file of this name that the campaign's folder keeps, else a bundled one.
+
+    Of several kept files the one with this content hash; where none has it, the first, another content.
+    """
     kept = [load_map(file) for file in sorted((folder / KEPT).glob(f"*/{escape(name)}.*"))]
     same = [map for map in kept if map.content_hash == content_hash]
     return (same or kept or [load_map(name)])[0]
 
 
 def bake_file(path: Path) -> BakedMap:
-    """The baked map of an OpenDRIVE file; the name is the file's."""
+    """Returns the baked map of an OpenDRIVE file; the name is the file's. FileError for a faulty one."""
     from skidpad.roads.opendrive.bake import bake  # lxml and scipy are needed for baking only
     from skidpad.roads.opendrive.document import SIZE_MAX
 
@@ -40,7 +43,11 @@ def bake_file(path: Path) -> BakedMap:
 
 
 def load_map(map: str | Path) -> RoadMap:
-    """A bundled map by name, or any OpenDRIVE or baked file. The same file gives the same object."""
+    """Returns a bundled map by name, or any OpenDRIVE or baked file; the same file gives the same object.
+
+    A file that has changed is read again. FileError for a file that is missing or faulty, ConfigError for
+    an unknown name.
+    """
     path = map_file(map)
     return _load(path, path.stat().st_mtime_ns)
 

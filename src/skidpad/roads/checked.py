@@ -18,9 +18,10 @@ MAYBE_NAN = ("limit", "value")
 
 
 def check_arrays(samples: LaneSamples, lanes: LaneTable, signals: SignalTable, where: str) -> None:
-    """FileError unless every index points into its table and every number is one.
+    """Raises FileError, beginning with `where`, unless every index points into its table and numbers are.
 
-    Kernels read arrays without looking at bounds, so this is what keeps a file from doing harm.
+    Kernels read arrays without looking at bounds, so this is what keeps a file from doing harm. Numbers are
+    at most EXTENT; NaN is allowed in MAYBE_NAN only.
     """
     try:
         n, m, k = len(samples.x), len(lanes.road), len(signals.id)
@@ -68,7 +69,7 @@ def _columns(table: Any, n: int, name: str) -> None:
 
 
 def kinds(table: type[NamedTuple]) -> dict[str, np.dtype[Any]]:
-    """The types of a table's columns, as it declares them."""
+    """Returns the numpy types of a table's columns by name, as the table declares them."""
     return {name: np.dtype(element_type(hint)) for name, hint in get_type_hints(table).items()}
 
 

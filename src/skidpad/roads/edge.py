@@ -59,7 +59,10 @@ class RoadEdge:
         self._radius = float(np.hypot(self._long, self._wide).max(initial=0.0)) + REACH
 
     def beyond(self, x: Numbers, y: Numbers, z: Numbers) -> Floats:
-        """(n,) m from each place to the nearest road at its height; 0 on it, inf beyond 8 m."""
+        """Returns (n,) m from each place to the nearest road less than LEVEL m above or below.
+
+        0 on it; inf beyond REACH m and for places that are no numbers.
+        """
         places = np.column_stack([x, y]).astype(np.float64)
         places[~np.isfinite(places).all(axis=1)] = NOWHERE
         out = np.full(len(places), inf)
@@ -84,7 +87,7 @@ class RoadEdge:
     def _lower(
         self, out: Floats, rows: NDArray[Any], pieces: NDArray[Any], places: Floats, z: Numbers
     ) -> None:
-        """Take the distance of each place in `rows` to its piece where that is less."""
+        """Lowers `out` at each of `rows` to the distance from its place to its piece, where that is less."""
         x, y, height = self._middle[pieces].T
         dx, dy = places[rows, 0] - x, places[rows, 1] - y
         c, s = self._cos[pieces], self._sin[pieces]
@@ -96,7 +99,10 @@ class RoadEdge:
     def off(
         self, x: Numbers, y: Numbers, z: Numbers, yaw: Numbers, length: float, width: float
     ) -> Flags:
-        """(n,) whether a car of this size at these places has all four wheels off the road."""
+        """Returns (n,) whether a car of this size at these places has its middle and all wheels off the road.
+
+        x, y, z, yaw (n,): m and rad; length, width: m of the one car.
+        """
         off = self.beyond(x, y, z) > 0.0
         rows = np.flatnonzero(off)
         c, s = np.cos(yaw[rows]), np.sin(yaw[rows])

@@ -15,7 +15,10 @@ Sample = tuple[float, float, float, float, float, float, float, float, float]
 
 @kernel
 def project(map: Held[LaneArrays], x: float, y: float, z: float, driving: bool) -> Point:
-    """Returns the point on the map nearest to (x, y, z) in m; see `kernels.project_point`."""
+    """Returns the point on the map nearest to (x, y, z) in m; see `kernels.project_point`.
+
+    driving: only driving lanes and ramps.
+    """
     return kernels.project_point(map.value, x, y, z, driving)
 
 

@@ -62,10 +62,10 @@ def wrapped(angle: float) -> float:
 def closest_on_segment(
     a: LaneArrays, i: int, x: float, y: float
 ) -> tuple[float, float, float, float]:
-    """Closest point of the curve between samples i and i + 1.
+    """Returns the closest point of the curve between samples i and i + 1, by Newton steps from the chord.
 
-    Returns (share in [0, 1], left offset, squared plane distance, distance by which the point lies
-    before or beyond the ends); Newton steps from the chord.
+    As (share in [0, 1], left offset, squared plane distance, distance by which the point lies before
+    (negative) or beyond the ends).
     """
     p, q = a.sample[i], a.sample[i + 1]
     cx, cy = q[X] - p[X], q[Y] - p[Y]
@@ -91,7 +91,7 @@ def closest_on_segment(
 
 @inner_kernel
 def hermite(a: LaneArrays, i: int, u: float) -> tuple[float, float, float, float]:
-    """Position and its derivative by u on the cubic through samples i and i + 1."""
+    """Returns x, y and their derivatives by u at u in [0, 1] on the cubic through samples i and i + 1."""
     p, q = a.sample[i], a.sample[i + 1]
     ds = q[S] - p[S]
     w = 1.0 - u
@@ -114,7 +114,7 @@ def project_kernel(
     z: float,
     driving: bool = True,
 ) -> tuple[int, float, float]:
-    """Nearest lane centre to a point: (lane, s, left offset); lane -1 beyond 20 m.
+    """Returns the nearest lane centre to a point: (lane, s, left offset); (-1, nan, nan) beyond REACH.
 
     Nearest in space with heights counted double (decision M-12). driving: only driving lanes and
     ramps.
@@ -184,7 +184,7 @@ def project_kernel(
 
 @inner_kernel
 def segment_kernel(a: LaneArrays, lane: int, s: float) -> tuple[int, float]:
-    """(sample, share): s lies between that sample of the lane and the next; s is clamped."""
+    """Returns (sample, share): s lies between that sample of the lane and the next; s is clamped."""
     first = a.first[lane]
     low, high = first, first + a.size[lane] - 1
     guess = first + int(max(s, 0.0) / a.length[lane] * (a.size[lane] - 1))
@@ -205,9 +205,9 @@ def segment_kernel(a: LaneArrays, lane: int, s: float) -> tuple[int, float]:
 def sample_kernel(
     a: LaneArrays, lane: int, s: float
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
-    """(x, y, z, heading, curvature, width, grade, bank, limit) of the lane centre at s.
+    """Returns (x, y, z, heading, curvature, width, grade, bank, limit) of the lane centre at s.
 
-    heading is wrapped; limit is NaN where the map gives none.
+    heading is wrapped; limit is NaN where the map gives none. s is clamped to the lane.
     """
     i, u = segment_kernel(a, lane, s)
     x, y, _, _ = hermite(a, i, u)
@@ -230,7 +230,10 @@ def sample_kernel(
 def project_point(
     a: LaneArrays, x: float, y: float, z: float, driving: bool
 ) -> tuple[int, float, float, float, float, float, float, float, float]:
-    """`project_kernel` and what the facade tells about the place: one call from Python."""
+    """Returns (lane, s, offset, x, y, z, heading, curvature, width) of the lane centre nearest to a point.
+
+    Lane -1 and NaN where `project_kernel` finds none.
+    """
     lane, s, offset = project_kernel(a, x, y, z, driving)
     if lane < 0:
         return -1, nan, nan, nan, nan, nan, nan, nan, nan
@@ -242,7 +245,10 @@ def project_point(
 def advance_point(
     a: LaneArrays, lane: int, s: float, distance: float, heading: float
 ) -> tuple[int, float, float, float, float, float, float, float, float]:
-    """Returns the point `distance` in m further along the lanes, offset 0; lane -1 and NaN at a dead end."""
+    """Returns the point `distance` m further along the lanes, offset 0; lane -1 and NaN at a dead end.
+
+    Columns as of `project_point`; forks as in `advance_kernel`.
+    """
     lane, s = advance_kernel(a, lane, s, distance, heading)
     if lane < 0:
         return -1, nan, nan, nan, nan, nan, nan, nan, nan
@@ -252,7 +258,7 @@ def advance_point(
 
 @kernel
 def s_road_kernel(a: LaneArrays, lane: int, s: float) -> float:
-    """OpenDRIVE s of a place on a lane."""
+    """Returns the OpenDRIVE s in m of a place s m along a lane."""
     i, u = segment_kernel(a, lane, s)
     p, q = a.sample[i], a.sample[i + 1]
     return float((1.0 - u) * p[S_ROAD] + u * q[S_ROAD])
@@ -260,7 +266,7 @@ def s_road_kernel(a: LaneArrays, lane: int, s: float) -> float:
 
 @kernel
 def lane_s_kernel(a: LaneArrays, lane: int, s_road: float) -> float:
-    """m along the lane of a place given by OpenDRIVE s, clamped to the lane."""
+    """Returns the m along the lane of a place given by OpenDRIVE s, clamped to the lane."""
     low = a.first[lane]
     high = low + a.size[lane] - 1
     rising = a.sample[high, S_ROAD] > a.sample[low, S_ROAD]
@@ -277,7 +283,10 @@ def lane_s_kernel(a: LaneArrays, lane: int, s_road: float) -> float:
 
 @inner_kernel
 def turn_of(a: LaneArrays, lane: int, heading: float, distance: float) -> float:
-    """Absolute angle between `heading` and the direction to the place `distance` m into the lane."""
+    """Returns the angle in rad between `heading` and a lane's direction `distance` m into it, inf: its end.
+
+    A thousandth of the turn to that place is added, so that lanes of one end direction differ.
+    """
     s = min(distance, a.length[lane])
     x0, y0 = a.sample[a.first[lane], X], a.sample[a.first[lane], Y]
     x, y, _, h, _, _, _, _, _ = sample_kernel(a, lane, s)
@@ -286,7 +295,10 @@ def turn_of(a: LaneArrays, lane: int, heading: float, distance: float) -> float:
 
 @inner_kernel
 def straightest_next(a: LaneArrays, lane: int, heading: float) -> int:
-    """The drivable successor whose end points closest to `heading` (A-148), or -1."""
+    """Returns the drivable successor whose end points closest to `heading` (A-148), or -1.
+
+    After a lane that is not drivable, any successor.
+    """
     best, chosen = inf, -1
     for k in range(a.next_start[lane], a.next_start[lane + 1]):
         candidate = a.next_lane[k]
@@ -300,7 +312,10 @@ def straightest_next(a: LaneArrays, lane: int, heading: float) -> int:
 
 @inner_kernel
 def straightest_previous(a: LaneArrays, lane: int, heading: float) -> int:
-    """The drivable predecessor whose start points closest to `heading`, or -1."""
+    """Returns the drivable predecessor whose start points closest to `heading`, or -1.
+
+    Before a lane that is not drivable, any predecessor.
+    """
     best, chosen = inf, -1
     for k in range(a.prev_start[lane], a.prev_start[lane + 1]):
         candidate = a.prev_lane[k]
@@ -316,7 +331,7 @@ def straightest_previous(a: LaneArrays, lane: int, heading: float) -> int:
 def advance_kernel(
     a: LaneArrays, lane: int, s: float, distance: float, heading: float = nan
 ) -> tuple[int, float]:
-    """(lane, s) `distance` m further, at forks along the straightest successor; -1 at a dead end.
+    """Returns (lane, s) `distance` m further, at forks along the straightest successor; -1, NaN at dead ends.
 
     heading: what "straight" is measured against at every fork; NaN: the lane's own at its end.
     A negative distance goes back along straightest predecessors.
@@ -345,7 +360,7 @@ def advance_kernel(
 
 @kernel
 def neighbour_s(a: LaneArrays, lane: int, other: int, s: float) -> float:
-    """m along a neighbouring lane of the same section abreast of s on `lane`."""
+    """Returns the m along a neighbouring lane of the same section abreast of s on `lane`."""
     return lane_s_kernel(a, other, s_road_kernel(a, lane, s))
 
 
@@ -353,10 +368,10 @@ def neighbour_s(a: LaneArrays, lane: int, other: int, s: float) -> float:
 def signal_ahead(
     a: LaneArrays, lane: int, s: float, distance: float, kind: int, heading: float = nan
 ) -> tuple[int, float]:
-    """First signal of `kind` on the straightest path from s on: (row of SignalTable, m to it).
+    """Returns the first signal of `kind` on the straightest path from s on: (row of SignalTable, m to it).
 
-    Row -1 when there is none within `distance`. The distance runs along the lanes to the stop line
-    (A-158, A-163); no junction is needed (decision M-5).
+    (-1, inf) when there is none within `distance`. The distance runs along the lanes to the stop line
+    (A-158, A-163); no junction is needed (decision M-5). heading: as in `advance_kernel`.
     """
     walked = -s
     for _ in range(RETRY + int(distance)):
@@ -378,6 +393,6 @@ def signal_ahead(
 
 @inner_kernel
 def distance_kernel(a: LaneArrays, lane: int, s: float, x: float, y: float) -> float:
-    """Plane distance from a point to a place on a lane."""
+    """Returns the plane distance in m from a point to a place on a lane."""
     px, py, _, _, _, _, _, _, _ = sample_kernel(a, lane, s)
     return sqrt((x - px) ** 2 + (y - py) ** 2)

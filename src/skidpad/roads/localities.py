@@ -22,7 +22,11 @@ class Localities:
         self._junction = lanes.junction[self._lane]
 
     def find(self, x: float, y: float) -> Locality | None:
-        """Returns the place of the nearest driving lane; None when none is within 20 m."""
+        """Returns the place of the nearest driving lane; None when none is within NEAR m.
+
+        Lanes count from 1 at the right. Outside of junctions, `junction` and `distance` are those of the
+        nearest.
+        """
         away = np.hypot(self._x - x, self._y - y)
         if not away.size or away.min() > NEAR:
             return None
@@ -44,7 +48,10 @@ class Localities:
         )
 
     def _nearest_junction(self, away: np.ndarray) -> tuple[int | None, float | None]:
-        """Returns id and distance in m of the nearest junction; (None, None) on a map without one."""
+        """Returns id and distance in m of the nearest junction; (None, None) on a map without one.
+
+        away (k,): m to each drivable sample.
+        """
         inside = np.flatnonzero(self._junction >= 0)
         if not inside.size:
             return None, None

@@ -54,12 +54,16 @@ MAPS = Registry("map", "skidpad.maps", MapSource, _own_maps)
 
 
 def bundled_maps() -> list[str]:
-    """Names of the maps that come with Skidpad."""
+    """Returns the names of the maps that come with Skidpad, sorted."""
     return sorted(p.stem for p in FOLDER.glob("*.xodr"))
 
 
 def map_file(map: str | Path) -> Path:
-    """The OpenDRIVE file of a map's name, of "name:setting" for a map that is made, or of a path."""
+    """Returns the file of a map: a bundled one by name, a made one by "name:setting", or any by path.
+
+    A map that a package makes is written to the cache first. FileError for a missing file, ConfigError for
+    an unknown name, a wrong setting or a map that cannot be made.
+    """
     name = str(map)
     if name in bundled_maps():
         return FOLDER / f"{name}.xodr"
@@ -74,13 +78,16 @@ def map_file(map: str | Path) -> Path:
 
 
 def is_made_map(map: str) -> bool:
-    """Tells whether a package makes the map of this name, "name" or "name:setting"."""
+    """Returns whether an installed package makes the map of this name, "name" or "name:setting"."""
     source = MAPS.sources().get(map.partition(":")[0])
     return source is not None and source.package != "skidpad"
 
 
 def _write_made_map(map: str) -> Path:
-    """Writes the map that a package makes to the cache; the file's place tells its content."""
+    """Writes the map that a package makes to the cache, under its content's hash, and returns the file.
+
+    ConfigError for a setting too many or missing, and where the package's code fails.
+    """
     from skidpad.core.jit import user_cache  # numba comes with it
 
     name, _, setting = map.partition(":")
@@ -105,17 +112,20 @@ def _write_made_map(map: str) -> Path:
 
 
 def map_name(map: str) -> str:
-    """The name of a bundled map, or of a file without folders and ending."""
+    """Returns the name of a bundled map, or of a file without folders and ending; nothing is looked up."""
     return map if map in bundled_maps() else Path(map).stem
 
 
 def kept_name(file: Path) -> str:
-    """Where a campaign's folder keeps a file: by its content, under its own name."""
+    """Returns the path below a campaign's folder at which it keeps a file: by its content, under its name."""
     return f"{KEPT}/{sha256(file.read_bytes()).hexdigest()[:16]}/{file.name}"
 
 
 def require_map(map: str) -> None:
-    """Raise ConfigError for a name that no map has; what names a file may be moved yet."""
+    """Raises ConfigError for a name that no map has.
+
+    A path passes unread, as its file may be moved yet; a map that a package makes is made.
+    """
     path = Path(map)
     if is_made_map(map) or (not path.suffix and len(path.parts) < 2):
         map_file(map)

@@ -14,7 +14,7 @@ CELLS_MAX = 8_000_000  # a map that is larger gets larger cells
 
 
 def lane_arrays(baked: BakedMap) -> LaneArrays:
-    """Pack a baked map for kernels and build its search grid."""
+    """Returns a baked map packed for kernels, with its search grid; headings are made continuous."""
     p, t = baked.samples, baked.lanes
     turns = np.diff(p.heading, prepend=p.heading[:1])
     jumps = -2.0 * np.pi * np.round(turns / (2.0 * np.pi))

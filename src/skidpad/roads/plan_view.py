@@ -23,7 +23,10 @@ SIGNALS = {SignalKind.LIGHT: "#d62728", SignalKind.STOP: "#9467bd", SignalKind.Y
 
 
 def draw(map: RoadMap, path: Path, kind: str) -> None:
-    """Write a picture of lanes, roadside objects, signals and the ego's start in a format."""
+    """Writes a picture of lanes, roadside objects, signals and the ego's start to a file.
+
+    kind: format, as matplotlib names it: "png", "svg".
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(14, 10), layout="constrained")

@@ -17,7 +17,7 @@ KEPT = (
 
 
 def map_place(projection: str, latitude: float, longitude: float) -> tuple[float, float]:
-    """(x, y) in m on a map of a place in deg.
+    """Returns (x, y) in m on a map of a place in deg.
 
     projection: the PROJ text of the map's header (ASAM OpenDRIVE 1.8, "Geo referencing"). Without one,
     on the plane that touches the earth at 0, 0. ConfigError when PROJ knows no such projection or the

@@ -45,7 +45,7 @@ class LanePoint:
 
     @property
     def pose(self) -> Pose:
-        """Pose on the centre line along the driving direction (flat)."""
+        """Pose on the centre line along the driving direction, without roll and pitch."""
         return Pose(self.x, self.y, self.z, yaw=self.heading)
 
 
@@ -93,11 +93,11 @@ class RoadMap:
 
     @cached_property
     def held(self) -> Held[kernels.LaneArrays]:
-        """`arrays` for entry kernels, made at first use: a command that only names a map needs no kernel."""
+        """The `arrays` for entry kernels, made at first use: a command that only names a map needs none."""
         return hold(self._arrays)
 
     def read_only(self) -> RoadMap:
-        """The same map for others to read: writing into its arrays raises.
+        """Returns the same map for others to read: writing into its arrays raises.
 
         Kernels go on with the arrays behind it, so that they see one type of array.
         """
@@ -114,15 +114,21 @@ class RoadMap:
 
     @cached_property
     def edge(self) -> RoadEdge:
-        """The edge of the paved road beside each lane."""
+        """The edge of the map's roads, made at first use."""
         return RoadEdge(self.samples, self.lanes)
 
     def project(self, x: float, y: float, z: float, driving: bool = True) -> LanePoint | None:
-        """Nearest (driving) lane centre at about this height; None beyond 20 m."""
+        """Returns the nearest lane centre at about this height; None beyond 20 m or for no numbers.
+
+        driving: only driving lanes and ramps.
+        """
         return self._make_point(*entries.project(self.held, float(x), float(y), float(z), driving))
 
     def _make_point(self, lane: int, s: float, offset: float, *place: float) -> LanePoint | None:
-        """Returns the point of a kernel's answer; place: x, y, z, heading, curvature, lane's width."""
+        """Returns the point of a kernel's answer, None for lane -1.
+
+        place: x, y, z, heading, curvature, lane's width.
+        """
         if lane < 0:
             return None
         x, y, z, heading, curvature, width = place
@@ -130,7 +136,11 @@ class RoadMap:
         return LanePoint(lane, s, x, y, z, heading, curvature, width, road, lane_id, offset)
 
     def at(self, lane: int, s: float, offset: float = 0.0) -> LanePoint:
-        """The place `s` m along a lane, given by its index."""
+        """Returns the place `s` m along a lane, given by its index.
+
+        Beyond its ends the coordinates of the end.
+        offset: only noted in the point, which stays on the centre line.
+        """
         x, y, z, heading, curvature, width, _, _, _ = entries.sample(self.held, int(lane), float(s))
         road, lane_id = self._names[lane]
         return LanePoint(
@@ -140,7 +150,7 @@ class RoadMap:
     def ahead(
         self, point: LanePoint, distance: float, heading: float | None = None
     ) -> LanePoint | None:
-        """The place `distance` m further along the lane; at forks the straightest path (A-148).
+        """Returns the place `distance` m further along the lane; at forks the straightest path (A-148).
 
         heading: what "straight" is measured against; None: the lane's own. None where the road ends.
         """
@@ -154,7 +164,7 @@ class RoadMap:
     ) -> NDArray[np.float64]:
         """Returns (n, 4) x, y, z, curvature of the places that `ahead` gives at each step, in one call.
 
-        n is less than `steps` where the road ends.
+        step: m; n is less than `steps` where the road ends.
         """
         out = np.empty((steps, 4))
         measured = nan if heading is None else heading
@@ -162,7 +172,7 @@ class RoadMap:
         return out[:n]
 
     def behind(self, point: LanePoint, distance: float) -> LanePoint | None:
-        """The place `distance` m back along the straightest predecessor."""
+        """Returns the place `distance` m back along straightest predecessors; None where the road begins."""
         return self.ahead(point, -distance)
 
     def all_ahead(self, point: LanePoint, distance: float) -> list[LanePoint]:
@@ -190,16 +200,16 @@ class RoadMap:
         return [int(i) for i in self.lanes.next_lane[start[lane] : start[lane + 1]]]
 
     def predecessors(self, lane: int) -> list[int]:
-        """Indices of the lanes that lead here."""
+        """Returns the indices of the lanes that lead into a lane."""
         start = self.lanes.prev_start
         return [int(i) for i in self.lanes.prev_lane[start[lane] : start[lane + 1]]]
 
     def left(self, point: LanePoint) -> LanePoint | None:
-        """Returns the neighbouring driving lane on the left, same direction."""
+        """Returns the place abreast on the driving lane to the left, same direction; None without one."""
         return self._beside(point, int(self.lanes.left[point.lane]))
 
     def right(self, point: LanePoint) -> LanePoint | None:
-        """Returns the neighbouring driving lane on the right, same direction."""
+        """Returns the place abreast on the driving lane to the right, same direction; None without one."""
         return self._beside(point, int(self.lanes.right[point.lane]))
 
     def _beside(self, point: LanePoint, lane: int) -> LanePoint | None:
@@ -209,7 +219,7 @@ class RoadMap:
         return self.at(lane, kernels.neighbour_s(self._arrays, point.lane, lane, point.s))
 
     def shifted(self, point: LanePoint, lanes_left: int) -> LanePoint | None:
-        """Returns the place `lanes_left` lanes to the left (negative: right); None when one is missing."""
+        """Returns the place `lanes_left` lanes to the left (negative: right); None when a lane is missing."""
         place: LanePoint | None = point
         for _ in range(abs(lanes_left)):
             if place is None:
@@ -222,7 +232,7 @@ class RoadMap:
         return float(kernels.s_road_kernel(self._arrays, point.lane, point.s))
 
     def limit(self, point: LanePoint) -> float | None:
-        """Speed limit in m/s; None where the map gives none."""
+        """Returns the speed limit in m/s at a place of a lane; None where the map gives none."""
         value = float(entries.sample(self.held, point.lane, point.s)[8])
         return None if value != value else value
 
@@ -231,7 +241,10 @@ class RoadMap:
         return float(entries.sample(self.held, point.lane, point.s)[7])
 
     def on_lane(self, road: int, lane_id: int, s_road: float) -> LanePoint:
-        """OpenDRIVE coordinates to a place; ConfigError when there is no such lane."""
+        """Returns the place of OpenDRIVE coordinates; ConfigError when there is no such lane.
+
+        It says where the lane's sections run. s_road: m.
+        """
         lanes = ((self.lanes.road == road) & (self.lanes.lane_id == lane_id)).nonzero()[0]
         spans = []
         for lane in lanes:
@@ -246,21 +259,30 @@ class RoadMap:
         )
 
     def place(self, position: LanePosition) -> LanePoint:
-        """The place of a lane position; its lateral offset is kept in `offset`."""
+        """Returns the place of a lane position; its lateral offset is only kept in `offset`.
+
+        ConfigError when there is no such lane.
+        """
         point = self.on_lane(position.road, position.lane, position.s)
         return self.at(point.lane, point.s, position.offset)
 
     def signal_ahead(
         self, point: LanePoint, distance: float, kind: SignalKind = SignalKind.LIGHT
     ) -> SignalAhead | None:
-        """The first signal of a kind on the straightest path, with the way to its stop line."""
+        """Returns the first signal of a kind on the straightest path, with the way to its stop line.
+
+        None where there is none within `distance` m.
+        """
         row, gap = entries.signal_ahead(self.held, point.lane, point.s, float(distance), int(kind))
         return None if row < 0 else SignalAhead(int(row), int(self.signals.id[row]), float(gap))
 
     def traced_roads(
         self, start: LanePoint, distance: float = 5000.0, step: float = 5.0
     ) -> frozenset[int]:
-        """Road ids met when driving on from `start` (highway tracing, A-212)."""
+        """Returns the road ids met when driving on from `start` (highway tracing, A-212), its own included.
+
+        Ends after `distance` m or at a dead end; roads shorter than `step` m may be missed.
+        """
         roads = {start.road}
         lane, s = start.lane, start.s
         for _ in range(ceil(distance / step)):

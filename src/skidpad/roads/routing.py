@@ -29,9 +29,10 @@ class _Node:
 
 
 def shortest_route(map: RoadMap, start: LanePoint, goal: LanePoint) -> LaneRoute | None:
-    """The cheapest route by Dijkstra's algorithm; None when the goal cannot be reached.
+    """Returns the cheapest route by Dijkstra's algorithm; None when the goal cannot be reached.
 
-    Lane changes go to neighbours of the same direction and cost as much as CHANGE_COST metres.
+    Lane changes go to neighbours of the same direction and cost as much as CHANGE_COST metres. A goal
+    behind the start on the same lane is reached around, if at all.
     """
     origin = _Node(start.lane, True)
     costs, parents = {origin: 0.0}, {origin: origin}
@@ -57,14 +58,20 @@ def shortest_route(map: RoadMap, start: LanePoint, goal: LanePoint) -> LaneRoute
 
 
 def _entered_at(map: RoadMap, start: LanePoint, node: _Node) -> float:
-    """m along the lane where the route comes onto it."""
+    """Returns the m along the lane of a node at which the route comes onto it.
+
+    On lanes beside the start's the same share of the lane as there, else 0.
+    """
     if not node.first:
         return 0.0
     return start.s / float(map.lanes.length[start.lane]) * float(map.lanes.length[node.lane])
 
 
 def _steps(map: RoadMap, node: _Node, done: float) -> Iterator[tuple[_Node, float]]:
-    """Yields (next node, cost in m) for each drivable successor and each lane change from a node."""
+    """Yields (next node, cost in m) for each drivable successor and each lane change from a node.
+
+    done: m along the node's lane where the route came onto it.
+    """
     rest = float(map.lanes.length[node.lane]) - done
     for lane in map.successors(node.lane):
         if map.arrays.drivable[lane]:

@@ -25,7 +25,7 @@ class Bend:
     limit: float | None  # m/s, lowest in the bend
 
     def grip(self, v: float) -> float:
-        """Friction that a point mass needs at speed v: v^2 / (R g)."""
+        """Returns the friction that a point mass needs at speed v in m/s: v^2 / (R g)."""
         return v * v / (self.radius * G)
 
 
@@ -45,7 +45,7 @@ class MapSummary:
 
 
 def summarise(map: RoadMap) -> MapSummary:
-    """Facts about a map, from its arrays."""
+    """Returns counts, lengths, bends and dead ends of a map, from its arrays."""
     lanes = map.lanes
     driving = map.arrays.drivable[map.samples.lane] == 1
     limits = map.samples.limit[driving]
@@ -76,7 +76,7 @@ def _dead_ends(map: RoadMap) -> Iterator[tuple[int, int]]:
 
 
 def _bends(map: RoadMap) -> Iterator[Bend]:
-    """Runs of curved samples, on each road merged over lanes by their OpenDRIVE s."""
+    """Yields runs of samples tighter than BEND_RADIUS, on each road merged over lanes by OpenDRIVE s."""
     samples, lanes = map.samples, map.lanes
     curved = (
         (map.arrays.drivable[samples.lane] == 1)
@@ -101,7 +101,7 @@ def _bends(map: RoadMap) -> Iterator[Bend]:
 
 
 def _against(map: RoadMap, rows: np.ndarray) -> np.ndarray:
-    """Whether the samples' lanes run against the road's s."""
+    """Returns (n,) whether the samples' lanes run against the road's s."""
     first = map.lanes.first[map.samples.lane[rows]]
     result: np.ndarray = map.samples.s_road[first + 1] < map.samples.s_road[first]
     return result

@@ -25,7 +25,7 @@ class PatchOutline(NamedTuple):
 
 
 def patch_kind(patch: SurfacePatch) -> str:
-    """Return what lies there: ice hides water, snow hides both."""
+    """Returns what lies there, "snow", "ice", "water" or else "friction": snow hides ice, ice hides water."""
     if patch.snow_mm > 0.0:
         return SNOW
     if patch.ice_mm > 0.0:
@@ -34,7 +34,7 @@ def patch_kind(patch: SurfacePatch) -> str:
 
 
 def outline_patches(map: RoadMap, surface: Sequence[SurfacePatch]) -> list[PatchOutline]:
-    """Return the polygons of all patches: one for an area, one per lane for a stretch of road."""
+    """Returns the polygons of all patches: one for an area, one per lane for a stretch of road."""
     return [
         PatchOutline(patch_kind(patch), patch.name, corners)
         for patch in surface
@@ -55,14 +55,14 @@ def _pieces(map: RoadMap, patch: SurfacePatch) -> Iterator[Floats]:
 
 
 def _on_road(map: RoadMap, corners: Floats) -> Floats:
-    """Return corners (n, 2) with the height of the lane that is nearest to their middle."""
+    """Returns corners (n, 2) as (n, 3), all at the height of the lane sample nearest to their middle."""
     s, (x, y) = map.samples, corners.mean(axis=0)
     nearest = int(np.argmin((s.x - x) ** 2 + (s.y - y) ** 2))
     return np.column_stack([corners, np.full(len(corners), s.z[nearest])])
 
 
 def _stretches(map: RoadMap, patch: SurfacePatch) -> Iterator[Floats]:
-    """Yields the outline (n, 3) in m of a patch on each drivable lane of its road."""
+    """Yields the outline (n, 3) in m of a patch on each drivable lane of its road; one side may be half."""
     s, lanes = map.samples, map.lanes
     low, high = (0.0, np.inf) if patch.s is None else patch.s
     left, right = (0.5 if patch.side != "right" else 0.0), (-0.5 if patch.side != "left" else 0.0)

@@ -44,13 +44,13 @@ class Terrain(NamedTuple):
 
 
 def terrain_of(samples: LaneSamples) -> Terrain:
-    """Returns the land of a map."""
+    """Returns the height of the land of a map, MARGIN m beyond its roads."""
     x0, y0, nx, ny = _lay_grid(samples)
     return Terrain(x0, y0, _terrain(_lowest_road(samples, x0, y0, nx, ny)))
 
 
 def _lay_grid(samples: LaneSamples) -> tuple[float, float, int, int]:
-    """Corner, and nodes per axis (a whole number of chunks plus one)."""
+    """Returns x and y in m of a corner, and the nodes per axis (a whole number of squares plus one)."""
     x0 = SQUARE * np.floor((samples.x.min() - MARGIN) / SQUARE)
     y0 = SQUARE * np.floor((samples.y.min() - MARGIN) / SQUARE)
     nx = COARSE * int(np.ceil((samples.x.max() + MARGIN - x0) / SQUARE)) + 1
@@ -59,7 +59,7 @@ def _lay_grid(samples: LaneSamples) -> tuple[float, float, int, int]:
 
 
 def _lowest_road(samples: LaneSamples, x0: float, y0: float, nx: int, ny: int) -> Heights:
-    """(nx, ny) lowest edge of any road sample that rounds to a node; inf where there is none."""
+    """Returns (nx, ny) the lowest edge in m of any road sample that rounds to a node; inf without one."""
     low = np.full((nx, ny), np.inf)
     z = samples.z - np.abs(np.sin(samples.bank)) * samples.width / 2.0
     i = np.rint((samples.x - x0) / CELL).astype(int)
@@ -69,7 +69,7 @@ def _lowest_road(samples: LaneSamples, x0: float, y0: float, nx: int, ny: int) -
 
 
 def _terrain(lowest: Heights) -> Heights:
-    """(nx, ny) heights such that quads of `FINE` cells stay below every road."""
+    """Returns (nx, ny) heights such that quads of FINE cells stay CLEARANCE below every road."""
     reach = ceil(FINE * sqrt(2.0)) + 1  # a quad's diagonal, and the rounding to nodes
     span = np.arange(-reach, reach + 1)
     disc = span[:, None] ** 2 + span[None, :] ** 2 <= reach**2

@@ -52,7 +52,7 @@ class WalkMesh:
     areas: tuple[WalkArea, ...]  # of each polygon
 
     def neighbours(self) -> list[list[int]]:
-        """Per polygon and edge (corner k to k + 1) the polygon beyond, -1 where there is none.
+        """Returns per polygon and edge (corner k to k + 1) the polygon beyond, -1 where there is none.
 
         Where ways part, several begin at one edge: the first of them goes on.
         """
@@ -67,7 +67,7 @@ class WalkMesh:
 
 
 def walk_mesh(map: RoadMap) -> WalkMesh | None:
-    """The map's walking surface; None when it has neither sidewalks nor shoulders to walk on.
+    """Returns the map's walking surface; None when it has neither sidewalks nor shoulders to walk on.
 
     None also for maps whose sidewalks or roads lie above each other: a plane cannot hold them.
     """
@@ -83,7 +83,7 @@ def _edges(ring: Ring) -> Iterable[tuple[int, int]]:
 
 
 def _borders(map: RoadMap, lane: int) -> tuple[Floats, Floats]:
-    """Left and right border of a lane, (k, 3) each."""
+    """Returns the left and the right border of a lane in m, (k, 3) each, along its driving direction."""
     first = int(map.lanes.first[lane])
     rows, samples = slice(first, first + int(map.lanes.size[lane])), map.samples
     middle = np.column_stack((samples.x[rows], samples.y[rows], samples.z[rows]))
@@ -111,7 +111,7 @@ def _strips(map: RoadMap, lanes: list[int]) -> WalkMesh:
 
 
 def _stations(map: RoadMap, lane: int) -> list[int]:
-    """Samples of a lane at which its strip is cut."""
+    """Returns the samples of a lane, counted from its first, at which its strip is cut."""
     first, size = int(map.lanes.first[lane]), int(map.lanes.size[lane])
     heading, s = map.samples.heading[first : first + size], map.samples.s[first : first + size]
     keep = [0]
@@ -123,7 +123,7 @@ def _stations(map: RoadMap, lane: int) -> list[int]:
 
 
 def _weld_points(points: Floats, rings: list[Ring], areas: list[WalkArea]) -> WalkMesh:
-    """Points closer than WELD become one, and pieces that this flattens are left out."""
+    """Returns a mesh in which points closer than WELD are one; pieces that this flattens are left out."""
     near = cKDTree(points).query_ball_point(points, WELD)
     used, index = np.unique([min(n) for n in near], return_inverse=True)
     whole = [(tuple(int(index[i]) for i in r), a) for r, a in zip(rings, areas, strict=True)]
@@ -163,7 +163,7 @@ def _town(map: RoadMap) -> WalkMesh:
 
 
 def _surfaces(map: RoadMap) -> dict[WalkArea, shapely.Geometry]:
-    """Outlines by area, without overlaps: a crossing ends at the pavement, a verge at the road."""
+    """Returns outlines by area, without overlaps: a crossing ends at the pavement, a verge at the road."""
     kinds, junction = map.lanes.kind, map.lanes.junction
 
     def union(lanes: NDArray[np.bool_]) -> shapely.Geometry:
@@ -211,7 +211,7 @@ def _heights(map: RoadMap, plan: Floats) -> Floats:
 
 
 def _convex_parts(face: shapely.Geometry, corners: dict[tuple[float, float], int]) -> list[Ring]:
-    """A face cut into convex polygons whose vertices are entered into `corners`."""
+    """Returns a face cut into convex polygons of vertex indices; new vertices are entered into `corners`."""
     triangles = []
     for part in shapely.get_parts(shapely.constrained_delaunay_triangles(face)):
         points = [(float(x), float(y)) for x, y in part.exterior.coords[:3]]
@@ -221,7 +221,7 @@ def _convex_parts(face: shapely.Geometry, corners: dict[tuple[float, float], int
 
 
 def _merge_polygons(rings: list[Ring], points: list[tuple[float, float]]) -> list[Ring]:
-    """Polygons joined over their longest common edges while they stay convex and small."""
+    """Returns polygons joined over their longest common edges while convex and of CORNERS at most."""
     alive = dict(enumerate(rings))
     owner = {edge: i for i, ring in alive.items() for edge in _edges(ring)}
     inner = [(a, b) for a, b in owner if a < b and (b, a) in owner]
@@ -238,7 +238,7 @@ def _merge_polygons(rings: list[Ring], points: list[tuple[float, float]]) -> lis
 
 
 def _join_polygons(one: Ring, two: Ring, a: int, b: int) -> Ring:
-    """The outline of two polygons; `one` has the edge a to b, `two` the edge b to a."""
+    """Returns the outline of two polygons; `one` has the edge a to b, `two` the edge b to a."""
     k, m = one.index(b), two.index(a)
     around = one[k:] + one[:k]  # from b to a
     return around + (two[m:] + two[:m])[1:-1]  # and from a back to b

@@ -47,7 +47,10 @@ def _dress_fully(map: RoadMap) -> RoadMap:
 
 
 def things_of(map: RoadMap) -> list[Thing]:
-    """Returns the things to put beside the roads, clear of what is there; the same for the same content."""
+    """Returns the things to put beside the roads, clear of what is there; [] where nothing fits.
+
+    The random seed is the map's content hash: equal maps get equal things.
+    """
     seed = int(map.content_hash[:15], 16)
     sides = sides_of(map.samples, map.lanes)
     found: list[Thing] = []
@@ -62,7 +65,11 @@ def things_of(map: RoadMap) -> list[Thing]:
 
 
 def boxes_of(things: Sequence[Thing], terrain: Terrain) -> list[Box]:
-    """Returns the boxes of the things, each on the ground below it."""
+    """Returns the boxes of the things in the map's axes, z in m up.
+
+    A box that begins at the thing's foot reaches SUNK m below the lowest ground under its outline; others
+    count from the ground at the centre.
+    """
     corners = np.array([[*footprint(*t.outline), t.outline[:2]] for t in things]).reshape(-1, 5, 2)
     ground = terrain.at(corners[..., 0].ravel(), corners[..., 1].ravel()).reshape(-1, 5)
     foot = np.round(ground.min(axis=1), 3) - SUNK
@@ -77,7 +84,10 @@ def boxes_of(things: Sequence[Thing], terrain: Terrain) -> list[Box]:
 
 
 def add_facade(box: Box) -> Box:
-    """Returns a building of the file with windows; the box stays as it is, and so does all else."""
+    """Returns a building box as a BLOCK with windows, of the same place and size.
+
+    Returned unchanged: what is no building, has no room for a storey, or a side below LEAST_FRONT m.
+    """
     storeys = min(int((box.height - 1.5) / STOREY), 15)
     if (
         box.label != SemanticClass.BUILDING
@@ -90,12 +100,15 @@ def add_facade(box: Box) -> Box:
 
 
 def count_things(things: Sequence[Thing]) -> dict[str, int]:
-    """Returns how many of each there are, by name."""
+    """Returns how many things there are of each name, in the order of the names."""
     return dict(sorted(Counter(t.name for t in things).items()))
 
 
 def name_kerbs(samples: LaneSamples, lanes: LaneTable) -> LaneSamples:
-    """Returns the samples with kerbs where sidewalks begin; paint on the lane beside them stays."""
+    """Returns a copy of the samples in which sidewalks have a kerb as marking on the side of the road.
+
+    Markings of the lane beside a sidewalk stay as they are.
+    """
     walks = np.isin(samples.lane, np.flatnonzero(lanes.kind == LaneKind.SIDEWALK))
     ends = lanes.first + lanes.size - 1
     is_along = samples.s_road[ends] >= samples.s_road[lanes.first]

@@ -21,7 +21,7 @@ PIECE = 12  # samples of a lane in one polygon
 
 
 class FreeGround:
-    """The ground of a map that is free."""
+    """Finds places for things on the ground of a map that nothing else covers."""
 
     def __init__(self, samples: LaneSamples, lanes: LaneTable, roadside: Roadside) -> None:
         own, corners = _lane_polygons(samples, lanes)
@@ -32,7 +32,11 @@ class FreeGround:
         self._sight = shapely.STRtree(sight_triangles(samples, lanes))
 
     def place(self, things: Sequence[Thing]) -> list[Thing]:
-        """Returns those things that have room; of two that meet, the first one."""
+        """Returns those things whose ground is free, in their order; of two that meet, the first one.
+
+        Free is: CLEAR m from lanes and crossings, CORNER m from lanes in junctions, OWN m from what the map
+        names, and for tall things outside every sight triangle.
+        """
         outlines = outlines_of(things)
         free = np.ones(len(things), dtype=np.bool_)
         for tree, distance in ((self._lanes, CLEAR), (self._corners, CORNER), (self._objects, OWN)):
@@ -58,7 +62,7 @@ class FreeGround:
 
 
 def outlines_of(things: Sequence[Thing]) -> NDArray[np.object_]:
-    """Returns what each thing covers, seen from above."""
+    """Returns (n,) polygons, the rectangle that each of n >= 1 things covers seen from above."""
     corners = [footprint(*t.outline) for t in things]
     found: NDArray[np.object_] = shapely.polygons(np.array(corners).reshape(-1, 4, 2))
     return found
@@ -67,7 +71,7 @@ def outlines_of(things: Sequence[Thing]) -> NDArray[np.object_]:
 def _lane_polygons(
     samples: LaneSamples, lanes: LaneTable
 ) -> tuple[list[shapely.Polygon], list[shapely.Polygon]]:
-    """Pieces of all lanes, and those of them that lie in a junction."""
+    """Returns convex pieces of all lanes, PIECE samples long, and those of them that lie in a junction."""
     left = np.stack([-np.sin(samples.heading), np.cos(samples.heading)], axis=1)
     middle = np.stack([samples.x, samples.y], axis=1)
     half = 0.5 * samples.width[:, None]

@@ -14,7 +14,7 @@ Rng = np.random.Generator
 
 
 def rows_of(side: Side, rng: Rng) -> Iterator[Thing]:
-    """Yields all that would stand beside this border, what matters most first."""
+    """Yields all that would stand beside this border, what matters most first; places may be taken."""
     yield from {
         RoadKind.TOWN: _town,
         RoadKind.RURAL: _rural,
@@ -23,7 +23,7 @@ def rows_of(side: Side, rng: Rng) -> Iterator[Thing]:
 
 
 def backdrop_of(side: Side, rng: Rng) -> Iterator[Thing]:
-    """Yields the woods behind all rows."""
+    """Yields woods 70 to 170 m beyond a border, behind all rows."""
     for s in _walk(side, rng, 25.0, 70.0):
         length, depth = rng.uniform(28.0, 60.0), rng.uniform(12.0, 24.0)
         offset = rng.uniform(70.0, 170.0) + 0.5 * depth
@@ -36,7 +36,7 @@ def _place(side: Side, s: float, offset: float) -> Place:
 
 
 def _walk(side: Side, rng: Rng, least: float, most: float) -> Iterator[float]:
-    """Yields places along a border, `least` to `most` m apart."""
+    """Yields distances s in m along a border, `least` to `most` m apart, up to its length."""
     s = float(rng.uniform(0.2, 1.0)) * least
     while s < side.length:
         yield s
@@ -44,7 +44,7 @@ def _walk(side: Side, rng: Rng, least: float, most: float) -> Iterator[float]:
 
 
 def _to_road(side: Side) -> float:
-    """Returns the sign of the direction towards the road: -1 on the left side, else 1."""
+    """Returns 1 where the road lies to the left of a border's direction, else -1 (left borders)."""
     return -1.0 if side.is_left else 1.0
 
 
@@ -67,7 +67,10 @@ def _town(side: Side, rng: Rng) -> Iterator[Thing]:
 
 
 def _houses(side: Side, rng: Rng, setback: float, is_suburb: bool) -> Iterator[Thing]:
-    """Yields the front row of buildings with hedges and fences, and a taller row behind."""
+    """Yields the front row of buildings with hedges and fences; outside suburbs a taller row behind.
+
+    setback: m from the border to the buildings' fronts, at least.
+    """
     s = float(rng.uniform(1.0, 6.0))
     while s < side.length - 5.0:
         is_house = bool(rng.random() < (0.85 if is_suburb else 0.12))
@@ -116,7 +119,10 @@ def _motorway(side: Side, rng: Rng) -> Iterator[Thing]:
 def _trees(
     side: Side, rng: Rng, apart: tuple[float, float], offsets: tuple[float, float], conifers: float
 ) -> Iterator[Thing]:
-    """Yields single trees; near the road there are fewer."""
+    """Yields single trees, fewer near the road.
+
+    apart: least and most m between two along the border; offsets: m from it to the crown; conifers: share.
+    """
     for s in _walk(side, rng, *apart):
         crown = float(rng.uniform(3.0, 7.5))
         share = float(rng.random()) ** 0.7

@@ -42,7 +42,11 @@ class Side:
         return float(self.s[-1])
 
     def at(self, s: float, offset: float) -> tuple[float, float, float]:
-        """Returns x, y and the direction along the border of a place `offset` m beyond it."""
+        """Returns x, y in m and a direction in rad of the place at s in m, `offset` m beyond the border.
+
+        The direction is that of the border there, with the road to its right on the left border, else to its
+        left.
+        """
         x, y = (float(np.interp(s, self.s, self.points[:, i])) for i in (0, 1))
         nx, ny = (float(np.interp(s, self.s, self.outward[:, i])) for i in (0, 1))
         size = max(float(np.hypot(nx, ny)), 1e-9)
@@ -52,7 +56,10 @@ class Side:
 
 
 def sides_of(samples: LaneSamples, lanes: LaneTable) -> list[Side]:
-    """Returns the borders of all roads outside junctions, in the order of their ids."""
+    """Returns both borders of all roads that have lanes outside junctions, in the order of road indices.
+
+    Borders shorter than SHORTEST m are left out.
+    """
     found = []
     for road in np.unique(lanes.road[lanes.junction < 0]).tolist():
         for is_left in (True, False):
@@ -65,7 +72,10 @@ def sides_of(samples: LaneSamples, lanes: LaneTable) -> list[Side]:
 
 
 def kind_of(samples: LaneSamples, lanes: LaneTable, road: int) -> RoadKind:
-    """Returns the kind of a road: by sidewalks, by limit and by lanes."""
+    """Returns the kind of a road: TOWN with a sidewalk or a limit of TOWN_LIMIT at most.
+
+    Else MOTORWAY from MOTORWAY_LIMIT on, or with four lanes in a section and a limit; else RURAL.
+    """
     own = np.flatnonzero(lanes.road == road)
     if (lanes.kind[own] == LaneKind.SIDEWALK).any():
         return RoadKind.TOWN
@@ -85,7 +95,7 @@ def kind_of(samples: LaneSamples, lanes: LaneTable, road: int) -> RoadKind:
 def _border(
     samples: LaneSamples, lanes: LaneTable, road: int, is_left: bool
 ) -> tuple[Floats, Floats]:
-    """The outermost edge of a road's sections, one after the other, along increasing s."""
+    """Returns points (n, 3) in m and outward unit vectors (n, 2) of a road's edge, along increasing s."""
     parts = list(_edges(samples, lanes, road, is_left))
     points = np.concatenate([p for p, _ in parts])
     outward = np.concatenate([n for _, n in parts])

@@ -16,7 +16,10 @@ DRIVEN = (LaneKind.DRIVING, LaneKind.RAMP)
 
 
 def sight_triangles(samples: LaneSamples, lanes: LaneTable) -> list[shapely.Polygon]:
-    """Returns a triangle per pair of lanes that lead into the same junction."""
+    """Returns the triangles that tall things must not meet: one per ordered pair of lanes into one junction.
+
+    Pairs of lanes of the same road have none.
+    """
     entries: dict[int, list[int]] = {}
     for lane in np.flatnonzero((lanes.junction < 0) & np.isin(lanes.kind, DRIVEN)).tolist():
         after = lanes.next_lane[lanes.next_start[lane] : lanes.next_start[lane + 1]]
@@ -34,7 +37,10 @@ def sight_triangles(samples: LaneSamples, lanes: LaneTable) -> list[shapely.Poly
 
 
 def _triangle(samples: LaneSamples, lanes: LaneTable, own: int, other: int) -> NDArray[np.float64]:
-    """The eye on one lane, where the other lane ends, and how far along it one must see."""
+    """Returns corners (3, 2) in m: the eye on lane `own`, the end of lane `other`, a point up `other`.
+
+    That point is as far back as one must see: GAP s at the limit (SPEED without one), at most FARTHEST m.
+    """
     last = int(lanes.first[other] + lanes.size[other] - 1)
     limit = float(samples.limit[last])
     reach = min(GAP * (limit if np.isfinite(limit) else SPEED), FARTHEST)

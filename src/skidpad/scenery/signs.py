@@ -26,7 +26,11 @@ CORNERS: dict[SignalKind, tuple[int, tuple[int, int, int]]] = {
 def signs_of(
     samples: LaneSamples, lanes: LaneTable, signals: SignalTable, roadside: Roadside
 ) -> Iterator[Box]:
-    """Yields post and plate of every sign beside the road for which the file draws none."""
+    """Yields post and plate for every stop, yield and speed-limit sign beside the road without a plate.
+
+    A sign has a plate when a traffic-sign box stands within NEAR m; a sign nearer than BESIDE m to a
+    driving lane gets none.
+    """
     driven = np.isin(lanes.kind, (LaneKind.DRIVING, LaneKind.RAMP))[samples.lane]
     plates = np.array(
         [(b.x, b.y) for b in roadside.boxes if b.label == SemanticClass.TRAFFIC_SIGN]

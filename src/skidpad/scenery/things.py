@@ -72,7 +72,10 @@ def _part(
     at: Place, label: SemanticClass, size: tuple[float, float, float], rgb: Rgb, shape: Shape,
     z: float = 0.0, solid: bool = True, variant: int = 0,
 ) -> Box:  # fmt: skip
-    """Returns a box at a place, its size (length, width, height) in m and z in m above the ground."""
+    """Returns a box at a place, its size (length, width, height) in m and z in m above the ground.
+
+    solid: whether vehicles can hit it; variant: number that picks the look within a shape.
+    """
     x, y, yaw = (round(v, 3) for v in (at.x, at.y, at.along))
     length, width, height = (round(v, 3) for v in size)
     return Box(
@@ -90,7 +93,7 @@ def _thing(
 def make_building(
     at: Place, length: float, depth: float, storeys: int, is_house: bool, rng: np.random.Generator
 ) -> Thing:
-    """Returns a building whose front is parallel to the road."""
+    """Returns a house (pitched roof) or a block around `at`, whose front is parallel to the road."""
     roof = 0.32 * depth if is_house else 0.9
     size = (length, depth, storeys * STOREY + 0.6 + roof)
     shape = Shape.HOUSE if is_house else Shape.BLOCK
@@ -100,7 +103,7 @@ def make_building(
 
 
 def make_tree(at: Place, crown: float, is_conifer: bool, rng: np.random.Generator) -> Thing:
-    """Returns a tree; crown: its diameter, m."""
+    """Returns a conifer or a broad-leaved tree of random height; crown: its diameter in m."""
     trunk = float(rng.uniform(0.22, 0.4))
     if is_conifer:
         height, bare = crown * float(rng.uniform(2.2, 3.0)), 0.9
@@ -151,7 +154,7 @@ def make_wood(at: Place, length: float, depth: float, rng: np.random.Generator) 
 
 
 def make_bus_stop(at: Place) -> Thing:
-    """Returns a shelter whose open side looks at the road."""
+    """Returns a shelter beside the road with a pole 2.6 m further along it."""
     box = _part(at, SemanticClass.STATIC, (4.0, 1.5, 2.5), GLASS, Shape.SHELTER)
     pole = _part(at.move(2.6, 0.0), SemanticClass.POLE, (0.08, 0.08, 2.6), GREY, Shape.POST)
     return _thing("bus stop", at.move(0.4, 0.0), 5.0, 1.6, box, pole)
@@ -164,6 +167,6 @@ def make_marker_post(at: Place) -> Thing:
 
 
 def make_noise_wall(at: Place, length: float) -> Thing:
-    """Returns a piece of a wall that keeps noise away."""
+    """Returns a piece of a noise wall, `length` m along the road and 3.2 m high."""
     box = _part(at, SemanticClass.WALL, (length, 0.3, 3.2), (138, 132, 118), Shape.BOX)
     return _thing("noise wall", at, length, 0.3, box)

@@ -38,7 +38,10 @@ DIGITS = {
 
 
 def bake(text: bytes, name: str, file: str = "") -> BakedMap:
-    """The baked map of OpenDRIVE text; `file` is named in errors."""
+    """Returns the baked map of OpenDRIVE text; `file` is named in errors.
+
+    FileError for a faulty file, NoLaneError for one without lanes.
+    """
     document = parse(text, file or name)
     shapes = list(lane_shapes(document))
     if not shapes:
@@ -102,7 +105,10 @@ def _table(document: Document, shapes: Sequence[LaneShape]) -> LaneTable:
 
 
 def _ego_start(document: Document) -> LanePosition | None:
-    """Returns the ego's start that the file's userData names; None where it names none."""
+    """Returns the ego's start that the header's userData EGO_START names; None where it names none.
+
+    FileError where it is not a road, a lane and s.
+    """
     text = document.user_data.get(EGO_START)
     if text is None:
         return None

@@ -27,7 +27,10 @@ Node = Any  # lxml's element
 
 
 def id_number(text: str) -> int:
-    """The number of an id, which OpenDRIVE allows to be any text."""
+    """Returns the number of an id, which OpenDRIVE allows to be any text.
+
+    What is no number of 32 bits gets one from NAMED on by its checksum, so two may meet.
+    """
     try:
         number = int(text)
     except ValueError:
@@ -45,7 +48,7 @@ class Shift:
     heading: float = 0.0
 
     def applied(self, x: float, y: float) -> tuple[float, float]:
-        """Returns where a point of the file lies in the world."""
+        """Returns the world's x and y in m of a point of the file."""
         c, s = cos(self.heading), sin(self.heading)
         x, y = x + self.x, y + self.y
         return x * c - y * s, x * s + y * c
@@ -134,12 +137,15 @@ class Reader:
         self.file, self.shift = file, shift
 
     def fail(self, node: Node, problem: str) -> FileError:
-        """Returns the error to raise about a node, with file and line."""
+        """Returns the FileError about a node, with file and line, for the caller to raise."""
         named = f" id={node.get('id')}" if node.get("id") is not None else ""
         return FileError(f"{self.file}, line {node.sourceline}: <{node.tag}{named}> {problem}")
 
     def number(self, node: Node, name: str, default: float | None = None) -> float:
-        """A number that a road may have; FileError when it is missing (without default) or is none."""
+        """Returns a number of a node.
+
+        FileError when it is missing (without default) or not within LARGEST.
+        """
         text = node.get(name)
         if text is None and default is not None:
             return default
@@ -154,7 +160,10 @@ class Reader:
         return value
 
     def integer(self, node: Node, name: str, default: int | None = None) -> int:
-        """A whole number that fits 32 bits."""
+        """Returns a whole number that fits 32 bits.
+
+        FileError for another, or when missing without default.
+        """
         text = node.get(name)
         if text is None and default is not None:
             return default
@@ -167,14 +176,14 @@ class Reader:
         return value
 
     def id(self, node: Node, name: str = "id", default: str | None = None) -> int:
-        """Returns an id as a number; raises an error where the attribute is missing."""
+        """Returns an id as a number (`id_number`); FileError where it is missing without default."""
         text = node.get(name, default)
         if text is None:
             raise self.fail(node, f"needs {name}")
         return id_number(text)
 
     def cubics(self, nodes: list[Node], start: str = "s") -> Cubics:
-        """Records with attributes a, b, c, d as one function; zero when there are none."""
+        """Returns records with attributes a, b, c, d as one function; zero everywhere when there are none."""
         if not nodes:
             return Cubics.none()
         rows = sorted(
@@ -184,7 +193,10 @@ class Reader:
         return Cubics(table[:, 0], table[:, 1:])
 
     def speed(self, node: Node) -> float | None:
-        """m/s of a <speed>; None for "no limit" and "undefined"."""
+        """Returns the m/s of a <speed>, m/s without a unit; None for "no limit" and "undefined".
+
+        FileError for another unit.
+        """
         if node.get("max") in ("no limit", "undefined"):
             return None
         factor = {"km/h": 1 / 3.6, "mph": 0.44704, "m/s": 1.0, None: 1.0}
@@ -195,13 +207,16 @@ class Reader:
 
 
 def _without_namespace(root: Node) -> None:
-    """Names as the standard has them, where a tool has put them into a namespace."""
+    """Renames all elements in place as the standard has them, where a tool has put them into a namespace."""
     for element in root.iter("{*}*"):
         element.tag = etree.QName(element).localname
 
 
 def parse_root(text: bytes, file: str) -> Node:
-    """Return the root of an OpenDRIVE file; without entities, networks or huge trees."""
+    """Returns the root of an OpenDRIVE file, read without entities, networks or huge trees.
+
+    FileError for more than SIZE_MAX bytes, what is not XML or not OpenDRIVE, and a document type.
+    """
     if len(text) > SIZE_MAX:
         raise FileError(f"{file}: {len(text)} bytes are more than the allowed {SIZE_MAX}")
     parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=False)
@@ -219,7 +234,7 @@ def parse_root(text: bytes, file: str) -> Node:
 
 
 def parse(text: bytes, file: str) -> Document:
-    """Returns the records of an OpenDRIVE file; raises an error for a faulty one."""
+    """Returns the records of an OpenDRIVE file; FileError, naming `file`, for a faulty one."""
     root = parse_root(text, file)
     read = Reader(file, _shift(Reader(file), root.find("header/offset")))
     roads: dict[int, RoadRecord] = {}
@@ -286,7 +301,7 @@ def _road(read: Reader, node: Node) -> RoadRecord:
 
 
 def _raise_elevation(read: Reader, elevation: Cubics) -> Cubics:
-    """Returns the elevation lifted by the z of the map's offset in m."""
+    """Returns the elevation lifted by the z in m of the map's offset."""
     lift = np.array([read.shift.z, 0.0, 0.0, 0.0])
     return Cubics(elevation.start, elevation.coefficients + lift)
 
@@ -404,5 +419,8 @@ def _connections(read: Reader, junction: Node) -> tuple[ConnectionRecord, ...]:
 
 
 def _leads_to(connection: Node) -> str:
-    """The attribute that names the road; direct junctions have no roads of their own."""
+    """Returns the name of the attribute of a connection that names the road it leads to.
+
+    "linkedRoad" at direct junctions, which have no roads of their own, else "connectingRoad".
+    """
     return "linkedRoad" if connection.get("linkedRoad") is not None else "connectingRoad"

@@ -98,7 +98,11 @@ class _Band(NamedTuple):
 
 
 def lane_shapes(document: Document) -> Iterator[LaneShape]:
-    """All lanes but the centre ones, roads in file order, each section from left to right."""
+    """Yields all lanes but the centre ones, roads in file order, each section from left to right.
+
+    Sections shorter than SHORTEST and lanes without width are left out. FileError for more than SAMPLES_MAX
+    samples or values beyond FARTHEST.
+    """
     samples = 0
     for road in document.roads.values():
         for index, section in enumerate(road.sections):
@@ -218,7 +222,10 @@ def _sample_lanes(
 def _from_above(
     band: _Band, roll: Floats, d_roll: Floats, dd_roll: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """t cos(roll), how far a place of a banked road lies beside its line; derivatives by s."""
+    """Returns how far a place of a banked road lies beside its line seen from above, t cos(roll).
+
+    With its first two derivatives by s; roll and its derivatives (n,).
+    """
     c, s = np.cos(roll), np.sin(roll)
     return (
         band.t * c,
@@ -228,14 +235,17 @@ def _from_above(
 
 
 def _lengths(x: Floats, y: Floats, heading: Floats) -> Floats:
-    """Arc length from the first sample: each chord is that of an arc through its headings."""
+    """Returns the arc length from the first sample: each chord is that of an arc through its headings."""
     chord = np.hypot(np.diff(x), np.diff(y))
     half = 0.5 * np.diff(heading)
     return np.concatenate(([0.0], np.cumsum(chord / np.sinc(half / np.pi))))
 
 
 def _bands(road: RoadRecord, section: SectionRecord, s: Floats, select: Floats) -> Iterator[_Band]:
-    """Lanes of both sides from the centre outwards; lanes without any width are left out."""
+    """Yields the lanes of each side from the centre outwards; lanes without any width are left out.
+
+    s (n,): m along the road; select (n,): places that choose the records.
+    """
     offset = np.array(road.lane_offset.at(s, select))  # value and derivatives: (3, n)
     centre = next((lane for lane in section.lanes if lane.id == 0), None)
 
@@ -261,7 +271,10 @@ def _outer_border(
     offset: Floats,
     cubic: Callable[[Cubics], Floats],
 ) -> Floats:
-    """Returns the lateral position in m of a lane's outer border; the inner one where it has no width."""
+    """Returns a lane's outer border in m left of the road's line with derivatives, (3, n).
+
+    The inner border where the lane has neither width nor border. side: 1 left, -1 right.
+    """
     if lane.width is not None:
         return inner + side * cubic(lane.width)
     if lane.border is not None:
@@ -272,7 +285,7 @@ def _outer_border(
 def _markings(
     band: _Band, section: SectionRecord, select: Floats
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Markings left and right of a lane as seen along increasing s."""
+    """Returns the markings left and right of a lane as seen along increasing s, (n,) each."""
     inner, outer = (
         _steps(
             [(s, float(MARKINGS.get(kind, Marking.OTHER))) for s, kind in lane.marks],
@@ -285,12 +298,12 @@ def _markings(
 
 
 def _limits(road: RoadRecord, section: SectionRecord, lane: LaneRecord, select: Floats) -> Floats:
-    """Speed limit: the lane's own record, else the road type's; NaN where there is none."""
+    """Returns the speed limit (n,) in m/s: the lane's own record, else the road type's; NaN without any."""
     by_lane = _steps(list(lane.speeds), select - section.s_start, np.nan)
     return np.where(np.isnan(by_lane), _steps(list(road.speeds), select, np.nan), by_lane)
 
 
 def _steps(records: list[tuple[float, float]], s: Floats, before: float) -> Floats:
-    """The value of the last record at or before `s`."""
+    """Returns the value of the last record at or before each `s`; `before` where there is none yet."""
     values = np.array([before, *(value for _, value in records)])
     return values[np.searchsorted([start for start, _ in records], s, side="right")]

@@ -24,7 +24,7 @@ class Neighbours(NamedTuple):
 
 
 def neighbours(shapes: Sequence[LaneShape], index: Mapping[LaneKey, int]) -> Neighbours:
-    """Adjacent drivable lanes; `left` and `right` of the same direction."""
+    """Returns the adjacent drivable lanes of each lane, -1 for none; `left` and `right` of its own side."""
     out = Neighbours(*(np.full(len(shapes), -1, dtype=np.int32) for _ in Neighbours._fields))
 
     def drivable(key: LaneKey) -> int:
@@ -47,7 +47,10 @@ def neighbours(shapes: Sequence[LaneShape], index: Mapping[LaneKey, int]) -> Nei
 def successions(
     document: Document, shapes: Sequence[LaneShape], index: Mapping[LaneKey, int]
 ) -> set[tuple[int, int]]:
-    """Pairs (lane, successor). Junctions that list a way from both ends give it once."""
+    """Returns pairs (lane, successor) of indices; ways that junctions list from both ends come once.
+
+    Links that would lead against the traffic of a lane are left out.
+    """
     pairs: set[tuple[int, int]] = set()
     for i, shape in enumerate(shapes):
         for at_exit in (True, False):
@@ -66,7 +69,10 @@ def compress_pairs(pairs: set[tuple[int, int]], lanes: int) -> tuple[Ints32, Int
 
 
 def _beyond(document: Document, shape: LaneShape, at_exit: bool) -> Iterator[tuple[LaneKey, bool]]:
-    """Lanes that touch one end of a lane, each with whether they are touched at their s = 0 side."""
+    """Yields lanes that touch one end of a lane, each with whether it is touched at its s = 0 side.
+
+    at_exit: the end at which traffic leaves the lane.
+    """
     road = document.roads[shape.key.road]
     at_high_s = shape.along == at_exit
     record = next(r for r in road.sections[shape.key.section].lanes if r.id == shape.key.lane)
@@ -102,7 +108,10 @@ def _through_junction(
 
 
 def _next_section(road: RoadRecord, section: int, up: bool) -> int | None:
-    """The adjacent section; those too short to be baked are stepped over."""
+    """Returns the index of the adjacent section, those too short to be baked stepped over.
+
+    None at the end.
+    """
     step = 1 if up else -1
     section += step
     while 0 <= section < len(road.sections):

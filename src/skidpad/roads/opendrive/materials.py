@@ -27,7 +27,10 @@ class LaneMaterial(NamedTuple):
 
 
 def read_materials(map: str | Path) -> tuple[LaneMaterial, ...]:
-    """Return the frictions that a map's OpenDRIVE file says; none where it says none."""
+    """Returns the frictions that a map's OpenDRIVE file says; () where it says none.
+
+    map: as in `map_file`. FileError for a baked map, which keeps none, and for a faulty file.
+    """
     path = map_file(map)
     if path.suffix == ".npz":
         raise FileError(f"map {path.name}: a baked map keeps no materials; give the .xodr file")
@@ -37,7 +40,7 @@ def read_materials(map: str | Path) -> tuple[LaneMaterial, ...]:
 
 
 def _of_road(read: Reader, road: Node) -> Iterator[LaneMaterial]:
-    """Yields the stretch (s in m) and friction of each lane material of a road that names a friction."""
+    """Yields stretch (s in m, inf at the road's end) and friction of each lane material that names one."""
     sections = sorted(road.findall("lanes/laneSection"), key=lambda n: read.number(n, "s"))
     for section, after in pairwise([*sections, None]):
         start = read.number(section, "s")
@@ -54,7 +57,7 @@ def _of_road(read: Reader, road: Node) -> Iterator[LaneMaterial]:
 
 
 def _friction(read: Reader, material: Node) -> float:
-    """Returns the friction of a material; raises an error outside of (0, FRICTION_MOST]."""
+    """Returns the friction of a material; FileError outside of (0, FRICTION_MOST]."""
     friction = read.number(material, "friction")
     if not 0.0 < friction <= FRICTION_MOST:
         raise read.fail(

@@ -67,7 +67,7 @@ def _rails(document: Document, edge: RoadEdge) -> Iterator[tuple[RoadRecord, lis
 
 
 def _beside(road: RoadRecord, shape: LaneShape, edge: RoadEdge) -> Iterator[Corners]:
-    """The pieces of rail along the outer border of a lane that no other road comes near."""
+    """Yields the pieces of rail along a lane's outer border to which no road comes nearer than FREE m."""
     order = np.argsort(shape.s_road)
     along = order[np.unique(np.append(np.arange(0, len(order), STRIDE), len(order) - 1))]
     s = shape.s_road[along]
@@ -87,13 +87,13 @@ def _beside(road: RoadRecord, shape: LaneShape, edge: RoadEdge) -> Iterator[Corn
 
 
 def _stretches(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Where runs of True begin and end."""
+    """Returns (begin, end) of each run of True, the end excluded."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def _objects(road: Node) -> Node:
-    """The road's list of objects, which stands behind its lanes."""
+    """Returns the road's node of objects; adds one behind its lanes where there is none."""
     found = road.find("objects")
     if found is None:
         found = etree.Element("objects")

@@ -28,7 +28,7 @@ class Cubics:
         return cls(np.zeros(1), np.zeros((1, 4)))
 
     def at(self, s: Floats, select: Floats | None = None) -> tuple[Floats, Floats, Floats]:
-        """Value and first two derivatives at `s`.
+        """Returns value and first two derivatives at `s` (n,); before the first piece that one goes on.
 
         select: places that choose the pieces instead of `s`: at the end of a lane section the piece
         before the joint is wanted, not the one that begins there.
@@ -91,7 +91,7 @@ class ReferenceLine:
         self.starts = np.array([e.s for e in elements])
 
     def at(self, s: Floats) -> LinePoints:
-        """Points at `s` (n,), in any order; beyond the ends the last element goes on."""
+        """Returns points at `s` (n,), in any order; beyond the ends the first or last element goes on."""
         out = LinePoints(*(np.empty(len(s)) for _ in LinePoints._fields))
         which = np.maximum(np.searchsorted(self.starts, s, side="right") - 1, 0)
         for i in np.unique(which):
@@ -110,7 +110,7 @@ def _evaluate(e: Element, ds: Floats) -> LinePoints:
 
 
 def _clothoid(e: Element, shape: Clothoid, ds: Floats) -> LinePoints:
-    """Arc in closed form, spiral by Fresnel integrals.
+    """Returns the points of an arc in closed form, of a spiral by Fresnel integrals.
 
     With k(s) = k0 + k' s and u = k(s) / sqrt(pi |k'|) the heading is phi + sign(k') pi/2 u^2, so the
     position is an integral of cos and sin of pi/2 u^2.
@@ -139,7 +139,10 @@ def _clothoid(e: Element, shape: Clothoid, ds: Floats) -> LinePoints:
 
 
 def _parametric(e: Element, shape: Parametric, ds: Floats) -> LinePoints:
-    """Parameter from arc length by a table; then the cubic and its derivatives."""
+    """Returns the points of a cubic: its parameter from arc length by a table, then its derivatives.
+
+    Its arc length is scaled to the length that the file says.
+    """
     from scipy.interpolate import CubicHermiteSpline  # likewise
 
     steps = int(np.clip(e.length / TABLE_STEP, 8, TABLE_MAX))
@@ -169,7 +172,7 @@ def _parametric(e: Element, shape: Parametric, ds: Floats) -> LinePoints:
 
 
 def _derivatives(shape: Parametric, p: Floats) -> tuple[Floats, ...]:
-    """u, v and their first, second and third derivatives by p."""
+    """Returns u, v and their first, second and third derivatives by p: u, v, du, dv and so on."""
     return tuple(
         value
         for derivatives in zip(_cubic(shape.u, p), _cubic(shape.v, p), strict=True)
@@ -178,7 +181,7 @@ def _derivatives(shape: Parametric, p: Floats) -> tuple[Floats, ...]:
 
 
 def _cubic(coefficients: tuple[float, float, float, float], p: Floats) -> tuple[Floats, ...]:
-    """Value and first three derivatives at `p`."""
+    """Returns value and first three derivatives of a + b p + c p^2 + d p^3."""
     a, b, c, d = coefficients
     return (
         a + p * (b + p * (c + p * d)),

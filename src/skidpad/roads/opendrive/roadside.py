@@ -54,7 +54,10 @@ LABELS = {
 
 
 def roadside(document: Document, signals: SignalTable, shapes: Sequence[LaneShape]) -> Roadside:
-    """Reads what stands beside the roads; nothing is made up for files without objects."""
+    """Returns what stands beside the roads; nothing is made up for files without objects.
+
+    FileError beyond OBJECTS_MAX objects and corners. Objects of types without a meaning here are left out.
+    """
     read = Reader(document.file)
     barriers: list[Barrier] = []
     boxes: list[Box] = []
@@ -90,7 +93,7 @@ def roadside(document: Document, signals: SignalTable, shapes: Sequence[LaneShap
 
 
 def _amount(read: Reader, road: RoadRecord, node: Node, barrier: bool) -> float:
-    """How many boxes and points an object will make, before any is made."""
+    """Returns about how many boxes and points an object will make, before any is made."""
     count = 1.0 + len(node.findall(".//cornerLocal")) + len(node.findall(".//cornerRoad"))
     for repeat in node.findall("repeat"):
         length = read.number(repeat, "length", 0.0)
@@ -102,7 +105,10 @@ def _amount(read: Reader, road: RoadRecord, node: Node, barrier: bool) -> float:
 
 
 def _barrier_kind(node: Node) -> BarrierKind | None:
-    """Tells the kind by subtype or name (which say guardRail or wall), else by type."""
+    """Returns the kind of an object whose type is one of BARRIERS, by subtype or name before type.
+
+    None for any other type, whatever subtype and name say.
+    """
     type_ = node.get("type", "").lower()
     if type_ not in BARRIERS:
         return None
@@ -122,13 +128,13 @@ def _barriers(read: Reader, road: RoadRecord, node: Node, kind: BarrierKind) -> 
 
 
 def _aside(read: Reader, node: Node, repeat: Node) -> tuple[float, float]:
-    """Returns t where a repetition starts and ends; where the file lets them out, the object's."""
+    """Returns t in m where a repetition starts and ends; where the file leaves them out, the object's."""
     start = read.number(repeat, "tStart", read.number(node, "t", 0.0))
     return start, read.number(repeat, "tEnd", start)
 
 
 def _repeated_line(read: Reader, road: RoadRecord, node: Node, repeat: Node) -> Floats:
-    """A continuous object (repeat distance 0) along the road."""
+    """Returns the points (n, 3) in m of a continuous object along the road, up to the road's end."""
     s = read.number(repeat, "s", read.number(node, "s"))
     length = min(read.number(repeat, "length", 0.0), road.length - s)
     n = max(int(np.ceil(length / BARRIER_STEP)), 1) + 1
@@ -154,7 +160,7 @@ def _points(road: RoadRecord, s: Floats, t: Floats, up: Floats) -> Floats:
 
 
 def _straight_line(read: Reader, road: RoadRecord, node: Node) -> Floats:
-    """An object with a length only, centred on its place."""
+    """Returns the two ends (2, 3) of an object with a length only, centred on its place; (0, 3) without."""
     place = road_place(
         road, read.number(node, "s"), read.number(node, "t"), read.number(node, "zOffset", 0.0)
     )
@@ -168,7 +174,7 @@ def _straight_line(read: Reader, road: RoadRecord, node: Node) -> Floats:
 
 
 def _outlines(read: Reader, road: RoadRecord, node: Node) -> Iterator[Floats]:
-    """Corner polygons in world coordinates; a box when only a size is given."""
+    """Yields corner polygons (n, 3) in world coordinates; a rectangle when only a size is given."""
     place = road_place(
         road, read.number(node, "s"), read.number(node, "t"), read.number(node, "zOffset", 0.0)
     )
@@ -228,13 +234,13 @@ def _boxes(read: Reader, road: RoadRecord, node: Node, type_: str) -> list[Box]:
 
 
 def _is_outlined(node: Node) -> bool:
-    """Whether corners alone say how large it is, as editors write buildings."""
+    """Returns whether corners alone say how large an object is, as editors write buildings."""
     sized = any(node.get(name) for name in ("length", "width", "radius"))
     return not sized and not node.findall("repeat") and len(_outline_nodes(node)) > 0
 
 
 def _heights(read: Reader, node: Node) -> list[float]:
-    """Heights of the corners above their feet, where these are given."""
+    """Returns the heights in m of corners above their feet, where these are given."""
     corners = [
         c
         for o in _outline_nodes(node)
@@ -244,7 +250,7 @@ def _heights(read: Reader, node: Node) -> list[float]:
 
 
 def _around(corners: Floats, height: float, label: int, rgb: tuple[int, int, int]) -> Box:
-    """The smallest upright box around an outline."""
+    """Returns the smallest upright box around an outline (n, 3) in m, THICKNESS wide at least."""
     turned = shapely.oriented_envelope(shapely.MultiPoint(corners[:, :2]))
     ring = shapely.get_coordinates(turned)
     if len(ring) < 4:  # all corners on a line
@@ -273,7 +279,10 @@ def _parking(read: Reader, road: RoadRecord, node: Node) -> ParkingSpace:
 
 
 def _places(read: Reader, node: Node) -> Iterator[tuple[float, float, float]]:
-    """Returns (s, t, zOffset) in m of an object's corners or repeated places."""
+    """Yields (s, t, zOffset) in m of an object: its own place, or those of its repetitions instead.
+
+    FileError where a repetition has no positive step or more than REPEATS_MAX places.
+    """
     repeats = node.findall("repeat")
     if not repeats:
         yield read.number(node, "s"), read.number(node, "t"), read.number(node, "zOffset", 0.0)

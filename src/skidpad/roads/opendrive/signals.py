@@ -56,7 +56,7 @@ class _Row(NamedTuple):
 
 
 def road_place(road: RoadRecord, s: float, t: float, z_offset: float = 0.0) -> Place:
-    """The point at (s, t) of a road, `z_offset` above its surface."""
+    """Returns the point at (s, t) in m of a road, `z_offset` m above its surface."""
     at = np.array([s])
     line = road.line.at(at)
     heading = float(line.heading[0])
@@ -71,7 +71,7 @@ def road_place(road: RoadRecord, s: float, t: float, z_offset: float = 0.0) -> P
 
 
 def signal_kind(node: Node) -> SignalKind:
-    """What a <signal> demands; its type is a number of the German catalogue or OpenDRIVE's own."""
+    """Returns what a <signal> demands, by its type's number in the German catalogue; OTHER for any else."""
     if node.get("type") in LIGHTS:
         return SignalKind.LIGHT
     return KINDS.get(node.get("type", ""), SignalKind.OTHER)
@@ -80,7 +80,10 @@ def signal_kind(node: Node) -> SignalKind:
 def signal_table(
     document: Document, shapes: Sequence[LaneShape], index: Mapping[LaneKey, int]
 ) -> SignalTable:
-    """One row per signal and lane; a stop line moves `s` of the light or stop sign it belongs to."""
+    """Returns one row per signal and lane, by lane, then s as the file has it.
+
+    A stop line in reach moves `s` of the light or stop sign it belongs to.
+    """
     read = Reader(document.file)
     rows: dict[tuple[int, int], _Row] = {}
     for row in _rows(read, document, shapes, index):
@@ -138,7 +141,7 @@ def _post(x: float, y: float, z: float, heading: float, top: float) -> Box:
 
 
 def _is_on_lane(shapes: Sequence[LaneShape], x: float, y: float, z: float) -> bool:
-    """Tells whether a post at this place would stand on a lane that is driven on, or touch it."""
+    """Returns whether a post at this place would stand on a drivable lane, or nearer than BESIDE m to it."""
     for shape in shapes:
         if shape.kind not in DRIVABLE:
             continue
@@ -198,7 +201,7 @@ def _governed_lanes(
     shapes: Sequence[LaneShape],
     index: Mapping[LaneKey, int],
 ) -> list[int]:
-    """Drivable lanes on which a signal is valid: its validity, else all of its orientation."""
+    """Returns indices of drivable lanes on which a signal is valid: its validity, else its orientation."""
     s = read.number(node, "s")
     section = max((i for i, sec in enumerate(road.sections) if sec.s_start <= s + 1e-6), default=0)
     ranges = [
@@ -221,7 +224,10 @@ def _governed_lanes(
 
 
 def _limit(read: Reader, signal: Node) -> float:
-    """m/s; the value is in km/h unless the file says otherwise."""
+    """Returns the limit of a sign in m/s, given in km/h unless the file says mph or m/s; NaN for none.
+
+    Where it has no value, its subtype is the number.
+    """
     factor = (
         0.44704 if signal.get("unit") == "mph" else 1.0 if signal.get("unit") == "m/s" else 1 / 3.6
     )
@@ -256,7 +262,10 @@ def _stop_lines(
 
 
 def _nearest_line(row: _Row, lines: list[tuple[int, float]]) -> float:
-    """Returns the s in m of the nearest stop line in reach for a light or stop sign, else the row's own s."""
+    """Returns the s in m of the nearest stop line in reach for a light or stop sign, else the row's own.
+
+    lines: (lane, s); in reach: on the same lane within STOP_LINE_REACH.
+    """
     if row.kind not in (SignalKind.LIGHT, SignalKind.STOP):
         return row.s
     near = [s for lane, s in lines if lane == row.lane and abs(s - row.s) <= STOP_LINE_REACH]

@@ -59,7 +59,7 @@ class Localities:
         return int(self._junction[row]), float(away[row])
 
     def _count_beside(self, lane: int, side: str) -> int:
-        """How many driving lanes of the same direction lie on a side of a lane."""
+        """Returns how many driving lanes of its direction lie beside a lane on a side, "left" or "right"."""
         beside, count = getattr(self._map.lanes, side), 0
         while (lane := int(beside[lane])) >= 0:
             count += 1

@@ -150,7 +150,7 @@ def _section_shapes(road: RoadRecord, index: int, section: SectionRecord) -> lis
 
 
 def _grid(road: RoadRecord, section: SectionRecord, step: float) -> Floats:
-    """Road s of the samples: evenly spaced between the joints, where curvature may jump."""
+    """Returns road s in m of the samples, `step` m apart at most, one at each joint (curvature may jump)."""
     widths = [
         section.s_start + cubic.start
         for lane in section.lanes

@@ -48,7 +48,7 @@ class Change:
 
     @property
     def subject(self) -> str:
-        """The group that is compared: `configuration 2` or `all configurations`."""
+        """Returns the group that is compared: `configuration 2` or `all configurations`."""
         return f"configuration {self.config}" if self.config else "all configurations"
 
 
@@ -62,7 +62,7 @@ class Rule:
     limit: float
 
     def p(self, change: Change) -> float:
-        """One-sided mid-p against "the mean difference is not beyond the limit"."""
+        """Returns the one-sided mid-p against "the mean difference is not beyond the limit"."""
         greater, less = sign_tests((change.differences - self.limit)[None, :], mid=True)
         return float((greater if self.compare in (operator.gt, operator.ge) else less)[0])
 
@@ -87,7 +87,7 @@ class RuleJudgement:
 
     @property
     def text(self) -> str:
-        """The comparison as one fragment of a sentence."""
+        """Returns the comparison as one fragment of a sentence."""
         c = self.change
         told = f"{c.subject}, {c.comparison.mean:+.3g}"
         if self.answer is Answer.UNDECIDED:
@@ -99,7 +99,11 @@ class RuleJudgement:
 def judge_rules(
     rules: Sequence[Rule], changes: Sequence[Change], *, point: bool
 ) -> list[RuleJudgement]:
-    """Every rule for every driver; point: by the mean difference alone, without a test."""
+    """Judges every rule for every driver whose change is of its column, in the order of the rules.
+
+    point: by the mean difference alone, without a test. Otherwise the p values are adjusted for all
+    (Holm) and fire at ALPHA; with fewer than `seeds_to_fire` seeds the answer is undecided.
+    """
     pairs = [(r, c) for r in rules for c in changes if c.column == r.column]
     if point:
         fired = [r.compare(c.comparison.mean, r.limit) for r, c in pairs]
@@ -117,7 +121,7 @@ def judge_rules(
 
 
 def seeds_to_fire(hypotheses: int) -> int:
-    """Least seeds with which one of so many hypotheses can be below 5 %, one-sided and adjusted.
+    """Returns the least seeds with which one of so many hypotheses can be below 5 %, one-sided, adjusted.
 
     Six at least: with fewer the mid-p raises more than 5 % of false alarms.
     """
@@ -133,7 +137,10 @@ class Flaw(str, Enum):
 
 
 def flaws(a: pl.DataFrame, b: pl.DataFrame, rules: Sequence[Rule]) -> dict[Flaw, str]:
-    """What is wrong with the data that the rules judge, each with a sentence."""
+    """Returns what keeps the rules from being judged, a sentence each; {}: nothing.
+
+    Runs without a partner, crashed runs, and columns of rules without values to compare.
+    """
     found = {}
     by = list(PAIRED_BY)
     alone = [len(x.join(y, on=by, how="anti", nulls_equal=True)) for x, y in ((a, b), (b, a))]
@@ -151,7 +158,7 @@ def flaws(a: pl.DataFrame, b: pl.DataFrame, rules: Sequence[Rule]) -> dict[Flaw,
 
 
 def _empty(a: pl.DataFrame, b: pl.DataFrame, column: str) -> list[str]:
-    """Where a column cannot be judged: for all drivers, or for one that had values before."""
+    """Returns the column, or its configurations that had values before, where it cannot be judged."""
     pairs = _pairs(a, b)
     whole = pairs.drop_nulls([column, f"{column}_b"])
     if not len(whole):
@@ -161,25 +168,28 @@ def _empty(a: pl.DataFrame, b: pl.DataFrame, column: str) -> list[str]:
 
 
 def _pairs(a: pl.DataFrame, b: pl.DataFrame) -> pl.DataFrame:
-    """Runs of both that were driven to their end, side by side."""
+    """Returns the runs of both that were driven to their end, side by side; columns of b end in `_b`."""
     a, b = (t.filter(~pl.col("outcome").is_in(NOT_RUN)) for t in (a, b))
     return a.join(b, on=list(PAIRED_BY), suffix="_b")
 
 
 def parse_rule(text: str) -> Rule:
-    """`fatal_collisions > 0.1`: column, one of > >= < <=, number; about the mean difference."""
+    """Returns the rule in a text such as `fatal_collisions > 0.1`, about the mean difference.
+
+    The comparison is one of > >= < <=; ConfigError for any other form or an unknown column.
+    """
     return Rule(text, *parse_comparison("--fail-if", text, columns()))
 
 
 def columns() -> list[str]:
-    """The columns that can be compared."""
+    """Returns the names of the columns that can be compared."""
     return [name for name, _, _ in definitions_of(Metrics)]
 
 
 def compare_campaigns(
     a: pl.DataFrame, b: pl.DataFrame, wanted: Sequence[str]
 ) -> tuple[list[Change], int, int]:
-    """Changes per column, over all drivers and per driver; and the runs without a partner in each.
+    """Returns changes per column, over all drivers and per driver, and the runs of each without a partner.
 
     A driver that is the only one is listed once. ConfigError when no run of one is in the other;
     crashed ones are in it and are not compared.
@@ -197,7 +207,7 @@ def compare_campaigns(
 
 
 def _change(runs: pl.DataFrame, config: str, column: str) -> Change | None:
-    """Mean difference per seed; None without a run that has both values."""
+    """Returns the mean difference b less a per seed; None without a run that has both values."""
     both = runs.drop_nulls([column, f"{column}_b"])
     if not len(both):
         return None

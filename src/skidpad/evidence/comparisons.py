@@ -21,7 +21,7 @@ RULE = re.compile(r"^\s*(\w+)\s*(>=|<=|>|<)\s*([-+]?[0-9.]+(?:e[-+]?\d+)?)\s*$")
 def parse_comparison(
     option: str, text: str, known: list[str] | tuple[str, ...]
 ) -> tuple[str, Callable[[float, float], bool], float]:
-    """A name among `known`, a comparison and a number; ConfigError says what `option` takes."""
+    """Returns a name among `known`, a comparison and a number; ConfigError says what `option` takes."""
     match = RULE.match(text)
     if not match:
         raise ConfigError(

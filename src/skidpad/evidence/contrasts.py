@@ -49,7 +49,7 @@ class Contrast:
 
     @property
     def small(self) -> bool:
-        """What was found lies below the margin."""
+        """Returns whether what was found lies below the margin."""
         return self.mean < self.margin
 
 
@@ -72,7 +72,7 @@ class Rows(NamedTuple):
 
 
 def rows_of(column: str, *values: str, name: str = "") -> Rows:
-    """The rows whose `column` has one of `values`, named by them or by `name`."""
+    """Returns the rows whose `column` has one of `values`, named by them or by `name`."""
     return Rows(name or ", ".join(values), pl.col(column).is_in(values))
 
 
@@ -81,14 +81,14 @@ class Criterion(Protocol):
 
     @property
     def test(self) -> tuple[str, ...]:
-        """How it is tested, in phrases."""
+        """Returns how it is tested, in phrases."""
 
     @property
     def amounts(self) -> tuple[Amount, ...]:
-        """Margins and bounds by which it is judged."""
+        """Returns the margins and bounds by which it is judged."""
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:
-        """The contrast; None when its columns or rows are not in `table`."""
+        """Returns the contrast; None when its columns or rows are not in `table`."""
 
 
 class Claim(Enum):
@@ -114,17 +114,17 @@ class Paired:
 
     @property
     def test(self) -> tuple[str, ...]:
-        """Sign changes of paired differences."""
+        """Returns the phrases for sign changes of paired differences."""
         return (f"paired by {_join_words(self.by)}", SIGNS)
 
     @property
     def amounts(self) -> tuple[Amount, ...]:
-        """The margin or bound."""
+        """Returns the margin or bound."""
         return (self.amount,)
 
     @property
     def label(self) -> str:
-        """What is positive if the claim is true."""
+        """Returns what is positive if the claim is true, in words."""
         within = f" in {self.where.name}" if self.where and self.where.name else ""
         sides = f"{self.column}{within}, {self.more.name} minus {self.less.name}"
         return {
@@ -135,7 +135,7 @@ class Paired:
         }[self.claim]
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:
-        """Computes the contrast from the differences of pairs."""
+        """Returns the contrast of the differences of pairs; None without the columns or a pair."""
         needed = (pl.col(self.column), self.more.are, self.less.are)
         if not has_columns(table, *needed, *([self.where.are] if self.where else [])):
             return None
@@ -166,16 +166,19 @@ class Outweighs:
 
     @property
     def test(self) -> tuple[str, ...]:
-        """Sign changes of paired differences."""
+        """Returns the phrases for sign changes of paired differences."""
         return (f"paired by {_join_words(self.by)}", SIGNS)
 
     @property
     def amounts(self) -> tuple[Amount, ...]:
-        """The margin."""
+        """Returns the margin alone."""
         return (self.margin,)
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:
-        """Computes the contrast from the differences of two effects per pair."""
+        """Returns the contrast of the differences of two effects per pair.
+
+        None without the columns, without a pair, or with other numbers of pairs for the two factors.
+        """
         if not {self.column, self.factor, self.other} <= set(table.columns):
             return None
         first, second = (
@@ -192,12 +195,12 @@ class Outweighs:
 
 
 def highest(column: str) -> Rows:
-    """The rows in which a factor has its greatest value."""
+    """Returns the rows in which a factor has its greatest value."""
     return Rows(f"highest {column}", pl.col(column) == pl.col(column).max())
 
 
 def lowest(column: str) -> Rows:
-    """The rows in which a factor has its least value."""
+    """Returns the rows in which a factor has its least value."""
     return Rows(f"lowest {column}", pl.col(column) == pl.col(column).min())
 
 
@@ -214,16 +217,19 @@ class Mean:
 
     @property
     def test(self) -> tuple[str, ...]:
-        """Sign changes."""
+        """Returns the phrases for sign changes."""
         return (f"means over {self.over}", SIGNS if "seed" in self.by else SEGMENTS)
 
     @property
     def amounts(self) -> tuple[Amount, ...]:
-        """The margin."""
+        """Returns the margin alone."""
         return (self.margin,)
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:
-        """Computes the contrast from the values of all rows; sums within `value` are over the whole table."""
+        """Returns the contrast of the values of all rows; sums within `value` are over the whole table.
+
+        None without the columns or a row with a value. Equal drives count once.
+        """
         where = pl.lit(True) if self.where is None else self.where
         if not has_columns(table, self.value, where):
             return None
@@ -244,7 +250,7 @@ class Never:
 
     @property
     def test(self) -> tuple[str, ...]:
-        """Counting."""
+        """Returns the phrase for counting."""
         return (f"counting {self.cases}; one contradicts",)
 
     @property
@@ -253,7 +259,7 @@ class Never:
         return ()
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:
-        """Certain either way, so the p values are 0 and 1."""
+        """Returns a contrast that is certain either way, so its p values are 0 and 1; None without a case."""
         broken, judged = self.count(table)
         if not judged:
             return None
@@ -266,12 +272,15 @@ class Never:
 
 
 def drop_unfinished(table: pl.DataFrame) -> pl.DataFrame:
-    """Drops the runs that leave every denominator (L-7)."""
+    """Returns the table without the runs that leave every denominator (L-7): crashed, timed out, failed."""
     return table.filter(~pl.col("outcome").is_in(NOT_RUN)) if "outcome" in table.columns else table
 
 
 def distinct(table: pl.DataFrame) -> pl.DataFrame:
-    """Each drive once: what moved alike with one driver and seed is one drive in any weather (T-3)."""
+    """Returns each drive once: what moved alike with one driver and seed is one drive in any weather (T-3).
+
+    The first row stays; all rows stay where a hash is missing.
+    """
     table = table.with_columns(drive=drive_hash(table))
     if not table["drive"].has_nulls():
         apart = [c for c in DRIVES_APART if c in table.columns]
@@ -280,13 +289,16 @@ def distinct(table: pl.DataFrame) -> pl.DataFrame:
 
 
 def drive_hash(table: pl.DataFrame) -> pl.Expr:
-    """What tells drives apart: the hash of the motion, in older results that of the whole log."""
+    """Returns what tells drives apart: the hash of the motion, in older results that of the whole log."""
     known = [pl.col(c) for c in ("motion_hash", "log_hash") if c in table.columns]
     return pl.coalesce(known) if known else pl.lit(None, pl.String)
 
 
 def per_seed(rows: pl.DataFrame, value: pl.Expr) -> pl.Series:
-    """Mean of `value` per seed: what shares a seed is not independent, so seeds are the units."""
+    """Returns the mean of `value` per seed, by rising seed; of each row where there is no column `seed`.
+
+    What shares a seed is not independent, so seeds are the units.
+    """
     rows = rows.with_columns(shown=value)
     if "seed" not in rows.columns:
         return rows["shown"]
@@ -298,7 +310,7 @@ def per_seed(rows: pl.DataFrame, value: pl.Expr) -> pl.Series:
 def paired_runs(
     table: pl.DataFrame, more: pl.Expr, less: pl.Expr, by: Sequence[str], column: str
 ) -> tuple[pl.DataFrame, bool]:
-    """`difference` of `column` between the rows of `more` and of `less` that agree in `by`.
+    """Returns `difference` of `column` between the rows of `more` and of `less` that agree in `by`.
 
     Several rows of one side that agree are averaged, and of one seed the same two drives are one
     pair, in how many weathers ever they were driven. Also whether all pairs are equal drives.
@@ -326,7 +338,7 @@ def paired_runs(
 def contrast_pairs(
     label: str, values: ArrayLike, margin: float, identical: bool = False
 ) -> Contrast:
-    """A contrast from values that are claimed positive: differences of runs that share a seed."""
+    """Returns a contrast from values that are claimed positive: differences of runs that share a seed."""
     c = compare_pairs(values)
     below = compare_pairs(np.asarray(values, dtype=np.float64) - margin) if margin else c
     return Contrast(
@@ -344,7 +356,7 @@ def contrast_pairs(
 
 
 def has_columns(table: pl.DataFrame, *needed: pl.Expr) -> bool:
-    """Whether all columns that expressions read are in the table."""
+    """Returns whether all columns that expressions read are in the table."""
     return {name for e in needed for name in e.meta.root_names()} <= set(table.columns)
 
 

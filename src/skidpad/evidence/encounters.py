@@ -39,9 +39,10 @@ class Encounter:
 
 
 def encounter(log: RunLog, ego: int, other: int, since: float = 0.0) -> Encounter | None:
-    """Return how two actors met; None when they were never there together.
+    """Returns how two actors met; None when they were never there together.
 
-    since: s, when the interaction began; who stands near before that is not in play.
+    since: s, when the interaction began; standing near before that is not in play. ego, other: columns
+    of the log.
     """
     both = together(log, ego, other)
     if not both.any():
@@ -76,7 +77,7 @@ def _axes(one: Body) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
 
 
 def _reach(one: Body, axis: tuple[Floats, Floats]) -> Floats:
-    """Half of what a box covers along an axis, (T,) m."""
+    """Returns (T,) m, half of what a box covers along an axis."""
     long, wide = _axes(one)
     along = np.abs(axis[0] * long[0] + axis[1] * long[1])
     across = np.abs(axis[0] * wide[0] + axis[1] * wide[1])
@@ -85,7 +86,7 @@ def _reach(one: Body, axis: tuple[Floats, Floats]) -> Floats:
 
 
 def time_to_meet(one: Body, other: Body) -> Floats:
-    """Time until two boxes touch when both keep velocity and heading, (T,) s; inf: never.
+    """Returns (T,) s until two boxes touch when both keep velocity and heading; 0: they do, inf: never.
 
     By separating axes: on each of the four edge normals the boxes overlap in one interval of time.
     """
@@ -127,7 +128,7 @@ def _alongside(one: Body, other: Body) -> Flags:
 
 
 def _corners(one: Body) -> Floats:
-    """Corners of a box, (4, T, 2) m."""
+    """Returns the corners of a box, (4, T, 2) m."""
     (cx, cy), (sx, sy) = _axes(one)
     signs = ((1, 1), (1, -1), (-1, -1), (-1, 1))
     half = 0.5 * one.length, 0.5 * one.width
@@ -146,7 +147,7 @@ def _corners(one: Body) -> Floats:
 
 
 def _outside(points: Floats, box: Body) -> Floats:
-    """Distance of points (4, T, 2) from a box, 0 inside; (4, T) m."""
+    """Returns (4, T) m of points (4, T, 2) from a box, 0 inside."""
     (cx, cy), (sx, sy) = _axes(box)
     dx, dy = points[..., 0] - box.x, points[..., 1] - box.y
     forward = np.maximum(np.abs(dx * cx + dy * cy) - 0.5 * box.length, 0.0)
@@ -156,14 +157,17 @@ def _outside(points: Floats, box: Body) -> Floats:
 
 
 def box_distance(one: Body, other: Body) -> Floats:
-    """Distance between two boxes, (T,) m; 0 while they overlap."""
+    """Returns the distance between two boxes, (T,) m; 0 while they overlap."""
     corners = np.concatenate([_outside(_corners(one), other), _outside(_corners(other), one)])
     distance: Floats = np.where(time_to_meet(one, other) <= 0.0, 0.0, corners.min(axis=0))
     return distance
 
 
 def crossing(one: Body, other: Body, t: Floats) -> float | None:
-    """Least time between both at the same place, s, positive where `one` comes later; None: no place."""
+    """Returns the least s between both at the same place, positive where `one` comes later; None: no place.
+
+    t: (T,) s.
+    """
     a, b = _places(one), _places(other)
     first, second = _select_rows(one, a), _select_rows(other, b)
     x, y, yaw = first.x[:, None], first.y[:, None], first.yaw[:, None]
@@ -176,7 +180,7 @@ def crossing(one: Body, other: Body, t: Floats) -> float | None:
 
 
 def _places(one: Body) -> NDArray[np.int64]:
-    """Rows at which a body has gone on by half a metre, the first and the last one among them."""
+    """Returns rows at which a body has gone on by SPACING or more, the first and the last one among them."""
     way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(one.x), np.diff(one.y)))])
     spacing = max(SPACING, way[-1] / PLACES)
     rows = np.flatnonzero(np.diff(np.floor(way / spacing), prepend=-1.0) > 0.0)
@@ -198,7 +202,11 @@ class Sized(Protocol):
 def overlap_along(
     x: Floats, y: Floats, yaw: Floats, x2: Floats, y2: Floats, yaw2: Floats, box: Sized, box2: Sized
 ) -> Flags:
-    """Return where boxes at all these places overlap along both edges of the first one."""
+    """Returns where boxes at all these places overlap along both edges of the first one.
+
+    x, y, yaw and x2, y2, yaw2 broadcast; together with the call with both exchanged it says that the
+    boxes overlap.
+    """
     c, s = np.cos(yaw), np.sin(yaw)
     along, across = np.abs(np.cos(yaw2 - yaw)), np.abs(np.sin(yaw2 - yaw))
     forward = np.abs((x2 - x) * c + (y2 - y) * s)

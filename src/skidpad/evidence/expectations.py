@@ -27,7 +27,10 @@ class Expectation:
     limit: float
 
     def disappointed(self, values: dict[str, float]) -> str:
-        """What is wrong; "" when it is as expected."""
+        """Returns what is wrong in words; "" when it is as expected.
+
+        values: of `run_values`.
+        """
         value = values[self.name]
         if self.compare(value, self.limit):
             return ""
@@ -37,7 +40,10 @@ class Expectation:
 
 
 def parse_expectation(text: str) -> Expectation:
-    """`no-collision`, or `min_ttc_s > 1.5`: one of NAMES, one of > >= < <=, number."""
+    """Returns what `no-collision`, or a text such as `min_ttc_s > 1.5`, expects of a run.
+
+    One of NAMES, one of > >= < <=, and a number; ConfigError for anything else.
+    """
     plain = "collisions <= 0" if text.strip() == NO_COLLISION else text
     name, compare, limit = parse_comparison("--expect", plain, NAMES)
     return Expectation(text, name, compare, limit)

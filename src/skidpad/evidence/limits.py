@@ -23,7 +23,7 @@ SKEW_SHORT = 0.5  # widens the other one
 def count_limits(
     totals: ArrayLike, with_events: ArrayLike, dispersions: ArrayLike, runs: int
 ) -> tuple[Floats, Floats]:
-    """Limits of expected totals of events, at least two runs having one; arrays broadcast.
+    """Returns limits of expected totals of events, at least two runs having one; arrays broadcast.
 
     Exact Poisson limits of T / phi clumps of phi events each. phi is the dispersion index, its excess
     over 1 widened by 12 / (runs with events), times Student's over the normal quantile. Source of the
@@ -41,7 +41,7 @@ def count_limits(
 
 
 def skew_limits(values: Floats) -> tuple[Floats, Floats]:
-    """Limits of means over the last axis of values (..., n) that are not all alike.
+    """Returns limits of means over the last axis of values (..., n) that are not all alike.
 
     Student's limits, widened on the side of the longer tail by 3.5 g / sqrt(n) and on the other by
     0.5 g / sqrt(n), g the sample skewness. The order of the correction and its side follow Johnson
@@ -54,7 +54,7 @@ def skew_limits(values: Floats) -> tuple[Floats, Floats]:
 
 
 def mean_widths(n: int, squares: ArrayLike, cubes: ArrayLike) -> tuple[Floats, Floats]:
-    """How far the limits of a mean lie below and above it, from sums of powers of n deviations."""
+    """Returns how far the limits of a mean lie below and above it, from sums of powers of n deviations."""
     squares, cubes = np.asarray(squares), np.asarray(cubes)
     skew = cubes / n / (squares / n) ** 1.5 * np.sqrt(n - 1.0) / (n - 2.0)  # G1 / sqrt(n)
     half = stdtrit(n - 1, 0.5 + 0.5 * CONFIDENCE) * np.sqrt(squares / (n - 1) / n)

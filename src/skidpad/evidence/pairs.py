@@ -64,12 +64,12 @@ class Following(NamedTuple):
 
 
 def pairs(log: RunLog) -> tuple[Pair, ...]:
-    """The ego and every actor that was there together with it."""
+    """Returns the numbers of the ego and every actor that was there together with it."""
     return tuple(_pairs(log, ((EGO, i) for i in range(1, len(log.table.names)))))
 
 
 def pairs_of_others(log: RunLog) -> tuple[Pair, ...]:
-    """Those of two others between whom there was anything to measure."""
+    """Returns the numbers of any two other actors between whom there was anything to measure."""
     found = _pairs(log, combinations(range(1, len(log.table.names)), 2))
     return tuple(pair for pair in found if any(v is not None for v in pair[2:]))
 
@@ -85,8 +85,10 @@ def _pairs(log: RunLog, chosen: Iterable[tuple[int, int]]) -> Iterator[Pair]:
 
 
 def together(log: RunLog, i: int, j: int) -> NDArray[np.bool_]:
-    """Ticks in which both are there and neither is above the other on another road: clear of it, by no
-    road's slope; (T,)."""
+    """Returns (T,) the ticks in which both are there and neither is above the other on another road.
+
+    Another road is clear of it in height, by no road's slope. i, j: columns of the log.
+    """
     a, height = log.actors, log.table.height
     dx, dy, dz = (v[:, j].astype(np.float64) - v[:, i] for v in (a.x, a.y, a.z))
     clear = np.where(dz > 0.0, height[i], height[j])
@@ -95,7 +97,7 @@ def together(log: RunLog, i: int, j: int) -> NDArray[np.bool_]:
 
 
 def body(log: RunLog, i: int) -> Body:
-    """An actor's columns of the log."""
+    """Returns the columns of actor i of the log."""
     a = log.actors
     x, y, yaw, vx, vy, ax, ay = (
         v[:, i].astype(np.float64) for v in (a.x, a.y, a.yaw, a.vx, a.vy, a.ax, a.ay)
@@ -107,7 +109,10 @@ def body(log: RunLog, i: int) -> Body:
 def pair_of(
     names: tuple[str, str], one: Body, other: Body, both: NDArray[np.bool_], dt: float
 ) -> Pair:
-    """Their numbers over the ticks in which both are there."""
+    """Returns the numbers of two actors over the ticks of `both` (T,), where both are there.
+
+    dt: s per tick.
+    """
     ways = [following(one, other), following(other, one)]
     use = [both & ~np.isnan(w.gap) for w in ways]
     cut = [Following(*(column[u] for column in w)) for w, u in zip(ways, use, strict=True)]
@@ -127,7 +132,7 @@ def pair_of(
 
 
 def following(behind: Body, ahead: Body) -> Following:
-    """What the one has in its way, as boxes; both keep their directions."""
+    """Returns what the one behind has in its way, as boxes; both keep their directions."""
     c, s = np.cos(behind.yaw), np.sin(behind.yaw)
     dx, dy = ahead.x - behind.x, ahead.y - behind.y
     forward, left = dx * c + dy * s, dy * c - dx * s
@@ -144,8 +149,9 @@ def following(behind: Body, ahead: Body) -> Following:
 
 
 def required_deceleration(gap: Floats, v_closing: Floats, a_lead: Floats) -> Floats:
-    """Constant deceleration behind a lead that keeps its own, without contact; >= 0.
+    """Returns the constant m/s^2 behind a lead that keeps its own, without contact; >= 0.
 
+    a_lead: m/s^2 along the axis of the one behind, negative when it brakes.
     Source: a_long,req for constant accelerations, Jansson (2005), as in
     criticality-metrics.readthedocs.io, "Required Longitudinal Acceleration".
     """
@@ -155,7 +161,7 @@ def required_deceleration(gap: Floats, v_closing: Floats, a_lead: Floats) -> Flo
 
 
 def post_encroachment(a: Body, b: Body, both: NDArray[np.bool_], dt: float) -> float | None:
-    """Least time between one leaving a place and the other coming there, s; None above 2 s."""
+    """Returns the least s between one leaving a place and the other coming there; None above 2 s."""
     stride = max(1, round(STEP / dt))
     rows = np.flatnonzero(both)
     breaks = np.flatnonzero(np.diff(rows) > 1) + 1

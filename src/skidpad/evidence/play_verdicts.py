@@ -28,7 +28,7 @@ class PlayVerdict(str, Enum):
 
     @property
     def is_good(self) -> bool:
-        """Whether a gate may go on."""
+        """Returns whether a gate may go on: passed, or not judged."""
         return self in (PlayVerdict.PASSED, PlayVerdict.NOT_JUDGED)
 
 
@@ -55,12 +55,12 @@ class Counterpart:
 
     @property
     def name(self) -> str:
-        """Name of the other actor."""
+        """Returns the name of the other actor."""
         return self.pair.other
 
 
 def counterparts(log: RunLog, found: Sequence[Pair], staging: Staging) -> list[Counterpart]:
-    """Return every actor that was there together with the ego, as in `pairs`."""
+    """Returns every actor that was there together with the ego, in the order of `found`."""
     names = log.table.names
     out = []
     for pair in found:
@@ -91,7 +91,7 @@ def judge_run(
     of_file: Sequence[Result],
     values: dict[str, float],
 ) -> PlayJudgement:
-    """Return the verdict on a run that was driven to its end.
+    """Returns the verdict on a run that was driven to its end.
 
     rules: of `--expect`. of_file: results of the file's own criteria. values: numbers for rules.
     """
@@ -131,7 +131,7 @@ def _criterion(
 
 
 def void_reasons(staging: Staging, others: Sequence[Counterpart]) -> list[str]:
-    """Return why the interaction did not happen; nothing when it did, or when none is staged."""
+    """Returns why the interaction did not happen; [] when it did, or when none is staged."""
     reasons = [
         f"event {event.name.rpartition('::')[2]!r} of {', '.join(event.actors)} never began"
         for event in staging.missing

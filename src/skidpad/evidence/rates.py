@@ -27,7 +27,7 @@ class RateBelow:
 
     @property
     def test(self) -> tuple[str, ...]:
-        """Name of the exact test."""
+        """Returns the name of the exact test."""
         return (f"exact Poisson against {self.limit}",)
 
     @property
@@ -36,7 +36,7 @@ class RateBelow:
         return ()
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:
-        """Computes the contrast from sums over the rows."""
+        """Returns the contrast of sums over the rows; None without the columns, a row, or what is `given`."""
         given = pl.lit(1) if self.given is None else self.given
         where = pl.lit(True) if self.where is None else self.where
         if not has_columns(table, self.events, self.exposure, given, where):
@@ -49,7 +49,7 @@ class RateBelow:
         return rate_below(label, int(events), exposure, self.limit.value, self._rate(rows))
 
     def _rate(self, rows: pl.DataFrame) -> Rate | None:
-        """The rate over seeds; None where rows have no seeds."""
+        """Returns the rate over seeds; None where rows have no seeds."""
         if "seed" not in rows.columns:
             return None
         seeds = rows.group_by("seed").agg(e=self.events, x=self.exposure).filter(pl.col("x") > 0)
@@ -59,7 +59,7 @@ class RateBelow:
 def rate_below(
     label: str, events: int, runs: float, limit: float, rate: Rate | None = None
 ) -> Contrast:
-    """The claim that a rate per run, or hour, lies below `limit`, by exact Poisson tests.
+    """Returns the claim that a rate per run, or hour, lies below `limit`, by exact Poisson tests.
 
     These take events as single ones. The limits are those of `rate`, over seeds, which may clump.
     """

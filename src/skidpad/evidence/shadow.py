@@ -44,12 +44,12 @@ class Foresight(NamedTuple):
 
 
 def is_braking(pedals: Pedals) -> NDArray[np.bool_]:
-    """(T,) whether a driver brakes."""
+    """Returns (T,) whether a driver brakes, BRAKING or more."""
     return pedals.brake >= BRAKING
 
 
 def partings(t: Floats, driver: Pedals, shadow: Pedals) -> list[Parting]:
-    """The stretches of at least SHORTEST s in which exactly one of both brakes, in order of time."""
+    """Returns the stretches of at least SHORTEST in which exactly one of both brakes, in order of time."""
     asked = np.isfinite(driver.brake) & np.isfinite(shadow.brake)
     apart = np.where(asked, is_braking(shadow).astype(int) - is_braking(driver).astype(int), 0)
     edges: list[int] = np.flatnonzero(np.diff(apart, prepend=0, append=0)).tolist()
@@ -62,18 +62,18 @@ def partings(t: Floats, driver: Pedals, shadow: Pedals) -> list[Parting]:
 
 
 def foresight(t: Floats, events: Floats, driver: Pedals, shadow: Pedals) -> list[Foresight]:
-    """How long before each event (s) each driver began the braking that lasted up to it."""
+    """Returns how long before each event (s) each driver was first braking, at most BEFORE."""
     return [Foresight(float(e), _ahead(t, e, driver), _ahead(t, e, shadow)) for e in events]
 
 
 def _ahead(t: Floats, event: float, pedals: Pedals) -> float | None:
-    """s from the first braking within BEFORE s of the event; None: no braking there."""
+    """Returns the s from the first braking within BEFORE of the event; None: no braking there."""
     near = (t >= event - BEFORE) & (t <= event) & is_braking(pedals)
     return float(event - t[np.argmax(near)]) if near.any() else None
 
 
 def share_apart(driver: Pedals, shadow: Pedals) -> float:
-    """Share of the moments at which both were asked and exactly one braked; 0 of none."""
+    """Returns the share of the moments at which both were asked and exactly one braked; 0 of none."""
     asked = np.isfinite(driver.brake) & np.isfinite(shadow.brake)
     if not asked.any():
         return 0.0

@@ -57,12 +57,12 @@ class Rate:
 
     @property
     def most_runs(self) -> float:
-        """Largest share of runs that have an event, at one-sided 95 %; it assumes nothing of clumps."""
+        """Returns the largest share of runs that have an event, at one-sided 95 %, however events clump."""
         return share_bound(self.runs_with, self.runs)
 
     @property
     def exceeds_assumption(self) -> bool:
-        """Whether the counts vary more than the limits of rates assume."""
+        """Returns whether the counts vary more than the limits of rates assume."""
         return (self.dispersion or 0.0) > DISPERSION_ASSUMED
 
 
@@ -79,25 +79,25 @@ class Comparison:
 
     @property
     def effect(self) -> float | None:
-        """Mean over standard deviation (Cohen's d_z); None where the pairs do not vary."""
+        """Returns mean over standard deviation (Cohen's d_z); None where the pairs do not vary."""
         return self.mean / self.spread if self.spread > 0.0 else None
 
     @property
     def p(self) -> float | None:
-        """Two-sided; None below six pairs, of which no outcome could be significant."""
+        """Returns the two-sided p; None below six pairs, of which no outcome could be significant."""
         if self.n < EVER_SIGNIFICANT:
             return None
         return min(1.0, 2.0 * min(self.p_greater, self.p_less))
 
     @property
     def is_clear(self) -> bool:
-        """Whether the interval has only one sign."""
+        """Returns whether the interval has only one sign; False without one."""
         i = self.interval
         return i is not None and (i.low > 0.0 or i.high < 0.0)
 
 
 def poisson_interval(count: int, exposure: float = 1.0, confidence: float = CONFIDENCE) -> Interval:
-    """Exact limits of a Poisson rate. Source: Garwood (1936), Biometrika 28."""
+    """Returns exact limits of a Poisson rate. Source: Garwood (1936), Biometrika 28."""
     tail = (1.0 - confidence) / 2.0
     low = stats.chi2.ppf(tail, 2 * count) / 2.0 if count else 0.0
     high = stats.chi2.ppf(1.0 - tail, 2 * count + 2) / 2.0
@@ -105,7 +105,7 @@ def poisson_interval(count: int, exposure: float = 1.0, confidence: float = CONF
 
 
 def dispersion_index(counts: ArrayLike, exposures: ArrayLike | None = None) -> float | None:
-    """Variance over mean of counts, 1 for Poisson; None below two runs or without events.
+    """Returns variance over mean of counts, 1 for Poisson; None below two runs or without events.
 
     Of unequal exposures it is Pearson's: squared deviations over expectations, per run but one.
     """
@@ -119,11 +119,11 @@ def dispersion_index(counts: ArrayLike, exposures: ArrayLike | None = None) -> f
 
 
 def event_rate(counts: Sequence[int], exposures: Sequence[float] | None = None) -> Rate:
-    """Rate of events over independent runs (n,), limits by `count_limits`.
+    """Returns the rate of events over independent runs (n,), with limits by `count_limits`.
 
     The limits hold while the variance of counts is at most 10 times their mean. With fewer than two
-    runs with an event, no data can tell rare clumps from single events: then the rate has no limits,
-    and what holds is `most_runs`.
+    runs with an event, no data can tell rare clumps from single events: then, and with fewer than
+    UNITS_FROM runs, the rate has no limits, and what holds is `most_runs`. ValueError without exposure.
     """
     c = np.asarray(counts, dtype=np.int64)
     e = np.ones(c.size) if exposures is None else np.asarray(exposures, dtype=np.float64)
@@ -139,7 +139,7 @@ def event_rate(counts: Sequence[int], exposures: Sequence[float] | None = None) 
 
 
 def mean_limits(values: ArrayLike) -> Interval | None:
-    """Limits of the mean of values (n,); None: fewer than eight, or all of them alike."""
+    """Returns limits of the mean of values (n,); None: fewer than eight, or all of them alike."""
     v = np.asarray(values, dtype=np.float64)
     if v.size < UNITS_FROM or is_alike(v):
         return None
@@ -148,12 +148,12 @@ def mean_limits(values: ArrayLike) -> Interval | None:
 
 
 def is_alike(values: Floats) -> bool:
-    """Whether values (n,) differ by no more than rounding."""
+    """Returns whether values (n,) differ by no more than rounding."""
     return bool(np.ptp(values) <= 1e-12 * max(1.0, float(np.abs(values).max())))
 
 
 def ratio_limits(values: ArrayLike, weights: ArrayLike) -> Interval | None:
-    """Limits of sum(values) / sum(weights) over units (n,); None as for `mean_limits`.
+    """Returns limits of sum(values) / sum(weights) over units (n,); None as for `mean_limits`.
 
     Those of the mean of what each unit contributes: the effects of leaving it out. Source: Efron and
     Tibshirani (1993), An Introduction to the Bootstrap, chapter 11, infinitesimal jackknife of a ratio.
@@ -173,7 +173,7 @@ def linear_ratio_limits(
     products: tuple[float, float, float],
     cubes: tuple[float, float, float, float],
 ) -> Interval | None:
-    """Limits of sum(y) / sum(x) over 30 units or more, from sums alone; None: all are alike.
+    """Returns limits of sum(y) / sum(x) over 30 units or more, from sums alone; None: all are alike.
 
     sums: of y and x; products: of y y, x y and x x; cubes: of y y y, y y x, y x x and x x x. By Taylor
     linearisation, var = k / (k - 1) sum((y - R x)^2) / sum(x)^2, widened for skewness as in
@@ -191,7 +191,7 @@ def linear_ratio_limits(
 
 
 def compare_pairs(differences: ArrayLike) -> Comparison:
-    """Test and interval of the mean of differences of runs with equal seeds (n,), n >= 1.
+    """Returns test and interval of the mean of differences of runs with equal seeds (n,), n >= 1.
 
     The test changes signs: all of them up to 12 pairs, else 4000 drawn ones, the same at every call;
     the interval is that of `mean_limits`. Source: Fisher (1935), The design of experiments, section 21.
@@ -211,7 +211,7 @@ def compare_pairs(differences: ArrayLike) -> Comparison:
 
 
 def sign_tests(differences: Floats, *, mid: bool = False) -> tuple[Floats, Floats]:
-    """One-sided p values (greater, less) of each row of differences (rows, n), by changing signs.
+    """Returns one-sided p values (greater, less) of each row of differences (rows, n), by changing signs.
 
     mid: changes that give the very sum seen count half, which makes up for the many ties of counts;
     false alarms are then 5 % at most on average, not for every distribution. Source: Lancaster (1961),
@@ -231,7 +231,7 @@ def sign_tests(differences: Floats, *, mid: bool = False) -> tuple[Floats, Float
 
 
 def pairs_needed(comparison: Comparison, smallest: float, power: float = 0.8) -> int | None:
-    """Pairs until a mean difference like the one seen, at least `smallest`, would be found.
+    """Returns the pairs until a mean difference like the one seen, at least `smallest`, would be found.
 
     By the normal approximation at 5 %, two-sided; None when the pairs do not vary or beyond 10 000.
     """
@@ -244,9 +244,9 @@ def pairs_needed(comparison: Comparison, smallest: float, power: float = 0.8) ->
 
 
 def mcnemar(only_a: int, only_b: int) -> float:
-    """Exact two-sided p of paired yes/no outcomes from the pairs that differ (completion, X-9).
+    """Returns the exact two-sided p of paired yes/no outcomes from the pairs that differ (X-9).
 
-    Source: McNemar (1947), Psychometrika 12.
+    1 without such a pair. Source: McNemar (1947), Psychometrika 12.
     """
     if only_a + only_b == 0:
         return 1.0
@@ -254,7 +254,10 @@ def mcnemar(only_a: int, only_b: int) -> float:
 
 
 def clopper_pearson(k: int, n: int, confidence: float = CONFIDENCE) -> Interval:
-    """Exact limits of a share k of n. Source: Clopper and Pearson (1934), Biometrika 26."""
+    """Returns exact limits of a share k of n; 0 to 1 for n = 0.
+
+    Source: Clopper and Pearson (1934), Biometrika 26.
+    """
     require_range("successes", k, 0, n)
     if n == 0:
         return Interval(0.0, 1.0)
@@ -263,13 +266,16 @@ def clopper_pearson(k: int, n: int, confidence: float = CONFIDENCE) -> Interval:
 
 
 def share_bound(k: int, n: int, confidence: float = CONFIDENCE) -> float:
-    """Largest share that k of n leave possible, one-sided and exact. Source: as `clopper_pearson`."""
+    """Returns the largest share that k of n leave possible, one-sided and exact.
+
+    Source: as `clopper_pearson`.
+    """
     require_range("successes", k, 0, n)
     return 1.0 if k == n else float(stats.beta.ppf(confidence, k + 1, n - k))
 
 
 def median_time(times: ArrayLike, end: float) -> tuple[float, Interval | None]:
-    """Median of times that were watched until `end`, and its exact 95 % interval; inf: beyond it.
+    """Returns the median of times watched until `end`, and its exact 95 % interval; inf: beyond it.
 
     times (n,), n >= 1: inf or NaN where nothing happened. The limits are order statistics, so that
     no form of the distribution is assumed; fewer than six times have none. Source: Thompson
@@ -288,12 +294,15 @@ def median_time(times: ArrayLike, end: float) -> tuple[float, Interval | None]:
 
 
 def seeds_for_verdict(claims: int, alpha: float = 0.05) -> int:
-    """Least seeds with which a sign-change test can show any of so many claims, Holm-adjusted."""
+    """Returns the least seeds with which a sign-change test can show any of so many claims, Holm-adjusted."""
     return floor(1.0 + log2(max(claims, 1) / alpha)) + 1
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
-    """Adjusted p values of a family. Source: Holm (1979), Scandinavian Journal of Statistics 6."""
+    """Returns the adjusted p values of a family, in its order.
+
+    Source: Holm (1979), Scandinavian Journal of Statistics 6.
+    """
     p = np.asarray(p_values, dtype=np.float64)
     order = np.argsort(p, kind="stable")
     steps = (p.size - np.arange(p.size)) * p[order]
@@ -303,7 +312,10 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 
 def interval_text(interval: Interval | None, units: int | None = None, unit: str = "run") -> str:
-    """`95 % 0.1 to 1.46`; without limits what `no_limits_text` says, if the number of units is given."""
+    """Returns text such as `95 % 0.1 to 1.46`; without limits that of `no_limits_text`.
+
+    NO_LIMITS where the number of units is not given.
+    """
     if interval is not None:
         return f"95 % {range_text(interval)}"
     return NO_LIMITS if units is None else no_limits_text(units, unit)
@@ -315,7 +327,10 @@ def range_text(interval: Interval) -> str:
 
 
 def no_limits_text(units: int, unit: str = "run") -> str:
-    """`3 runs give no limits, 8 would`, `all 12 runs are alike, at most 22 % differ (95 %)`."""
+    """Returns text such as `3 runs give no limits, 8 would`.
+
+    From UNITS_FROM on: `all 12 runs are alike, at most 22 % differ (95 %)`.
+    """
     if units == 1:
         return f"1 {unit} says nothing of others"
     if units < UNITS_FROM:
@@ -325,9 +340,9 @@ def no_limits_text(units: int, unit: str = "run") -> str:
 
 
 def rate_text(rate: Rate, unit: str = "run", per: str = "run") -> str:
-    """`0.60 per run, 95 % 0.31 to 1.14 if variance/mean is at most 10`; without limits what stands for them.
+    """Returns text such as `0.60 per run, 95 % 0.31 to 1.14 if variance/mean is at most 10`.
 
-    unit: what `Rate.runs` are; per: the unit of exposure.
+    Without limits what stands for them. unit: what `Rate.runs` are; per: the unit of exposure.
     """
     text = f"{rate.rate:.2f} per {per}"
     if rate.interval is not None:
@@ -337,7 +352,7 @@ def rate_text(rate: Rate, unit: str = "run", per: str = "run") -> str:
 
 
 def runs_with_text(rate: Rate, unit: str = "run") -> str:
-    """`none of 10 runs had one, at most 26 % do (95 %)`: what holds however events clump."""
+    """Returns text such as `none of 10 runs had one, at most 26 % do (95 %)`, however events clump."""
     if rate.runs == 1:
         return f"1 {unit} says nothing of others"
     had = "none" if rate.runs_with == 0 else f"{rate.runs_with}"
@@ -359,7 +374,7 @@ def rate_remark(rate: Rate, unit: str = "run") -> str:
 
 
 def share_text(share: float, interval: Interval | None) -> str:
-    """`5.00 %, 95 % 0.1 to 14.6 %` of shares from 0 to 1."""
+    """Returns text such as `5.00 %, 95 % 0.1 to 14.6 %` of shares from 0 to 1."""
     if interval is None:
         return f"{100.0 * share:.2f} %, {interval_text(None)}"
     percent = Interval(100.0 * interval.low, 100.0 * interval.high)
@@ -367,12 +382,12 @@ def share_text(share: float, interval: Interval | None) -> str:
 
 
 def p_text(p: float | None) -> str:
-    """`p = 0.25`, `p < 0.001`; None: `no test below 6 pairs`."""
+    """Returns `p = 0.25` or `p < 0.001`; for None `no test below 6 pairs`."""
     if p is None:
         return f"no test below {EVER_SIGNIFICANT} pairs"
     return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
 
 
 def _plain(value: float) -> str:
-    """A finite number with three digits and no negative zero."""
+    """Returns a finite number as text with three digits and no negative zero."""
     return f"{value + 0.0:.3g}"

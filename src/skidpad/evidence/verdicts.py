@@ -49,22 +49,22 @@ class Finding:
 
     @property
     def test(self) -> str:
-        """Names of the tests that judge the finding."""
+        """Returns the names of the tests that judge the finding."""
         return "; ".join(dict.fromkeys(phrase for c in self.criteria for phrase in c.test))
 
     @property
     def margin(self) -> str:
-        """The amounts below which a difference does not matter."""
+        """Returns the amounts below which a difference does not matter, in words; "none" without any."""
         amounts = dict.fromkeys(a for c in self.criteria for a in c.amounts if a.value)
         return ", ".join(map(str, amounts)) or "none"
 
     @property
     def nature(self) -> str:
-        """Whether the effect is put in, in words."""
+        """Returns in words whether the simulation is built so or the effect emerges."""
         return f"By construction: {self.built_in}." if self.built_in else "Emergent."
 
     def contrasts(self, table: pl.DataFrame) -> list[Contrast]:
-        """One per criterion, or none at all: a claim is judged whole."""
+        """Returns one contrast per criterion, or none at all: a claim is judged whole."""
         drawn = [c for criterion in self.criteria if (c := criterion.draw(drop_unfinished(table)))]
         return drawn if len(drawn) == len(self.criteria) else []
 
@@ -84,7 +84,7 @@ class Judgement:
 def judge(
     findings: Sequence[Finding], results: Sequence[pl.DataFrame | None], refused: str = ""
 ) -> list[Judgement]:
-    """Judge a report's findings, each on its table (None: never run), Holm-adjusted together.
+    """Judges a report's findings, each on its table (None: never run), Holm-adjusted together.
 
     refused: why these runs allow no verdict at all; empty: they do.
     """
@@ -105,7 +105,7 @@ def judge(
 
 
 def _sides(contrasts: list[Contrast]) -> tuple[float, float]:
-    """p for and against a claim: all contrasts must show it, one suffices against it."""
+    """Returns p for and against a claim: all contrasts must show it, one suffices against it."""
     claimed = max(c.p_claimed for c in contrasts)
     return claimed, min(1.0, len(contrasts) * min(c.p_against for c in contrasts))
 

@@ -28,9 +28,9 @@ class Movers(NamedTuple):
 
 @inner_kernel
 def box_of(polygon: Floats, size: int) -> tuple[float, float, float, float]:
-    """Centre x, y and half length, half width of the box around a polygon in its own frame.
+    """Returns centre x, y and half length, half width in m of the box around a polygon in its own frame.
 
-    Vertices that are not numbers are left out; a shape without any is a point.
+    Only the first `size` vertices count, those that are not finite are left out; all 0.0 without any.
     """
     x0 = y0 = np.inf
     x1 = y1 = -np.inf
@@ -47,7 +47,10 @@ def box_of(polygon: Floats, size: int) -> tuple[float, float, float, float]:
 def _orient_box(
     points: Floats, heading: float, polygon: Floats, size: int, movers: Movers, i: int
 ) -> None:
-    """Fill row i of `movers` with the box of `polygon` carried along points (SAMPLES, 2)."""
+    """Fills row i of `movers` with the box of `polygon` carried along points (SAMPLES, 2).
+
+    heading: rad at the first point; it follows the motion, but is kept below V_STANDING and in reverse.
+    """
     cx, cy, half_l, half_w = box_of(polygon, size)
     movers.half[i, 0], movers.half[i, 1] = half_l, half_w
     c, s = np.cos(heading), np.sin(heading)
@@ -98,7 +101,7 @@ def _move_objects(
 
 
 def ego_movers(frame: ChannelFrame | None) -> Movers | None:
-    """The ego on its plan, one box; None without a place or a plan."""
+    """Returns the ego's box along its plan as one row; None without a frame, a finite pose or a plan."""
     if frame is None or not np.isfinite(frame.ego).all():
         return None
     movers = _movers(1)
@@ -108,7 +111,7 @@ def ego_movers(frame: ChannelFrame | None) -> Movers | None:
 
 
 def world_movers(frame: ChannelFrame | None) -> Movers | None:
-    """All objects of a channel on their predictions."""
+    """Returns the boxes of all objects of a channel along their predictions; None without a frame."""
     if frame is None:
         return None
     movers = _movers(len(frame.objects))

@@ -28,7 +28,10 @@ Nodes = dict[str, list[NodeEvidence]]  # by indicator, in the order of the table
 
 
 def evidence_of(table: pl.DataFrame) -> Nodes:
-    """What the indicator table of a drive says, indicator by indicator and subject by subject."""
+    """Returns by built-in indicator the evidence of each subject in a drive's table of indicators.
+
+    An indicator without rows has an empty list; those that packages added are left out.
+    """
     value = pl.col("value").drop_nulls()
     summed = table.group_by("indicator", "subject", maintain_order=True).agg(
         now=value.last(),
@@ -47,12 +50,15 @@ def evidence_of(table: pl.DataFrame) -> Nodes:
 
 
 def node_evidence(nodes: Nodes, statement: Statement) -> list[NodeEvidence]:
-    """Evidence for a statement."""
+    """Returns the evidence of all indicators that support a statement."""
     return [n for indicator in statement.indicators for n in nodes[indicator.value]]
 
 
 def evidence_lines(table: pl.DataFrame) -> Iterator[str]:
-    """The tree as text."""
+    """Yields the safety case as indented lines: claims, verdicts of statements, and their evidence.
+
+    A statement is supported without a violated cycle, else challenged; no evidence: never evaluated.
+    """
     case, everything = safety_case(), evidence_of(table)
     yield case.goal
     for argument in case.arguments:

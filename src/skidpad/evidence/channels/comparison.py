@@ -13,7 +13,11 @@ BLOCK = 100  # cycles that are resampled together, since neighbours are not inde
 
 
 def compare_drives(a: pl.DataFrame, b: pl.DataFrame) -> Iterator[str]:
-    """One line per indicator: paired mean difference with its interval, and violations of each."""
+    """Yields a line per indicator and subject: mean of b less a over common cycles, and violations of each.
+
+    a, b: tables of indicators of two drives. The interval is over blocks of BLOCK cycles. Raises
+    InputError, when first asked for a line, if the tables have nothing in common.
+    """
     keys = ["cycle", "indicator", "subject"]
     both = a.join(b, on=keys, suffix="_b", maintain_order="left")
     if both.is_empty():

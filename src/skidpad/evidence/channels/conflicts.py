@@ -20,7 +20,7 @@ CORNERS = 16  # of a square cut by eight lines, at most 12
 
 @inner_kernel
 def _axes(a: Floats, half_a: Floats, b: Floats, half_b: Floats, out: Floats) -> None:
-    """The four edge normals of two boxes and how far apart centres may be on each: out (4, 3)."""
+    """Writes into out (4, 3) two boxes' edge normals x, y and the m between centres at which they touch."""
     ac, as_, bc, bs = a[2], a[3], b[2], b[3]
     al, aw, bl, bw = half_a[0], half_a[1], half_b[0], half_b[1]
     cc, cs = abs(ac * bc + as_ * bs), abs(as_ * bc - ac * bs)
@@ -32,7 +32,10 @@ def _axes(a: Floats, half_a: Floats, b: Floats, half_b: Floats, out: Floats) -> 
 
 @inner_kernel
 def _entry(x: float, y: float, dx: float, dy: float, axes: Floats) -> float:
-    """Share of a step after which boxes (x, y) apart that move by (dx, dy) overlap; inf: never."""
+    """Returns the share of a step after which two boxes overlap; inf: never in this step.
+
+    x, y: m from one centre to the other; dx, dy: by how much that changes in the step; axes: of `_axes`.
+    """
     low, high = 0.0, 1.0
     for m in range(4):
         q = axes[m, 0] * x + axes[m, 1] * y
@@ -49,7 +52,10 @@ def _entry(x: float, y: float, dx: float, dy: float, axes: Floats) -> float:
 
 @inner_kernel
 def first_overlap(a: Floats, half_a: Floats, b: Floats, half_b: Floats) -> float:
-    """Time in s of the first overlap of two motions (SAMPLES, 4); inf when they never meet."""
+    """Returns the time in s of the first overlap of two motions (SAMPLES, 4); inf when they never meet.
+
+    half_a, half_b: (2,) half length and half width in m.
+    """
     axes = np.empty((4, 3))
     reach = half_a[0] + half_a[1] + half_b[0] + half_b[1]
     n = a.shape[0]
@@ -70,7 +76,10 @@ def first_overlap(a: Floats, half_a: Floats, b: Floats, half_b: Floats) -> float
 
 @inner_kernel
 def _cut_polygon(corners: Floats, n: int, c: float, cs: float, cu: float, out: Floats) -> int:
-    """The part of a polygon (n, 2) in (s, u) where c + cs s + cu u <= 0; how many corners it has."""
+    """Writes the part of a polygon where c + cs s + cu u <= 0 into `out`; returns its number of corners.
+
+    corners: (n, 2) in (s, u).
+    """
     m = 0
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
@@ -91,7 +100,10 @@ def _cut_polygon(corners: Floats, n: int, c: float, cs: float, cu: float, out: F
 def _shared_corners(
     a: Floats, i: int, half_a: Floats, b: Floats, j: int, half_b: Floats, axes: Floats, room: Floats
 ) -> int:
-    """Where a at share s of step i and b at share u of step j overlap: corners into room[0]."""
+    """Writes into room[0] the corners (s, u) of where two boxes overlap; returns how many there are.
+
+    s: share of step i of motion a, u: share of step j of motion b, each 0 to 1. 0 corners: no overlap.
+    """
     x, y = b[j, 0] - a[i, 0], b[j, 1] - a[i, 1]
     ax, ay = a[i + 1, 0] - a[i, 0], a[i + 1, 1] - a[i, 1]
     bx, by = b[j + 1, 0] - b[j, 0], b[j + 1, 1] - b[j, 1]
@@ -123,7 +135,7 @@ def _stride(motion: Floats) -> float:
 
 @kernel
 def encroachment(a: Floats, half_a: Floats, b: Floats, half_b: Floats) -> tuple[float, float]:
-    """Post-encroachment time of two motions (SAMPLES, 4) that never meet, and their nearness.
+    """Returns the post-encroachment time in s of two motions (SAMPLES, 4) that never meet, and nearness.
 
     The time is the smallest shift in s that makes them touch, inf above PET_SAFE. Nearness in
     [0, 1] is the greatest (1 - shift / PET_SAFE)(1 - t / HORIZON) over all places that both

@@ -37,22 +37,31 @@ INDICATORS = (
 def mean_above(
     label: str, value: pl.Expr, margin: Amount = NONE, where: pl.Expr | None = None
 ) -> Mean:
-    """The mean over segments is positive."""
+    """Returns a test of whether the mean of `value` over drive segments is above 0.
+
+    margin: the smallest amount that matters; where: the segments that count, None: all.
+    """
     return Mean(label=label, value=value, margin=margin, where=where, over="drive segments")
 
 
 def share_above(label: str, hits: pl.Expr, cases: pl.Expr, limit: float | pl.Expr) -> Mean:
-    """hits / cases > limit, over segments with cases: mean of hits - limit * cases."""
+    """Returns a test of whether hits / cases is above `limit`, over segments with cases.
+
+    It is judged by the mean of hits - limit * cases.
+    """
     return mean_above(label, hits - limit * cases, where=cases > 0.0)
 
 
 def sum_counts(kind: str, *hazards: HazardType) -> pl.Expr:
-    """tp, fp or fn of a segment."""
+    """Returns an expression: the sum over hazards of a segment's counts of `kind` (tp, fp or fn)."""
     return sum((pl.col(f"{kind}_{h.value}").cast(pl.Float64) for h in hazards), pl.lit(0.0))
 
 
 def errors_above(hard: HazardType, easy: HazardType) -> Mean:
-    """The share of errors is larger for `hard`: errors less the share of `easy`, per segment."""
+    """Returns a test of whether the share of errors is larger for hazard `hard` than for `easy`.
+
+    Errors are fp + fn of tp + fp + fn; the share of `easy` is that of all segments together.
+    """
     (wrong, cases), (wrong_easy, cases_easy) = (
         (fp + fn, tp + fp + fn)
         for tp, fp, fn in ([sum_counts(k, h) for k in ("tp", "fp", "fn")] for h in (hard, easy))
@@ -62,7 +71,7 @@ def errors_above(hard: HazardType, easy: HazardType) -> Mean:
 
 
 def violations(*indicators: Indicator) -> pl.Expr:
-    """Mean of the violation events of some indicators in a segment."""
+    """Returns an expression: violation events in a segment, averaged over the indicators."""
     columns = (pl.col(f"violations_{i.value}").cast(pl.Float64) for i in indicators)
     return sum(columns, pl.lit(0.0)) / len(indicators)
 

@@ -21,7 +21,10 @@ class Usable(NamedTuple):
 
 
 def usable(frame: ChannelFrame, limit: int = OBJECT_LIMIT) -> Usable:
-    """`frame` without objects that are not numbers and, of very many, without the farthest."""
+    """Returns the frame without objects that are not finite and, above `limit`, without the farthest.
+
+    It comes with the counts of what was left out; the same frame where nothing was.
+    """
     objects = frame.objects
     n = len(objects)
     if n <= limit and np.isfinite(objects).all():

@@ -115,7 +115,7 @@ class Clause:
 
     @classmethod
     def parse(cls, text: str) -> Clause:
-        """Reads a clause such as "gap > 0.3"; ConfigError says what is wrong."""
+        """Returns the clause in a text such as "gap > 0.3"; raises ConfigError for any other form."""
         try:
             signal, symbol, value = text.split()
             if symbol not in _OPERATORS:
@@ -128,7 +128,7 @@ class Clause:
             ) from None
 
     def holds(self, signals: dict[Signal, float]) -> bool | None:
-        """Whether the clause holds; None while its signal is not evaluated."""
+        """Returns whether the clause holds; None while its signal is not evaluated."""
         value = signals[self.signal]
         return None if np.isnan(value) else _OPERATORS[self.operator](value, self.value)
 
@@ -162,7 +162,7 @@ class Rule:
     extreme: Extreme
 
     def fires(self, signals: dict[Signal, float]) -> bool | None:
-        """True, False, or None while it cannot be decided."""
+        """Returns True where an alternative holds, False where none can; None while it cannot be decided."""
         verdict: bool | None = False
         for clauses in self.alternatives:
             held = [clause.holds(signals) for clause in clauses]
@@ -174,7 +174,10 @@ class Rule:
 
 
 def load_rules(profile: Profile, path: Path | None = None) -> tuple[Rule, ...]:
-    """The rules of `profile`: the built-in ones, or those of the file at `path`."""
+    """Returns the built-in rules of `profile`, or those in the YAML file at `path`.
+
+    Raises ConfigError when the file lacks the profile or a clause is not usable.
+    """
     if path is None:
         return _own_rules(profile)
     return _rules(profile, read_bytes(path, "hazard rules"), str(path))
@@ -188,7 +191,7 @@ def _own_rules(profile: Profile) -> tuple[Rule, ...]:
 
 
 def load_only_rules(path: Path) -> tuple[Profile, tuple[Rule, ...]]:
-    """Returns the one profile that the file at `path` holds, and its rules."""
+    """Returns the one profile that the file at `path` holds, and its rules; ConfigError for more or none."""
     tables = _tables(read_bytes(path, "hazard rules"), str(path))
     if len(tables) != 1:
         raise ConfigError(f"{path}: must hold the rules of one profile, holds {len(tables)}")
@@ -243,7 +246,10 @@ class SignalReader:
     def read(
         self, t: float, readings: IndicatorReadings, risk: RiskMatrix, driving: int | None
     ) -> SignalReadings:
-        """The signals at `t`; without a recorded driving channel, that of the highest score."""
+        """Returns the signals of the cycle at `t` s, NaN where not evaluated; to be called once per cycle.
+
+        driving: number of the channel that drives; None: the one with the highest safety score is taken.
+        """
         scores = readings[Indicator.SAFETY_SCORE]
         comfort = readings[Indicator.PLANNED_PATH_COMFORT]
         if driving is None:
@@ -275,7 +281,11 @@ class SignalReader:
 
 
 def _largest_gap(readings: IndicatorReadings) -> tuple[float, int | None, bool]:
-    """OLSS - OCSS of the pair where it is largest by size, that pair, and whether assumed."""
+    """Returns location less count similarity of objects of the pair where it is largest by size.
+
+    Besides, the pair's number, and whether the location counted as 1 for want of matched objects.
+    (nan, None, False) where no pair was evaluated.
+    """
     count = readings[Indicator.OBJECT_COUNT]
     location = readings[Indicator.OBJECT_LOCATION]
     best, best_pair, best_assumed = float("nan"), None, False
@@ -304,7 +314,10 @@ class _Steadiness:
     def update(
         self, t: float, readings: IndicatorReadings, values: dict[Signal, float]
     ) -> dict[Signal, float]:
-        """Takes in a cycle's values at `t` s and returns the signals over the last 20 s; nan until known."""
+        """Takes in a cycle's values at `t` s and returns the signals over the last 20 s; nan until known.
+
+        A step back in time, or of more than 2 s, starts anew.
+        """
         count = _least(readings[Indicator.OBJECT_COUNT])
         row = np.concatenate([[values[Signal.SAFETY_SCORE], count], readings.values[self.steady]])
         if self.blocks and not 0.0 <= t - self.blocks[-1][0] <= 2.0:

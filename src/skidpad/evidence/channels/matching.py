@@ -41,9 +41,10 @@ class Matching:
 
 
 def match(detected: Sequence[Span], true: Sequence[Span], tolerance: float = 1.0) -> Matching:
-    """Pairs as many as possible of the same hazard and object that overlap within `tolerance` s.
+    """Pairs as many spans as possible of the same hazard and object that overlap within `tolerance` s.
 
-    Every detection and every truth is in at most one pair; the surplus is false or missed.
+    Every detection and every truth is in at most one pair; the surplus is false or missed. Spans that
+    name no object match any.
     """
     if not detected or not true:
         return Matching((), tuple(range(len(detected))), tuple(range(len(true))))
@@ -75,12 +76,12 @@ class Weighed(NamedTuple):
 
     @property
     def recall(self) -> float | None:
-        """Share found, each counted as often as it occurs; None without a true hazard."""
+        """Returns the share found, each counted as often as it occurs; None without a true hazard."""
         return self.found / self.true if self.true > 0.0 else None
 
     @property
     def size(self) -> float:
-        """Effective sample size: so many equally weighted hazards say as much (Kish 1965)."""
+        """Returns the effective sample size: so many equally weighted hazards say as much (Kish 1965)."""
         return self.true * self.true / self.squares if self.squares > 0.0 else 0.0
 
 
@@ -107,24 +108,24 @@ class Tally:
 
     @property
     def precision(self) -> float | None:
-        """TP / (TP + FP); None without a detection."""
+        """Returns TP / (TP + FP); None without a detection."""
         return self.tp / (self.tp + self.fp) if self.tp + self.fp else None
 
     @property
     def recall(self) -> float | None:
-        """TP / (TP + FN); None without a true hazard."""
+        """Returns TP / (TP + FN); None without a true hazard."""
         return self.tp / (self.tp + self.fn) if self.tp + self.fn else None
 
     @property
     def false_alarms_per_hour(self) -> float | None:
-        """False alarms per hour of evaluated driving."""
+        """Returns false alarms per hour of evaluated driving; None without driving."""
         return self.fp / self.hours if self.hours > 0.0 else None
 
 
 def tally(
     detected: Sequence[Span], true: Sequence[Span], hours: float, tolerance: float = 1.0
 ) -> dict[HazardType, Tally]:
-    """Counts per hazard of one segment."""
+    """Returns the counts of one segment by hazard, with one entry for every HazardType."""
     out = {}
     for hazard in HazardType:
         d = [s for s in detected if s.hazard is hazard]
@@ -151,9 +152,10 @@ class Score:
 
 
 def score(segments: Sequence[Tally]) -> Score:
-    """Sum of segments; events within a drive are dependent, so resampling is over segments (X-9).
+    """Returns the score of one hazard over segments, with intervals over segments.
 
-    With events in one segment only, the interval is that of a single binomial count.
+    Events within a drive are dependent, so resampling is over segments (X-9). With events in one
+    segment only, the interval is that of a single binomial count.
     """
     return Score(
         sum(segments, Tally()),
@@ -164,7 +166,10 @@ def score(segments: Sequence[Tally]) -> Score:
 
 
 def _weighed_interval(known: Sequence[Weighed]) -> Interval | None:
-    """Limits of the weighted recall; where all or none were found, exact ones of the effective size."""
+    """Returns limits of the weighted recall; exact ones of the effective size where all or none were found.
+
+    None without a true hazard. known: of the segments that have one.
+    """
     total = Weighed(*(sum(column) for column in zip(*known, strict=True))) if known else Weighed()
     if total.recall is None:
         return None
@@ -175,7 +180,7 @@ def _weighed_interval(known: Sequence[Weighed]) -> Interval | None:
 
 
 def _interval(counts: Sequence[tuple[int, int]]) -> Interval | None:
-    """Limits of the ratio of sums over segments of (hits, cases)."""
+    """Returns limits of the ratio of sums over segments of (hits, cases); None without a case."""
     known = [(k, n) for k, n in counts if n]
     if not known:
         return None
@@ -192,7 +197,7 @@ def _share_limits(hits: Sequence[float], cases: Sequence[float]) -> Interval | N
 
 
 def macro(scores: Mapping[HazardType, Score]) -> tuple[float | None, float | None]:
-    """Means of the hazards' precisions and recalls, over those that have one (C-216)."""
+    """Returns means of the hazards' precisions and recalls, over those that have one (C-216); else None."""
     return (
         _mean([s.total.precision for s in scores.values()]),
         _mean([s.total.recall for s in scores.values()]),
@@ -200,13 +205,13 @@ def macro(scores: Mapping[HazardType, Score]) -> tuple[float | None, float | Non
 
 
 def micro(scores: Mapping[HazardType, Score]) -> tuple[float | None, float | None]:
-    """Precision and recall of all hazards' counts together (C-216)."""
+    """Returns precision and recall of all hazards' counts together (C-216); None where not defined."""
     total = sum((s.total for s in scores.values()), Tally())
     return total.precision, total.recall
 
 
 def percent(ratio: float) -> str:
-    """Percent with two decimals, rounded half up (C-214)."""
+    """Returns a ratio as text in percent with two decimals, rounded half up, without a sign (C-214)."""
     value = (Decimal(str(ratio)) * 100).quantize(Decimal("0.01"), ROUND_HALF_UP)
     return f"{value}"
 
@@ -218,7 +223,10 @@ def _mean(values: Sequence[float | None]) -> float | None:
 
 
 def merge_spans(spans: Iterable[Span], pause: float = 2.0) -> list[Span]:
-    """Spans of one hazard whose pause is under `pause` s, as one (decision C-5)."""
+    """Returns the spans with those of one hazard whose pause is under `pause` s as one (decision C-5).
+
+    A merged span has weight 1 and the objects of all its parts.
+    """
     out: list[Span] = []
     for s in sorted(spans, key=lambda s: (s.hazard.value, s.t_start)):
         last = out[-1] if out else None

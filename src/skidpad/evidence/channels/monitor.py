@@ -57,7 +57,7 @@ class Unusable:
     shapes: Counter[str] = field(default_factory=Counter)  # objects without an area
 
     def as_dict(self) -> dict[str, dict[str, int]]:
-        """Counts above zero by kind and channel."""
+        """Returns the counts above zero by kind and channel."""
         kinds = ("absent", "poses", "plans", "objects", "objects_beyond_limit", "shapes")
         return {kind: dict(+getattr(self, kind)) for kind in kinds}
 
@@ -87,7 +87,7 @@ class MonitorSettings:
 
     @property
     def safe_distance(self) -> SafeDistance:
-        """The safe distance of the rules `tracked`, on the stated grip or on a dry road."""
+        """Returns the safe distance of the rules `tracked`, on the stated grip or on a dry road."""
         return SafeDistance() if self.grip is None else SafeDistance.on(self.grip)
 
 
@@ -132,7 +132,10 @@ class Monitor:
         self._missing, self._violated = np.zeros((2, len(self.layout.places)), dtype=np.int64)
 
     def update(self, cycle: Cycle, lap: Lap = no_lap) -> CycleEvidence:
-        """Judge one cycle. `lap(name)` is called when the part `name` is done, for profiling."""
+        """Judges one cycle and returns all that was found in it; adds its hazards, violations and records.
+
+        `lap(name)` is called when the part `name` is done, for profiling.
+        """
         kept = [None if f is None else usable(f) for f in cycle.frames]
         frames = [None if u is None else u.frame for u in kept]
         self._count_unusable(kept)
@@ -190,21 +193,21 @@ class Monitor:
         return self.learned.update(t, feature_row(readings, risk, signals))
 
     def note(self, entries: dict[str, str]) -> None:
-        """Words about the drive, copied into records; nothing is judged by them."""
+        """Adds words about the drive, which are copied into records; nothing is judged by them."""
         if self._recorder:
             self._recorder.context.update(entries)
 
     @property
     def context(self) -> dict[str, str]:
-        """Words about the drive so far."""
+        """Returns the words about the drive so far; {} when no records are kept."""
         return dict(self._recorder.context) if self._recorder else {}
 
     def records(self) -> list[HazardRecord]:
-        """Records that have closed since the last call."""
+        """Returns the records that have closed since the last call; [] when none are kept."""
         return self._recorder.take() if self._recorder else []
 
     def finish(self) -> list[HazardRecord]:
-        """The records still open at the end of the drive, flagged as cut."""
+        """Closes the records that are still open at the end of the drive and returns them, flagged as cut."""
         return self._recorder.finish() if self._recorder else []
 
     def _count_unusable(self, kept: Sequence[Usable | None]) -> None:
@@ -237,12 +240,12 @@ class Monitor:
 
     @property
     def not_evaluated(self) -> Counter[Place]:
-        """Cycles in which an indicator had no value, by indicator and subject."""
+        """Returns in how many cycles an indicator had no value, by indicator and subject; none at 0."""
         return self._tally(self._missing)
 
     @property
     def violation_cycles(self) -> Counter[Place]:
-        """Cycles in which an indicator was beyond its threshold."""
+        """Returns in how many cycles an indicator was beyond its threshold, by indicator and subject."""
         return self._tally(self._violated)
 
     def _tally(self, cycles: NDArray[np.int64]) -> Counter[Place]:
@@ -250,7 +253,7 @@ class Monitor:
         return Counter({self.layout.places[k]: int(cycles[k]) for k in np.flatnonzero(cycles)})
 
     def _bounds(self) -> tuple[Floats, Floats]:
-        """Least and greatest value at each place that raises no alarm."""
+        """Returns least and greatest value at each place of a row that raise no alarm; inf: no bound."""
         low, high = np.full((2, len(self.layout.places)), [[-np.inf], [np.inf]])
         for k, place in enumerate(self.layout.places):
             entry = self.thresholds[place.indicator]
@@ -262,7 +265,7 @@ class Monitor:
 def drive_events(
     monitor: Monitor,
 ) -> tuple[list[Event[HazardType]], list[Event[Place]]]:
-    """All hazard events and threshold-violation events of a finished drive, by start."""
+    """Returns all hazard events and all threshold-violation events of a drive, each by start; ends them."""
     hazards = sorted(monitor.hazards.finish(), key=lambda e: (e.t_start, e.key.value))
     violations = sorted(
         monitor.violations.finish(), key=lambda e: (e.t_start, e.key[0].value, e.key[1])
@@ -284,7 +287,10 @@ class GhostCue:
         self._shared: list[set[int]] = [set() for _ in channels]  # ids that another channel knew
 
     def update(self, frames: Sequence[ChannelFrame | None], shared: Sequence[set[int]]) -> None:
-        """Takes in one cycle; `shared` holds per channel the rows that were paired with another channel."""
+        """Takes in one cycle; `shared` holds per channel the rows that were paired with another channel.
+
+        An object counts in `brief` when it goes within MOMENT of its first cycle and was never shared.
+        """
         for c, frame in enumerate(frames):
             if frame is None:  # nobody can say what happened to its objects
                 self._since[c].clear()

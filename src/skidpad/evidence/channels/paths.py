@@ -10,7 +10,7 @@ from skidpad.core.jit import inner_kernel, kernel
 
 @inner_kernel
 def usable_length(times: Floats, points: Floats) -> int:
-    """Leading rows that are finite and strictly later than the row before them.
+    """Returns how many leading rows are finite and strictly later than the row before them.
 
     times (m,) s, points (m, 2). What follows the first bad row is not trusted.
     """
@@ -25,11 +25,11 @@ def usable_length(times: Floats, points: Floats) -> int:
 def sample_path(
     times: Floats, points: Floats, start: Floats, t_start: float, step: float, out: Floats
 ) -> int:
-    """Positions on a path at t_start + i * step, into out (m, 2).
+    """Writes positions on a path at t_start + i * step s into out (m, 2); returns how many lie in it.
 
     times (k,) and points (k, 2) begin after or at time 0, where the mover is at `start` (x, y, _,
-    vx, vy). Beyond the end the last velocity is held (C-073). Returns how many samples, counted
-    from the first, lie within the path's own duration: 0 when it has no usable point.
+    vx, vy). Beyond the end the last velocity is held (C-073). The samples, counted from the first,
+    lie within the path's own duration: 0 when it has no usable point.
     """
     k = usable_length(times, points)
     # velocity after the end: of the last segment, else of the mover itself
@@ -70,7 +70,7 @@ def sample_path(
 
 @kernel
 def sample_plan(plan: Floats, ego: Floats, t_start: float, step: float, out: Floats) -> int:
-    """`sample_path` for a plan (m, 3) of x, y, t and its ego (5,)."""
+    """Writes samples of a plan (m, 3) of x, y, t and its ego (5,) into `out`, as `sample_path` does."""
     return sample_path(plan[:, 2].copy(), plan[:, :2].copy(), ego, t_start, step, out)
 
 
@@ -84,6 +84,10 @@ def sample_predictions(
     out: Floats,
     inside: Ints,
 ) -> None:
-    """`sample_path` for each of n objects: objects (n, 5), predictions (n, p, 2), out (n, m, 2)."""
+    """Writes samples of the predictions of n objects into out (n, m, 2), as `sample_path` does.
+
+    objects (n, 5), predictions (n, p, 2) at prediction_t (p,) s; inside (n,) is written, too: how
+    many samples lie within each prediction.
+    """
     for i in range(objects.shape[0]):
         inside[i] = sample_path(prediction_t, predictions[i], objects[i], t_start, step, out[i])

@@ -72,7 +72,7 @@ class Recorder:
         self.number = 0
 
     def update(self, cycle: Cycle, evidence: CycleEvidence) -> None:
-        """Add the cycle to the past and to all open hazards."""
+        """Adds the cycle to the past and to all open hazards; closes those whose AFTER s are over."""
         cycle = cycle._replace(truth=None)  # a record holds what channels said
         t = cycle.t
         for hazard, one in list(self.open.items()):
@@ -151,7 +151,7 @@ class Recorder:
         return done
 
     def finish(self) -> list[HazardRecord]:
-        """Close everything; what has not had its 5 s after is cut."""
+        """Closes everything and returns it; what has not had its AFTER s is flagged as cut."""
         for hazard in list(self.open):
             one = self.open[hazard]
             one.cut |= not one.worlds or one.worlds[-1].t - one.t_end < AFTER - SAME_TIME
@@ -162,7 +162,10 @@ class Recorder:
 def _name_involved(
     hazard: HazardType, one: _Open, channels: tuple[str, ...]
 ) -> tuple[tuple[str, ...], tuple[InvolvedObject, ...]]:
-    """Channels and objects that a record names."""
+    """Returns the channels and objects that a record names: those of the worst risk on its side.
+
+    For localisation, or without any risk, the pair with the largest gap, else all channels; no object.
+    """
     if hazard is HazardType.INCONSISTENT_LOCALISATION or not np.isfinite(one.risk.risk).any():
         pair = one.signals.gap_pair
         names = channels if pair is None else _pair(channels, pair)

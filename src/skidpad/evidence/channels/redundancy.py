@@ -35,7 +35,10 @@ class Difference:
 
 
 def compare_drivers(outcomes: Sequence[DriveOutcome]) -> list[DriverRow]:
-    """Rates per driver over the routes and seeds that every driver has: paired by seed (X-8)."""
+    """Returns rates per driver over the routes and seeds that every driver has: paired by seed (X-8).
+
+    Without a shared one the rates are empty.
+    """
     runs = _by_driver(outcomes)
     shared = set.intersection(*(set(r) for r in runs.values())) if runs else set()
     rows = []
@@ -53,7 +56,7 @@ def compare_drivers(outcomes: Sequence[DriveOutcome]) -> list[DriverRow]:
 
 
 def differences(outcomes: Sequence[DriveOutcome]) -> list[Difference]:
-    """Each channel alone less the arbiter where both drove the same route and seed."""
+    """Returns each channel alone less the arbiter where both drove the same route and seed, per event."""
     runs = _by_driver(outcomes)
     arbiter = runs.pop(ARBITER, {})
     found = []

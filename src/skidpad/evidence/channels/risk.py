@@ -73,12 +73,12 @@ class RiskMatrix:
 
     @property
     def safety_scores(self) -> Floats:
-        """(n,) 1 - max over worlds of the risk (C-094); NaN without plan or world."""
+        """Returns (n,) 1 - max over worlds of the risk (C-094); NaN without plan or world."""
         return np.array([1.0 - _worst_known(row) for row in self.risk.tolist()])
 
     @property
     def behind_share(self) -> Floats:
-        """(n,) share of the risk that objects behind add beyond those ahead; NaN without risk."""
+        """Returns (n,) the share of the risk that objects behind add beyond those ahead; NaN without risk."""
         out = []
         for row, row_ahead in zip(self.risk.tolist(), self.risk_ahead.tolist(), strict=True):
             worst = _worst_known(row)
@@ -99,7 +99,7 @@ def printed_risk(ttc: float, pet: float) -> float:
 
 @kernel
 def ordered_risk(ttc: float, nearness: float) -> float:
-    """Risk of a hit after `ttc` s, or, where that is inf, of a miss with `nearness` in [0, 1]."""
+    """Returns the risk of a hit after `ttc` s, or, where that is inf, of a miss with `nearness` in [0, 1]."""
     if ttc == np.inf:
         return MISS_MOST * nearness
     return MISS_MOST + (1.0 - MISS_MOST) * max(1.0 - ttc / HORIZON, 0.0)
@@ -107,7 +107,7 @@ def ordered_risk(ttc: float, nearness: float) -> float:
 
 @kernel
 def braking_needed(gap: float, way: float, v: float, v_lead: float) -> float:
-    """m/s^2 that a follower needs when its lead brakes at `LEAD_BRAKE`; inf: none is enough.
+    """Returns the m/s^2 that a follower needs when its lead brakes at LEAD_BRAKE; inf: none is enough.
 
     gap: m, bumper to bumper. way: m that the follower drives in the response time, v: its speed then,
     v_lead: that of the lead now, m/s, at least 0. Source: RSS, lemma 2, solved for the braking.
@@ -120,7 +120,11 @@ def braking_needed(gap: float, way: float, v: float, v_lead: float) -> float:
 
 @kernel
 def close_risk(gap: float, way: float, v: float, v_lead: float) -> float:
-    """Risk of following at `gap` m: from 0 where braking as the lead does is enough to `CLOSE_MOST`."""
+    """Returns the risk of following: 0 where braking as the lead does is enough, CLOSE_MOST from HARDEST on.
+
+    gap: m, bumper to bumper; way: m driven in the response time; v: m/s after it; v_lead: m/s of the
+    lead now, at least 0.
+    """
     needed = min(braking_needed(gap, way, v, v_lead), HARDEST)
     return CLOSE_MOST * max(needed - LEAD_BRAKE, 0.0) / (HARDEST - LEAD_BRAKE)
 
@@ -129,9 +133,9 @@ def close_risk(gap: float, way: float, v: float, v_lead: float) -> float:
 def _following_risk(
     motion: Floats, half: Floats, lead: Floats, lead_half: Floats, v_lead: float
 ) -> float:
-    """Risk of a box that moves as `motion` (SAMPLES, 4) behind one that now is at `lead` (4,).
+    """Returns the risk of a box that moves as `motion` (SAMPLES, 4) behind one that now is at `lead` (4,).
 
-    0 where it does not follow it. v_lead: m/s along its heading.
+    0 where it does not follow it. half, lead_half: (2,) m; v_lead: m/s along its heading.
     """
     me = motion[0]
     if me[2] * lead[2] + me[3] * lead[3] < SAME_WAY:
@@ -155,7 +159,10 @@ def _following_risk(
 def _judge(
     ego: Movers, world: Movers, objects: Floats, pose: Floats, printed: bool, out: Floats
 ) -> None:
-    """TTC, PET, whether behind, and risk of each object into out (n, 4)."""
+    """Writes TTC in s, PET in s, 1 for behind, and risk of each object into out (n, 4).
+
+    pose: (5,) of the ego; times are inf where there is none.
+    """
     c, s = np.cos(pose[2]), np.sin(pose[2])
     mine = ego.bounds[0]
     for i in range(objects.shape[0]):
@@ -184,7 +191,10 @@ def _judge(
 
 @kernel
 def _worst(judged: Floats) -> tuple[float, float, float, float, float, int, int]:
-    """Risk ahead and behind, TTC ahead and behind, least PET, worst objects ahead and behind."""
+    """Returns risk ahead and behind, TTC ahead and behind, least PET, worst objects ahead and behind.
+
+    judged: (n, 4) of `_judge`. An object is -1 where there is no risk on its side.
+    """
     ahead = behind = 0.0
     ttc_ahead = ttc_behind = pet = np.inf
     i_ahead = i_behind = -1
@@ -218,7 +228,7 @@ def risk_matrix(
     per_object: bool = False,
     form: RiskForm = RiskForm.RECOMMENDED,
 ) -> RiskMatrix:
-    """Risk of every channel's plan in every channel's world.
+    """Returns the risk of every channel's plan in every channel's world.
 
     `frames` as in a cycle: None for an absent channel, whose row and column stay NaN. Objects must
     be finite (see `frames.usable`). `per_object` keeps each object's times as well.
@@ -254,5 +264,5 @@ def risk_matrix(
 
 
 def safety_scores(frames: Sequence[ChannelFrame | None]) -> Floats:
-    """(n,) safety score of each channel's plan in [0, 1]; NaN: not evaluated (C-094, C-095)."""
+    """Returns (n,) the safety score of each channel's plan in [0, 1]; NaN: not evaluated (C-094, C-095)."""
     return risk_matrix([usable(frame).frame if frame else None for frame in frames]).safety_scores

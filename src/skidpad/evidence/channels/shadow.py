@@ -18,7 +18,7 @@ HARDEST = 8.0  # m/s^2 of a full brake; 0.15 of it, where braking begins, are 1.
 
 
 def planned_braking(frame: ChannelFrame | None) -> float:
-    """Share of a full brake that a channel plans for the next second; NaN without a plan that long.
+    """Returns the share of a full brake that a channel plans for the next second; NaN for a shorter plan.
 
     The deceleration is the one under which the plan's way of AHEAD s begins at the channel's speed.
     """
@@ -32,7 +32,7 @@ def planned_braking(frame: ChannelFrame | None) -> float:
 
 
 def plans_of(cycles: Iterable[Cycle], shadow: int) -> tuple[Floats, Pedals, Pedals]:
-    """(T,) times, and the braking planned by the driving channel and by channel `shadow`.
+    """Returns (T,) times in s, and the braking that the driving channel and channel number `shadow` plan.
 
     Moments count while another channel drives; the others are NaN in both.
     """

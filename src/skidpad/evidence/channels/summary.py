@@ -27,7 +27,7 @@ class Watched:
 
 
 def columns(monitor: Monitor) -> list[Column]:
-    """What each place of the readings is, for their log."""
+    """Returns what each place of the readings is, for their log."""
     return [
         Column(
             indicator.value,
@@ -41,7 +41,7 @@ def columns(monitor: Monitor) -> list[Column]:
 
 
 def summarise_drive(monitor: Monitor, losses: Losses, seconds: float, n: int) -> Watched:
-    """The outcome of a drive of n cycles that has ended."""
+    """Returns the outcome of a drive of n cycles and so many seconds that has ended; ends its events."""
     hazards, violations = drive_events(monitor)
     beyond = _count_keys([e.key for e in violations])
     summary = {
@@ -72,7 +72,7 @@ def summarise_drive(monitor: Monitor, losses: Losses, seconds: float, n: int) ->
 
 
 def _audit(monitor: Monitor, events: dict[Place, int]) -> list[dict[str, Any]]:
-    """Per indicator and subject: claim, threshold, violations and cycles without a value (C-17)."""
+    """Returns per indicator and subject claim, threshold, violations and cycles without a value (C-17)."""
     missing, beyond = monitor.not_evaluated, monitor.violation_cycles
     return [
         {

@@ -31,7 +31,7 @@ class TimeFilter(Generic[Key]):
         self.closed: list[Event[Key]] = []
 
     def add(self, key: Key, t: float, value: float, least: bool) -> bool:
-        """A detection at `t`, not earlier than the one before; True when it begins an event.
+        """Adds a detection at `t` s, not earlier than the one before; returns True when it begins an event.
 
         The event keeps the least or the greatest value; NaN is a value that was not there.
         """
@@ -49,7 +49,7 @@ class TimeFilter(Generic[Key]):
         return False
 
     def advance(self, t: float) -> list[Event[Key]]:
-        """Events that no detection at `t` or later can extend; each is handed out once."""
+        """Returns the events that no detection at `t` s or later can extend; each is handed out once."""
         for key in [
             k for k, event in self.open.items() if t - event.t_end >= self.pause - SAME_TIME
         ]:
@@ -58,5 +58,5 @@ class TimeFilter(Generic[Key]):
         return done
 
     def finish(self) -> list[Event[Key]]:
-        """Returns all events that remain."""
+        """Ends and returns all events that were not handed out yet."""
         return self.advance(float("inf"))

@@ -27,14 +27,14 @@ class Stopwatch(Protocol):
         """Starts the measurements of a cycle."""
 
     def lap(self, name: str) -> None:
-        """The part `name` of the cycle is done."""
+        """Notes that the part `name` of the cycle is done."""
 
     def table(self) -> pl.DataFrame:
         """Returns a row of TIMES per cycle."""
 
 
 def timing_statistics(timing: pl.DataFrame) -> pl.DataFrame:
-    """The table of C-233: per module mean, extremes, deviation and shares against its threshold.
+    """Returns the table of C-233: per module mean, extremes, deviation and shares against its threshold.
 
     Threshold of the total: 25 ms; of a module: its own maximum. "Within 90 %" is 0.9 T <= t <= T
     (C-234, DC-64).
@@ -48,7 +48,10 @@ def timing_statistics(timing: pl.DataFrame) -> pl.DataFrame:
 
 
 def time_figures(t: NDArray[np.float64], module: str) -> dict[str, float]:
-    """Mean, extremes and deviation of times (k,) in ms, and shares against the module's threshold."""
+    """Returns mean, extremes and deviation of times (k,) in ms, and shares against the module's threshold.
+
+    The threshold is BUDGET_MS for `total`, else the largest of the times.
+    """
     return {
         "mean_ms": float(t.mean()),
         "max_ms": float(t.max()),
@@ -59,7 +62,7 @@ def time_figures(t: NDArray[np.float64], module: str) -> dict[str, float]:
 
 
 def time_shares(t: NDArray[np.float64], limit: float) -> dict[str, float]:
-    """Percent of times (k,) in ms above the threshold, within 90 % of it and under half of it."""
+    """Returns the percent of times (k,) in ms above the limit, within 90 % of it and under half of it."""
     return {
         "breaches_pct": float(100.0 * (t > limit).mean()),
         "within_90_pct": float(100.0 * ((t >= 0.9 * limit) & (t <= limit)).mean()),
@@ -68,7 +71,7 @@ def time_shares(t: NDArray[np.float64], limit: float) -> dict[str, float]:
 
 
 def time_by_objects(timing: pl.DataFrame) -> pl.DataFrame:
-    """Mean time per module against the number of objects of all channels (C-238)."""
+    """Returns mean times in ms per module by the number of objects of all channels, rising (C-238)."""
     return (
         timing.group_by("objects", maintain_order=True)
         .agg(pl.len().alias("cycles"), pl.col("total", *MODULES).mean())
@@ -90,7 +93,7 @@ FAULTS_MANY = 64  # in a cycle; a warm one has next to none
 
 
 def late_cycles(timing: pl.DataFrame) -> pl.DataFrame:
-    """Cycles of a live drive whose judgement came over 25 ms after their last word, with causes.
+    """Returns the cycles of a live drive judged over BUDGET_MS after their last message, with causes.
 
     timing: LIVE_TIMES; waited_ms: in the queue for a processor.
     """
@@ -112,7 +115,7 @@ def late_cycles(timing: pl.DataFrame) -> pl.DataFrame:
 
 
 def delay_sentence(timing: pl.DataFrame) -> str:
-    """How long after its last word a cycle was judged, and why some came late."""
+    """Returns in words how long after its last message a cycle was judged, and why some came late."""
     wall = timing["wall_ms"].to_numpy()
     causes = late_cycles(timing)["cause"].value_counts(sort=True).rows()
     late = ", ".join(f"{n} {cause}" for cause, n in sorted(causes, key=lambda c: (-c[1], c[0])))

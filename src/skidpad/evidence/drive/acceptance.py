@@ -16,9 +16,10 @@ INVASIONS_MAX = Amount(2.0, "markings per run")  # in configurations 2 to 4 (A-2
 
 
 def broken_cells(table: pl.DataFrame) -> tuple[int, int]:
-    """Cells of configuration 0 without or of 4 with a collision, and all of both.
+    """Returns cells of configuration 0 without or of 4 with a collision, and all cells of both.
 
     A cell whose every drive moved as in another weather is that cell again, and counts once (T-3).
+    (0, 0) where one of the configurations is missing.
     """
     cells = (
         table.with_columns(drive=drive_hash(table))
@@ -35,12 +36,12 @@ def broken_cells(table: pl.DataFrame) -> tuple[int, int]:
 
 
 def _are_new(cells: pl.DataFrame) -> list[bool]:
-    """Whether each cell has a drive that no other cell of its configuration has; the larger one stays."""
+    """Returns whether each cell has a drive that no other cell of its configuration has; the larger stays."""
     drives = [{(d["seed"], d["drive"]) for d in row} for row in cells["drive"].to_list()]
     configs, order = cells["config"].to_list(), range(len(cells))
 
     def contains(k: int, other: int) -> bool:
-        """Whether a cell stands within another one, of two equal ones the later."""
+        """Returns whether cell `k` stands within cell `other`, of two equal ones the later."""
         known = configs[k] == configs[other] and None not in {drive for _, drive in drives[k]}
         return known and (drives[k] < drives[other] or (drives[k] == drives[other] and other < k))
 

@@ -58,7 +58,10 @@ METRICS = Registry("metric", "skidpad.metrics", MetricType, _own_metrics)
 def measure_added(
     log: RunLog, road_map: RoadMap, settings: MetricSettings | None = None
 ) -> tuple[AddedMetric, ...]:
-    """Returns what the metrics of installed packages say of a run; ConfigError for one that fails."""
+    """Returns what the metrics of installed packages say of a run; ConfigError for one that fails.
+
+    () without such metrics or with an empty log.
+    """
     kinds = METRICS.foreign_entries()
     if not kinds or not len(log):
         return ()

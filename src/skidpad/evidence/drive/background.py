@@ -14,8 +14,11 @@ UNSEEN = "unseen"  # `traffic` of a log's header: the backend does not tell cont
 
 
 def background(drive: Drive, where: Flags) -> Metrics:
-    """Contacts among background vehicles over the ticks of `where` (T,); those soon after a contact
-    of the ego are counted apart."""
+    """Returns the metrics of contacts among background vehicles over the ticks of `where` (T,).
+
+    Those within AFTER_EGO of a contact of the ego are counted apart. All None where the backend does
+    not report contacts of others.
+    """
     log = drive.log
     if log.header.about.get("traffic") == UNSEEN:
         return Metrics()
@@ -39,7 +42,7 @@ def background(drive: Drive, where: Flags) -> Metrics:
 
 
 def _vehicle_km(drive: Drive, where: Flags) -> float:
-    """km that all vehicles but the ego drove."""
+    """Returns the km that all vehicles but the ego drove in the ticks of `where`."""
     log = drive.log
     others = log.table.kind <= ActorKind.MOTORCYCLE
     others[0] = False

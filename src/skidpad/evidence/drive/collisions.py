@@ -79,14 +79,14 @@ class Crash:
 
 
 def recovery_rows(log: RunLog) -> list[int]:
-    """Rows on which the supervisor began to brake for a collision (A-179, A-190)."""
+    """Returns the rows on which the supervisor began to brake for a collision (A-179, A-190)."""
     braking = log.supervision == Supervision.BRAKE
     begins = braking & ~np.concatenate([[False], braking[:-1]])
     return [int(k) for k in np.flatnonzero(begins)]
 
 
 def find_crashes(drive: Drive) -> tuple[Crash, ...]:
-    """All fatal events of a drive in order: recoveries, wrong ways, departures (A-247, R-6)."""
+    """Returns all fatal events of a drive in order: recoveries, wrong ways, departures (A-247, R-6)."""
     log = drive.log
     crashes = [_crash(drive, row, _culprit(log, row)) for row in recovery_rows(log)]
     crashes += [
@@ -98,7 +98,7 @@ def find_crashes(drive: Drive) -> tuple[Crash, ...]:
 
 
 def contact_crashes(drive: Drive) -> tuple[Crash, ...]:
-    """The first contact with each other body, for drives without a supervisor."""
+    """Returns a crash for the first contact with each other body, for drives without a supervisor."""
     first: dict[tuple[int, str], ContactEvent] = {}
     for contact in drive.log.contacts:
         first.setdefault((contact.actor, contact.static), contact)
@@ -106,7 +106,7 @@ def contact_crashes(drive: Drive) -> tuple[Crash, ...]:
 
 
 def _culprit(log: RunLog, row: int) -> ContactEvent | None:
-    """The hardest contact just before a recovery began."""
+    """Returns the hardest contact within RECOVERY_LAG before a recovery began at `row`; None without any."""
     tick, lag = int(log.tick[row]), RECOVERY_LAG / log.header.dt
     recent = [c for c in log.contacts if 0 <= tick - c.tick <= lag]
     return max(recent, key=lambda c: c.impulse, default=None)
@@ -143,14 +143,14 @@ def _correct_crash(drive: Drive, at: int, kind: CrashKind) -> Crash:
 
 
 def _is_bend_exit(drive: Drive, at: int) -> bool:
-    """Whether the ego was in a bend with no vehicle ahead."""
+    """Returns whether the ego was in a bend with no vehicle ahead in the JUST_BEFORE s up to row `at`."""
     radius = _bend_radius(drive, at)
     alone = not np.any(drive.lead.actor[rows_before(drive, at, JUST_BEFORE) : at + 1] >= 0)
     return radius is not None and radius < BEND_RADIUS and alone
 
 
 def _follows(drive: Drive, at: int) -> bool:
-    """Whether a crash comes within 8 s and 100 m of where the ego was last put."""
+    """Returns whether a crash comes within CHAIN_TIME and CHAIN_WAY of where the ego was last put."""
     log = drive.log
     tick = int(log.tick[at])
     before = [r for r in log.relocations if r.tick < tick]
@@ -209,12 +209,12 @@ def _event(
 
 
 def rows_before(drive: Drive, at: int, seconds: float) -> int:
-    """Returns the row that lies so long before `at`, at least the first one of the log."""
+    """Returns the row that lies so many seconds before row `at`, at least the first one of the log."""
     return max(at - round(seconds / drive.log.header.dt), 0)
 
 
 def _bend_radius(drive: Drive, at: int) -> float | None:
-    """Tightest radius of the ego's lane in the last two seconds; None on a straight."""
+    """Returns the tightest radius in m of the ego's lane in the last two seconds; None on a straight."""
     curvature = np.abs(drive.place.curvature[rows_before(drive, at, JUST_BEFORE) : at + 1])
     curvature = curvature[np.isfinite(curvature)]
     tightest = float(curvature.max()) if curvature.size else 0.0
@@ -222,10 +222,10 @@ def _bend_radius(drive: Drive, at: int) -> float | None:
 
 
 def _who(log: RunLog, at: int, other: int) -> tuple[bool, Striker]:
-    """Whether the other car stood behind, and which of the two approached faster.
+    """Returns whether the other car stood behind, and which of the two approached faster.
 
     Cars that stood side by side just before met sideways: neither was behind, and what counts is
-    how fast each moved across.
+    how fast each moved across. other: column of the car in the log.
     """
     a, k = log.actors, max(at - 1, 0)
     to = np.array([a.x[k, other] - a.x[k, 0], a.y[k, other] - a.y[k, 0]], dtype=np.float64)
@@ -240,7 +240,7 @@ def _who(log: RunLog, at: int, other: int) -> tuple[bool, Striker]:
 
 
 def _are_side_by_side(log: RunLog, row: int, other: int) -> bool:
-    """Whether two cars overlap along the ego's axis, and by more than across it."""
+    """Returns whether two cars overlap along the ego's axis, and by more than across it."""
     a, table = log.actors, log.table
     dx, dy = a.x[row, other] - a.x[row, 0], a.y[row, other] - a.y[row, 0]
     yaw, turned = float(a.yaw[row, 0]), float(a.yaw[row, other] - a.yaw[row, 0])
@@ -253,7 +253,7 @@ def _are_side_by_side(log: RunLog, row: int, other: int) -> bool:
 
 
 def _grip(log: RunLog, row: int) -> float | None:
-    """Mean friction at the ego's tyres."""
+    """Returns the mean friction coefficient at the ego's tyres; None where it is not known."""
     mu = log.mu[row, 0]
     return None if np.all(np.isnan(mu)) else float(np.nanmean(mu))
 
@@ -264,7 +264,10 @@ def _speed(log: RunLog, row: int, actor: int) -> float:
 
 
 def _lead_since(drive: Drive, at: int, actor: int | None) -> float | None:
-    """Returns for how many s the actor had been the lead up to row `at`; None where it was not."""
+    """Returns for how many s the actor had been the lead up to row `at`; None where it was not.
+
+    It was when it led at any time in the JUST_BEFORE s up to then.
+    """
     if actor is None:
         return None
     is_lead = np.asarray(drive.lead.actor[: at + 1] == actor)
@@ -273,7 +276,7 @@ def _lead_since(drive: Drive, at: int, actor: int | None) -> float | None:
 
 
 def last_stretch(flags: Flags, since: int) -> int | None:
-    """Returns where the last stretch of true values begins, None if it ends before `since`."""
+    """Returns the row where the last stretch of true values begins; None if it ends before row `since`."""
     last = np.flatnonzero(flags[since:])
     if not last.size:
         return None
@@ -282,5 +285,5 @@ def last_stretch(flags: Flags, since: int) -> int | None:
 
 
 def number(value: float) -> float | None:
-    """`value`, None when it is NaN: the way from arrays to interfaces."""
+    """Returns `value`, None when it is NaN: the way from arrays to interfaces."""
     return None if np.isnan(value) else value

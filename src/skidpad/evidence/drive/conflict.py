@@ -35,9 +35,9 @@ class TrueConflicts(NamedTuple):
 
 
 def time_to_collision(gap: Floats, v_closing: Floats) -> Floats:
-    """Time to collision at constant closing speed; inf where the gap is not closing.
+    """Returns the time to collision in s at constant closing speed; inf where the gap is not closing.
 
-    gap, v_closing: (...) broadcastable, gap >= 0. Returns (...).
+    gap in m, v_closing in m/s: (...) broadcastable, gap >= 0. Returns (...).
     Source: Hayward (1972), Near-miss determination through use of a scale of danger.
     """
     out = np.full(np.broadcast(gap, v_closing).shape, np.inf)
@@ -46,8 +46,9 @@ def time_to_collision(gap: Floats, v_closing: Floats) -> Floats:
 
 
 def deceleration_to_avoid_crash(gap: Floats, v_closing: Floats) -> Floats:
-    """Constant deceleration that just avoids contact: v^2 / (2 gap), 0 where nothing closes.
+    """Returns the constant m/s^2 that just avoids contact: v^2 / (2 gap), 0 where nothing closes.
 
+    A gap below GAP_MIN counts as that.
     Source: Cooper and Space (1976), as DRAC in Archer (2005), Indicators for traffic safety.
     """
     drac: Floats = np.maximum(v_closing, 0.0) ** 2 / (2.0 * np.maximum(gap, GAP_MIN))
@@ -55,7 +56,7 @@ def deceleration_to_avoid_crash(gap: Floats, v_closing: Floats) -> Floats:
 
 
 def reported_ttc(drive: Drive) -> Floats:
-    """(T,) time to collision from what the stack measured; inf where there is none (A-232, A-233).
+    """Returns (T,) s to collision from what the stack measured; inf where there is none (A-232, A-233).
 
     The closing speed is the radar's, or the ego's own speed where the radar has none.
     """
@@ -68,7 +69,7 @@ def reported_ttc(drive: Drive) -> Floats:
 
 
 def conflicts(drive: Drive, where: Flags) -> Conflicts:
-    """Least time to collision and time below the critical one, over samples in `where`."""
+    """Returns the least time to collision and the time below TTC_CRITICAL, over samples in `where`."""
     ttc = np.where(where & drive.sample, reported_ttc(drive), np.inf)
     critical = int(np.count_nonzero(ttc < TTC_CRITICAL))
     return Conflicts(
@@ -80,7 +81,7 @@ def conflicts(drive: Drive, where: Flags) -> Conflicts:
 
 
 def true_conflicts(drive: Drive, where: Flags) -> TrueConflicts:
-    """Surrogates from truth while the ego drives, for leads whose box is in the ego's way."""
+    """Returns surrogates from truth while the ego drives, for leads whose box is in the ego's way."""
     lead = drive.lead
     use = where & drive.free & (drive.v > V_EGO_MIN) & lead.overlap & ~np.isnan(lead.gap)
     gap, closing = lead.gap[use], lead.v_closing[use]
@@ -93,6 +94,6 @@ def true_conflicts(drive: Drive, where: Flags) -> TrueConflicts:
 
 
 def least(values: Floats) -> float | None:
-    """Smallest finite value, None when there is none."""
+    """Returns the smallest finite value, None when there is none."""
     finite = values[np.isfinite(values)]
     return float(finite.min()) if finite.size else None

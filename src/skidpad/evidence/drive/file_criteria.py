@@ -23,7 +23,7 @@ class Result:
 
 
 def judge_criteria(drive: Drive, criteria: Sequence[FileCriterion]) -> list[Result]:
-    """Return the results in the order of the file."""
+    """Returns the results of the criteria in the order of the file."""
     return [Result(c.name, _wrong(drive, c)) for c in criteria]
 
 

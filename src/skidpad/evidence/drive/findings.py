@@ -27,9 +27,9 @@ OFF_LANES_MAX_PCT = 1.0  # of all ticks
 
 
 def astray(table: pl.DataFrame) -> str:
-    """Why no verdict may rest on these runs: they drove off all lanes and nothing counted it (R-6).
+    """Returns why no verdict may rest on these runs: they drove off all lanes and nothing counted it (R-6).
 
-    Empty: they kept to the road.
+    "" where at most OFF_LANES_MAX_PCT of the ticks are, or nothing is known of it.
     """
     if "off_lanes_pct" not in table.columns:
         return ""

@@ -28,7 +28,7 @@ class LaneMatch(NamedTuple):
     curvature: Floats  # 1/m, left positive
 
     def at(self, rows: Ints | NDArray[np.bool_]) -> LaneMatch:
-        """Returns the match of these points only."""
+        """Returns the match of the points of these rows only."""
         return LaneMatch(
             self.lane[rows],
             self.s[rows],
@@ -48,7 +48,10 @@ class LaneIndex:
         self._tree = cKDTree(here)
 
     def match(self, x: Numbers, y: Numbers, z: Numbers) -> LaneMatch:
-        """Matches each point (n,) to the lane at its height whose centre line is nearest in x and y."""
+        """Matches each point (n,) to the lane at its height whose centre line is nearest in x and y.
+
+        Lane -1 and NaN where none of the CANDIDATES nearest samples has one within REACH and HEIGHT.
+        """
         points = np.column_stack([x, y, z]).astype(np.float64)
         k = min(CANDIDATES, len(self._rows))
         _, near = self._tree.query(points, k=k)
@@ -68,7 +71,10 @@ class LaneIndex:
         )
 
     def _on_segments(self, points: Floats, starts: Ints) -> tuple[Floats, Floats, Floats]:
-        """Distance, s and offset of points (n, 3) on the segments that begin at samples (n, k)."""
+        """Returns distance, s and offset in m of points (n, 3) on the segments that begin at samples (n, k).
+
+        The distance is inf where no segment begins there or it is at another height.
+        """
         a = self.samples
         last = len(a.x) - 1
         i, j = np.clip(starts, 0, last), np.clip(starts + 1, 0, last)
@@ -84,10 +90,10 @@ class LaneIndex:
         return distance, a.s[i] + part * (a.s[j] - a.s[i]), offset
 
     def starts_ahead(self, lane: int, horizon: float) -> Floats:
-        """(L,) m from the start of `lane` to the start of each lane that follows it.
+        """Returns (L,) m from the start of `lane` to the start of each lane that follows it.
 
         Every branch counts, as for the radar's lane check (A-078); inf where none leads within
-        `horizon` of the end of `lane`.
+        `horizon` m of the end of `lane`.
         """
         table = self.lanes
         start = np.full(len(table.length), np.inf)
@@ -104,7 +110,10 @@ class LaneIndex:
         return start
 
     def distance_ahead(self, behind: LaneMatch, ahead: LaneMatch, horizon: float) -> Floats:
-        """(n,) m along the lanes from `behind` to `ahead`; inf where no lane leads there."""
+        """Returns (n,) m along the lanes from `behind` to `ahead`; inf where no lane leads there.
+
+        horizon: m, as in `starts_ahead`.
+        """
         out = np.full(len(behind.lane), np.inf)
         known = (behind.lane >= 0) & (ahead.lane >= 0)
         for lane in np.unique(behind.lane[known]):

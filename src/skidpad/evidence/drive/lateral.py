@@ -33,7 +33,7 @@ class Invasions(NamedTuple):
 
 
 def lateral_offset(drive: Drive, where: Flags) -> Offsets:
-    """Statistics of |offset| above 5 km/h, outside recovery and warm-up (A-245)."""
+    """Returns statistics of |offset| above V_MIN in `where`, outside recovery and warm-up (A-245)."""
     offset = np.abs(drive.place.offset)
     use = where & drive.free & (drive.v > V_MIN) & ~np.isnan(offset)
     values = offset[use]
@@ -45,7 +45,10 @@ def lateral_offset(drive: Drive, where: Flags) -> Offsets:
 def count_invasions(
     invasions: Iterable[LaneInvasion], highway: frozenset[int], dt: float
 ) -> Invasions:
-    """Solid markings are infractions; broken ones lane changes, at most one per 12 s."""
+    """Counts solid markings as infractions and broken ones as lane changes, at most one per 12 s.
+
+    highway: ids of roads; dt: s per tick.
+    """
     solid = total = on_highway = changes = 0
     last_change = -np.inf
     for invasion in sorted(invasions, key=lambda i: i.tick):

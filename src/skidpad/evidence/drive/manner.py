@@ -25,7 +25,7 @@ JERK_OVER = 0.5  # s between the speeds from which jerk is taken
 
 
 def phantom_brakings(log: RunLog) -> int:
-    """Times that emergency braking began although nothing was within 40 m of the ego.
+    """Returns how often emergency braking began although nothing was within NEAR of the ego.
 
     Whatever stands or drives there, in any lane: a strict reading of "for nothing".
     """
@@ -37,14 +37,14 @@ def phantom_brakings(log: RunLog) -> int:
 
 
 def surges(log: RunLog) -> int:
-    """Times that emergency braking began within 2 s of pulling away in free cruise (F-18)."""
+    """Returns how often emergency braking began within SURGE_TIME of pulling away in free cruise (F-18)."""
     pulling = np.isin(log.report.tier, CRUISING) & (log.applied.throttle > SURGE_THROTTLE)
     recent = _within(pulling & _free(log), SURGE_TIME, log.header.dt)
     return int(np.sum(_begins(_emergency(log)) & recent))
 
 
 def mode_changes_per_min(log: RunLog) -> float | None:
-    """Changes between following and free cruise per minute of both (F-19); None: neither."""
+    """Returns changes between following and free cruise per minute of both (F-19); None: neither."""
     follows, cruises = (np.isin(log.report.tier, t) & _free(log) for t in (FOLLOWING, CRUISING))
     either = follows | cruises
     if not either.any():
@@ -54,7 +54,10 @@ def mode_changes_per_min(log: RunLog) -> float | None:
 
 
 def jerk_rms(log: RunLog) -> float | None:
-    """Root mean square of the longitudinal jerk in m/s^3 over steps of 0.5 s; None: too short."""
+    """Returns the root mean square of longitudinal jerk in m/s^3 over steps of 0.5 s; None: too short.
+
+    Ticks of the supervisor, and soon after a contact or relocation, are left out.
+    """
     step = max(1, round(JERK_OVER / log.header.dt))
     v = log.ego.speed[::step]
     calm = (_free(log) & ~_disturbed_ticks(log))[::step]
@@ -66,7 +69,7 @@ def jerk_rms(log: RunLog) -> float | None:
 
 
 def spins(log: RunLog) -> int:
-    """Times that the car began to move more than 15 deg off its heading by itself (F-29)."""
+    """Returns how often the car began to move more than SPIN_ANGLE off its heading by itself (F-29)."""
     a = log.actors
     vx, vy, yaw = (c[:, 0].astype(np.float64) for c in (a.vx, a.vy, a.yaw))
     forward = np.cos(yaw) * vx + np.sin(yaw) * vy
@@ -77,7 +80,7 @@ def spins(log: RunLog) -> int:
 
 
 def hits_in_cool_down(log: RunLog) -> int:
-    """Relocations that were followed by a contact of the ego within 3 s (F-30)."""
+    """Returns how many relocations were followed by a contact of the ego within COOL_DOWN (F-30)."""
     lag = COOL_DOWN / log.header.dt
     hits = np.array([c.tick for c in log.contacts], dtype=np.int64)
     return sum(bool(np.any((hits > r.tick) & (hits - r.tick <= lag))) for r in log.relocations)
@@ -90,7 +93,7 @@ def _free(log: RunLog) -> Flags:
 
 
 def _emergency(log: RunLog) -> Flags:
-    """Returns (n,) True in free ticks in which the stack reports a braking tier."""
+    """Returns (n,) True in the ticks without a supervisor in which the stack reports a tier of BRAKING."""
     braking: Flags = np.isin(log.report.tier, BRAKING) & _free(log)
     return braking
 
@@ -102,14 +105,14 @@ def _begins(mask: Flags) -> Flags:
 
 
 def _within(mask: Flags, seconds: float, dt: float) -> Flags:
-    """Ticks at most `seconds` after one of `mask`, that one included."""
+    """Returns (n,) True in ticks at most `seconds` after one of `mask`, that one included; dt: s per tick."""
     last = np.maximum.accumulate(np.where(mask, np.arange(len(mask)), -(10**9)))
     recent: Flags = np.arange(len(mask)) - last <= round(seconds / dt)
     return recent
 
 
 def _disturbed_ticks(log: RunLog) -> Flags:
-    """Ticks soon after a contact or a relocation."""
+    """Returns (n,) True in ticks at most CALM s after a contact or a relocation."""
     mask = np.zeros(len(log), dtype=np.bool_)
     events = [c.tick for c in log.contacts] + [r.tick for r in log.relocations]
     rows = np.clip(np.searchsorted(log.tick, np.array(events, dtype=np.int64)), 0, len(log) - 1)

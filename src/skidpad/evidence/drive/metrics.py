@@ -36,7 +36,7 @@ KMH = 3.6
 
 
 def run_metrics(log: RunLog, road_map: RoadMap, settings: MetricSettings | None = None) -> Metrics:
-    """The metrics of a whole run; complete whatever the log lacks (A-251)."""
+    """Returns the metrics of a whole run; those that the log cannot give are None (A-251)."""
     if not len(log):
         return Metrics(samples=0)
     drive = prepare(log, road_map, settings)
@@ -46,7 +46,7 @@ def run_metrics(log: RunLog, road_map: RoadMap, settings: MetricSettings | None 
 def weather_metrics(
     log: RunLog, road_map: RoadMap, settings: MetricSettings | None = None
 ) -> dict[str, Metrics]:
-    """The same for each weather of the run, by slug (A-231)."""
+    """Returns the metrics of the ticks of each weather of the run, by its slug (A-231); {}: an empty log."""
     if not len(log):
         return {}
     drive = prepare(log, road_map, settings)
@@ -59,7 +59,7 @@ def weather_metrics(
 
 
 def highway_roads(drive: Drive, road_map: RoadMap) -> frozenset[int]:
-    """Roads met when driving on from the start (A-032, A-212)."""
+    """Returns the ids of the roads met when driving on from the start (A-032, A-212); empty off the lanes."""
     a = drive.log.actors
     start = road_map.project(float(a.x[0, 0]), float(a.y[0, 0]), float(a.z[0, 0]))
     return frozenset() if start is None else road_map.traced_roads(start)
@@ -68,7 +68,10 @@ def highway_roads(drive: Drive, road_map: RoadMap) -> frozenset[int]:
 def summarise(
     drive: Drive, crashes: Sequence[Crash], highway: frozenset[int], where: Flags | None = None
 ) -> Metrics:
-    """Metrics over the ticks of `where` (T,), all by default."""
+    """Returns the metrics over the ticks of `where` (T,), all by default.
+
+    crashes: of the whole drive; highway: ids of its roads.
+    """
     if where is None:
         where = np.ones(len(drive.log), dtype=np.bool_)
     here = [c for c in crashes if where[drive.row(c.tick)]]
@@ -86,7 +89,7 @@ def summarise(
 
 
 def combine_metrics(*parts: Metrics) -> Metrics:
-    """One row from partial ones, each of which sets its own columns."""
+    """Returns one row from partial ones, each of which sets its own columns."""
     names = [f.name for f in fields(Metrics)]
     set_by = {n: getattr(p, n) for p in parts for n in names if getattr(p, n) is not None}
     return Metrics(**set_by)
@@ -154,7 +157,7 @@ def _severity(drive: Drive, here: Sequence[Crash], where: Flags) -> Metrics:
 
 
 def _first_fatal(drive: Drive, here: Sequence[Crash], where: Flags) -> float | None:
-    """s driven among `where` to the first fatal event; None: none, it lies beyond the run."""
+    """Returns the s driven among `where` up to the first fatal event; None: there was none."""
     if not here:
         return None
     return float(np.count_nonzero(where[: drive.row(here[0].tick)]) * drive.log.header.dt)
@@ -292,7 +295,7 @@ def first_intervention(drive: Drive, where: Flags) -> tuple[float | None, float]
 
 
 def _is_intervention(drive: Drive, begin: int) -> bool:
-    """Whether the supervisor began at this row for a crash, a departure or a wrong way."""
+    """Returns whether the supervisor began at row `begin` for a crash, a departure or a wrong way."""
     if drive.log.supervision[begin] == Supervision.BRAKE:
         return True
     later = np.flatnonzero(drive.free[begin:])

@@ -26,12 +26,12 @@ class Confusion(NamedTuple):
 
     @property
     def fpr_pct(self) -> float | None:
-        """100 FP / (FP + TN), eq. 20; None when no vehicle-free tick exists."""
+        """Returns 100 FP / (FP + TN), eq. 20; None when no vehicle-free tick exists."""
         return percent(self.fp, self.fp + self.tn)
 
     @property
     def fnr_pct(self) -> float | None:
-        """100 FN / (FN + TP), eq. 21; None when no vehicle was ever there."""
+        """Returns 100 FN / (FN + TP), eq. 21; None when no vehicle was ever there."""
         return percent(self.fn, self.fn + self.tp)
 
 
@@ -45,25 +45,25 @@ class Errors(NamedTuple):
 
 
 def percent(part: int, whole: int) -> float | None:
-    """100 part / whole, None when there is no whole (decision X-3)."""
+    """Returns 100 part / whole; None when there is no whole (decision X-3)."""
     return 100.0 * part / whole if whole else None
 
 
 def vehicle_present(drive: Drive) -> Flags:
-    """(T,) a lead is there in truth (A-237)."""
+    """Returns (T,) whether a lead is there in truth: between the distances PRESENT (A-237)."""
     d = drive.lead.distance
     return np.asarray((d > PRESENT[0]) & (d < PRESENT[1]), dtype=np.bool_)
 
 
 def confusion(reported: Flags, present: Flags, where: Flags) -> Confusion:
-    """Counts over the ticks of `where`; masks (T,)."""
+    """Returns the counts over the ticks of `where`; all masks are (T,)."""
     r, p = reported[where], present[where]
     counts = (r & p, r & ~p, ~r & ~p, ~r & p)
     return Confusion(*(int(np.count_nonzero(c)) for c in counts))
 
 
 def radar_levels(drive: Drive, where: Flags) -> tuple[Confusion, Confusion, Confusion]:
-    """Counts at the pre-filter, after the lane check, and of the final decision (A-239)."""
+    """Returns the counts at the pre-filter, after the lane check, and of the final decision (A-239)."""
     report, present = drive.log.report, vehicle_present(drive)
     use = where & drive.sample
     levels = (~np.isnan(report.radar_pre), ~np.isnan(report.radar_lane), report.detected == 1.0)
@@ -72,7 +72,10 @@ def radar_levels(drive: Drive, where: Flags) -> tuple[Confusion, Confusion, Conf
 
 
 def distance_errors(drive: Drive, where: Flags) -> Errors:
-    """|truth - measured| where both lie strictly between 0.1 and 99 m (A-240)."""
+    """Returns errors |truth - measured| where both lie strictly between 0.1 and 99 m (A-240).
+
+    All None without such a sample.
+    """
     truth, measured = drive.lead.distance, drive.log.report.distance
     use = where & drive.sample & _inside(truth) & _inside(measured)
     error = np.abs(truth - measured)[use]
@@ -92,7 +95,10 @@ def _inside(distance: Floats) -> Flags:
 
 
 def gap_variance(drive: Drive, where: Flags) -> float | None:
-    """Population variance of the true gap in m^2 while the stack follows (A-242)."""
+    """Returns the population variance of the true gap in m^2 while the stack follows (A-242).
+
+    None with fewer than two samples.
+    """
     following = np.isin(drive.log.report.tier, FOLLOWING)
     gap = drive.lead.gap[where & drive.sample & following]
     gap = gap[~np.isnan(gap)]
@@ -100,8 +106,10 @@ def gap_variance(drive: Drive, where: Flags) -> float | None:
 
 
 def dropout_pct(drive: Drive, where: Flags) -> tuple[float | None, float | None]:
-    """Share of ticks that are a detection gap: of all samples (A-243), and of those on which a
-    vehicle is truly there (A-244)."""
+    """Returns the share of ticks that are a detection gap, in % of all samples (A-243), and in % of
+
+    those on which a vehicle is truly there (A-244); None without any.
+    """
     lost = np.isin(drive.log.report.status, LOST)
     every = where & drive.sample
     there = every & vehicle_present(drive)

@@ -82,12 +82,12 @@ class Drive:
     strays: Flags
 
     def row(self, tick: int) -> int:
-        """The row of a tick, or of the first one after it."""
+        """Returns the row of a tick, or of the first one after it, at most the last."""
         return min(int(np.searchsorted(self.log.tick, tick)), len(self.log) - 1)
 
 
 def prepare(log: RunLog, road_map: RoadMap, settings: MetricSettings | None = None) -> Drive:
-    """Match a log to its map."""
+    """Matches a log, which must not be empty, to its map."""
     index = lane_index(road_map)
     a = log.actors
     place = index.match(a.x[:, 0], a.y[:, 0], a.z[:, 0])
@@ -106,12 +106,12 @@ def prepare(log: RunLog, road_map: RoadMap, settings: MetricSettings | None = No
 
 @lru_cache(maxsize=4)
 def lane_index(road_map: RoadMap) -> LaneIndex:
-    """The nearest lanes of a map, sought once."""
+    """Returns the index of a map's lanes, made once per map."""
     return LaneIndex(road_map.samples, road_map.lanes)
 
 
 def _strays(log: RunLog, road_map: RoadMap, free: Flags) -> Flags:
-    """Ticks off all lanes that nothing counts: a stretch that the supervisor ended is counted."""
+    """Returns (T,) ticks off all lanes, but for stretches that the supervisor ended: those are counted."""
     a, table = log.actors, log.table
     size = float(table.length[0]), float(table.width[0])
     off = road_map.edge.off(a.x[:, 0], a.y[:, 0], a.z[:, 0], a.yaw[:, 0], *size)
@@ -124,7 +124,7 @@ def _strays(log: RunLog, road_map: RoadMap, free: Flags) -> Flags:
 
 
 def find_leads(log: RunLog, index: LaneIndex, place: LaneMatch, rule: LeadDefinition) -> Leads:
-    """The nearest vehicle within 80 m that the definition calls a lead (A-236)."""
+    """Returns the nearest vehicle within LEAD_RANGE that the definition calls a lead, per tick (A-236)."""
     a, table = log.actors, log.table
     distance = np.hypot(a.x - a.x[:, :1], a.y - a.y[:, :1]).astype(np.float64)
     near = log.present & (distance < LEAD_RANGE) & (table.kind <= ActorKind.MOTORCYCLE)
@@ -150,7 +150,7 @@ def _same_ids(index: LaneIndex, a: LaneMatch, b: LaneMatch) -> Flags:
 
 
 def _describe(log: RunLog, leads: Pairs) -> Leads:
-    """The leads of a drive from at most one pair per tick."""
+    """Returns the leads of a drive from at most one pair per tick."""
     a, (k, i, e, o, along) = log.actors, leads
     distance, gap, closing = (np.full(len(log), np.nan) for _ in range(3))
     actor = np.full(len(log), -1, dtype=np.int64)
@@ -167,7 +167,10 @@ def _describe(log: RunLog, leads: Pairs) -> Leads:
 
 
 def _extent(log: RunLog, k: Ints, i: Ints, heading: Floats) -> tuple[Floats, Floats]:
-    """Half length and half width of boxes along and across their lanes."""
+    """Returns half length and half width in m of boxes along and across their lanes.
+
+    k: rows, i: columns of actors, heading: rad of the lanes, (m,) each.
+    """
     turn = log.actors.yaw[k, i] - heading
     c, s = np.abs(np.cos(turn)), np.abs(np.sin(turn))
     length, width = log.table.length[i] / 2.0, log.table.width[i] / 2.0

@@ -50,32 +50,32 @@ class Contact:
 
     @property
     def is_road_user(self) -> bool:
-        """Whether a vehicle or a person was touched, not a barrier or a cone."""
+        """Returns whether a vehicle or a person was touched, not a barrier or a cone."""
         return self.kind is not None and self.kind is not ActorKind.PROP
 
     @property
     def is_vulnerable(self) -> bool:
-        """Whether a pedestrian or a two-wheeler was touched."""
+        """Returns whether a pedestrian or a two-wheeler was touched."""
         return self.kind in VULNERABLE
 
     @property
     def v_graded(self) -> float:
-        """The speed that decides the class, m/s."""
+        """Returns the speed that decides the class, m/s."""
         return self.v_closing if self.delta_v is None else self.delta_v
 
     @property
     def graded_by(self) -> Measure:
-        """Whether the delta-v decides, or the closing speed for want of it."""
+        """Returns whether the delta-v decides, or the closing speed for want of it."""
         return Measure.CLOSING_SPEED if self.delta_v is None else Measure.DELTA_V
 
     @property
     def is_serious(self) -> bool:
-        """Whether it leads the headline: above the lowest class, and a person or two wheels always."""
+        """Returns whether a road user was hit above the lowest class; a person or two wheels always count."""
         return self.is_road_user and self.severity is not Severity.LIGHT
 
     @property
     def severity(self) -> Severity:
-        """The class; never the lowest with a pedestrian or a two-wheeler."""
+        """Returns the class; never the lowest with a pedestrian or a two-wheeler."""
         if self.v_graded > HEAVY_ABOVE:
             return Severity.HEAVY
         light = self.v_graded < LIGHT_BELOW and not self.is_vulnerable
@@ -144,7 +144,10 @@ def speed_change(log: RunLog, row: int, actor: int) -> float | None:
 
 
 def _usual_change(log: RunLog, row: int, actor: int, dt: float) -> Floats:
-    """The change that the acceleration just before goes on making; none where that was an impact."""
+    """Returns (2,) m/s that the acceleration just before would add; 0 where that was an impact.
+
+    0, too, where it is not known.
+    """
     if row < 2 or not log.present[row - 2, actor]:
         return np.zeros(2)
     earlier = float(log.tick[row - 1] - log.tick[row - 2]) * log.header.dt

@@ -28,12 +28,12 @@ def config(name: str) -> Rows:
 
 
 def configs(column: str, more: str, less: str, margin: Amount) -> Paired:
-    """`column` is larger in configuration `more` than in `less`."""
+    """Returns the claim that `column` is larger in configuration `more` than in `less`."""
     return Paired(column=column, more=config(more), less=config(less), by=BY_RUN, amount=margin)
 
 
 def variants(column: str, more: str, less: str, margin: Amount) -> Paired:
-    """`column` is larger in variant `more` of a study than in `less`."""
+    """Returns the claim that `column` is larger in variant `more` of a study than in `less`."""
     return Paired(
         column=column, more=rows_of("variant", more), less=rows_of("variant", less),
         by=("config", "weather", "seed"), amount=margin,
@@ -41,7 +41,7 @@ def variants(column: str, more: str, less: str, margin: Amount) -> Paired:
 
 
 def at_night(column: str, amount: Amount, claim: Claim = Claim.MORE) -> Paired:
-    """`column` is larger at night than by day, or hardly."""
+    """Returns the claim that `column` is larger at night than by day, or what `claim` says."""
     return Paired(
         column=column, more=NIGHT, less=DAY, by=("config", "precipitation_kind", "seed"),
         amount=amount, claim=claim, where=ASSISTED,
@@ -49,7 +49,7 @@ def at_night(column: str, amount: Amount, claim: Claim = Claim.MORE) -> Paired:
 
 
 def ttc_hardly_more(more: str, less: str) -> Paired:
-    """One side of an equivalence: the minimum is hardly larger in one configuration."""
+    """Returns one side of an equivalence: the minimum is hardly larger in configuration `more`."""
     return Paired(
         column="min_ttc_s", more=config(more), less=config(less), by=BY_RUN, amount=TTC,
         claim=Claim.HARDLY_MORE,

@@ -95,7 +95,7 @@ class Story:
 
     @property
     def came_just_before(self) -> bool:
-        """Whether the vehicle that was hit came before the ego in the last seconds."""
+        """Returns whether the vehicle that was hit came before the ego in the last seconds."""
         recent = CHAIN_TIME if self.arrival is Arrival.EGO_PUT else JUST_CAME
         came = self.arrived is not None and self.arrived.before <= recent
         return came and self.arrival is not Arrival.DRIVEN_UP
@@ -144,7 +144,7 @@ class _Way:
         self.true: Floats = np.where(self.ahead, self.gap, lead.gap[: at + 1])
 
     def begin(self) -> int | None:
-        """The row from which it was ahead until the contact, 2 s of grace; None: it was not.
+        """Returns the row from which it was ahead until the contact, 2 s of grace; None: it was not.
 
         Not before the ego was last put back.
         """
@@ -160,12 +160,18 @@ class _Way:
         return float(self.drive.log.t[self.at] - self.drive.log.t[row])
 
     def to(self, row: int) -> str:
-        """Name of the vehicle that the true gap is to."""
+        """Returns the name of the vehicle that the true gap in a row is to: the one hit while it is ahead.
+
+        Else the lead; "" for none.
+        """
         i = self.actor if self.ahead[row] else int(self.drive.lead.actor[row])
         return "" if i is None or i < 0 else self.drive.log.table.names[i]
 
     def error(self, row: int) -> float:
-        """m by which measured and true differ beyond what is right; 0 where they agree."""
+        """Returns the m by which measured and true differ beyond what is right; 0 where they agree.
+
+        0, too, where nothing was measured.
+        """
         measured = float(self.drive.log.report.distance[row])
         if np.isnan(measured):
             return 0.0
@@ -214,7 +220,7 @@ class _Box(NamedTuple):
             yield self.x + along * c - across * s, self.y + along * s + across * c
 
     def gap(self, x: Floats, y: Floats) -> Floats:
-        """m from points to it, 0 inside."""
+        """Returns the m from points to it, 0 inside."""
         forward, left = self.project(x, y)
         along = np.maximum(np.abs(forward) - self.half_length, 0.0)
         return np.hypot(along, np.maximum(np.abs(left) - self.half_width, 0.0))
@@ -232,7 +238,10 @@ def _box_of(log: RunLog, at: int, actor: int) -> _Box:
 
 
 def _box_gap(log: RunLog, at: int, actor: int) -> tuple[Floats, Flags]:
-    """m between the boxes of the ego and an actor, and whether it is straight ahead and near."""
+    """Returns m between the boxes of the ego and an actor, and whether it is straight ahead and near.
+
+    Both (at + 1,); nan where the actor is absent. Near is within STRAIGHT_WITHIN.
+    """
     ego, other = (_box_of(log, at, i) for i in (EGO, actor))
     gaps = [a.gap(x, y) for a, b in ((ego, other), (other, ego)) for x, y in b.corners()]
     forward, left = ego.project(other.x, other.y)
@@ -258,7 +267,7 @@ def _classify_arrival(drive: Drive, begin: int, way: _Way) -> Arrival:
 
 
 def _measure_sidestep(drive: Drive, row: int) -> float:
-    """m that the ego moved across its lane in the 1.5 s before a row, left positive."""
+    """Returns the m that the ego moved across its lane in the 1.5 s before a row, left positive."""
     rows = slice(rows_before(drive, row, SIDE_STEP_TIME), row)
     a, heading = drive.log.actors, drive.place.heading[rows]
     across = a.vy[rows, EGO] * np.cos(heading) - a.vx[rows, EGO] * np.sin(heading)
@@ -272,7 +281,10 @@ def _find_first_report(way: _Way, begin: int) -> Sighting | None:
 
 
 def _list_changes(way: _Way, wanted: Sequence[Sighting | None]) -> tuple[Sighting, ...]:
-    """Changes of status and tier in the last 10 s that lasted, and the sightings that are wanted."""
+    """Returns changes of status and tier in the last 10 s that lasted, and the sightings that are wanted.
+
+    Oldest first; of the changes the newest NEWS_MAX.
+    """
     drive, begin = way.drive, rows_before(way.drive, way.at, LOOK_BACK)
     said = np.stack([drive.log.report.status, drive.log.report.tier])[:, : way.at + 1]
     changes = [
@@ -288,13 +300,13 @@ def _list_changes(way: _Way, wanted: Sequence[Sighting | None]) -> tuple[Sightin
 
 
 def _lasts(way: _Way, row: int, end: int) -> bool:
-    """Whether what the stack said is no flicker; a hard braking never is."""
+    """Returns whether what the stack said in rows `row` to `end` is no flicker; hard braking never is."""
     tier = way.drive.log.report.tier[row]
     return tier in BRAKING or (end - row) * way.drive.log.header.dt > FLICKER
 
 
 def _find_worst_error(way: _Way) -> Sighting | None:
-    """The largest error of the last 5 s that may have mattered.
+    """Returns the largest error of the last 5 s that may have mattered; None without any.
 
     Too short while the stack braked hard, or too long while the vehicle that was hit was ahead.
     """
@@ -314,7 +326,7 @@ def _find_worst_error(way: _Way) -> Sighting | None:
 
 
 def _find_braking(way: _Way) -> Moment | None:
-    """Finds since when the pedal was pressed without a break until the contact."""
+    """Finds since when the pedal was pressed without a break until the contact; None: it was not."""
     pressed = way.drive.log.applied.brake[: way.at] > BRAKES
     if not pressed.size or not pressed[-1]:
         return None
@@ -324,7 +336,7 @@ def _find_braking(way: _Way) -> Moment | None:
 
 
 def _find_slowing(way: _Way, actor: int) -> Moment | None:
-    """Finds when the other car was fastest in the last 5 s, if it lost much speed since."""
+    """Finds when the other car was fastest in the last 5 s; None if it lost less than SLOWED_BY since."""
     begin, a = rows_before(way.drive, way.at, ERROR_LOOK_BACK), way.drive.log.actors
     v = np.hypot(a.vx[begin : way.at, actor], a.vy[begin : way.at, actor]).astype(np.float64)
     if not v.size or v.max() - v[-1] < SLOWED_BY:
@@ -334,7 +346,7 @@ def _find_slowing(way: _Way, actor: int) -> Moment | None:
 
 
 def _find_push(drive: Drive, crash: Crash) -> Contact | None:
-    """The last contact with a road user within 2 s before a departure."""
+    """Returns the last contact with a road user within 2 s before a departure; None for other crashes."""
     if crash.actor is not None:
         return None
     earliest = crash.tick - JUST_BEFORE / drive.log.header.dt
@@ -350,7 +362,7 @@ def _seconds(drive: Drive, crash: Crash, contact: Contact) -> float:
 
 
 def _list_later_contacts(drive: Drive, crash: Crash) -> tuple[tuple[float, Contact], ...]:
-    """The contacts after the crash until the supervisor gives the ego back."""
+    """Returns the contacts after the crash until the supervisor gives the ego back, with s after it."""
     end = _end_of_recovery(drive, crash)
     if end is None:
         return ()
@@ -373,7 +385,7 @@ def _find_put_back(drive: Drive, crash: Crash) -> float | None:
 
 
 def _end_of_recovery(drive: Drive, crash: Crash) -> int | None:
-    """The last row of the supervised stretch that the crash began; None: the drive has no supervisor."""
+    """Returns the last row of the supervised stretch that the crash began; None: no supervisor took over."""
     at = drive.row(crash.tick)
     begins = np.flatnonzero(~drive.free[at : at + 1 + round(0.3 / drive.log.header.dt)])
     if not begins.size:

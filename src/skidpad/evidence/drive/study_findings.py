@@ -17,7 +17,7 @@ CHAINED = "fatal events per run that follow on a relocation"
 
 
 def unequal_logs(table: pl.DataFrame) -> tuple[int, int]:
-    """Pairs of paced and slowed runs with unequal logs, and all pairs."""
+    """Returns the number of pairs of paced and slowed runs with unequal logs, and of all pairs."""
     sides = [table.filter(pl.col("variant") == v) for v in ("paced", "slowed")]
     keys = [k for k in ("config", "weather", "seed") if k in table.columns]
     both = sides[0].join(sides[1], on=keys, suffix="_slowed")
@@ -31,7 +31,7 @@ def _rare(what: str, column: str, variant: str, limit: Amount) -> RateBelow:
 
 
 def _noisy(kind: str, sizes: str) -> tuple[Finding, Finding]:
-    """What follows from noise of a cited size: dropout, and crashes with vehicles."""
+    """Returns two findings on noise of a cited size: dropout, and crashes with vehicles."""
     id = {"night": "F-12", "rain": "F-13"}[kind]
     needs = "its own study: exact sensing, noise of night, noise of rain"
     given = f"Given noise of {sizes}"

@@ -24,13 +24,13 @@ BASELINE = Rows("the baselines", pl.col("weather").is_in(BASELINES))
 
 
 def proper(*more: Rows) -> Rows:
-    """Runs of the campaign proper that are all of these."""
+    """Returns the runs of the campaign proper that are in all of these rows."""
     name = ", ".join(rows.name for rows in more)
     return Rows(name, pl.all_horizontal(pl.col("cutin") == "fixed", *(rows.are for rows in more)))
 
 
 def scene(scenario: str, *weathers: str) -> Rows:
-    """Runs of one scenario in some weathers."""
+    """Returns the runs of one scenario in some weathers, in all without any."""
     rows = rows_of("scenario", scenario)
     return proper(rows, rows_of("weather", *weathers)) if weathers else proper(rows)
 
@@ -38,19 +38,22 @@ def scene(scenario: str, *weathers: str) -> Rows:
 def frictions(
     where: Rows, column: str = "completion", amount: Amount = SHARE, claim: Claim = Claim.MORE
 ) -> Paired:
-    """`column` is larger with original than with reduced friction, or what `claim` says."""
+    """Returns the claim that `column` is larger with original than with reduced friction.
+
+    claim: what is said instead of that, e.g. hardly more.
+    """
     return Paired(
         column=column, more=ORIGINAL, less=REDUCED, by=BY, amount=amount, claim=claim, where=where
     )
 
 
 def claims_more(where: Rows, column: str, margin: Amount = SHARE) -> Paired:
-    """`column` is larger with reduced than with original friction."""
+    """Returns the claim that `column` is larger with reduced than with original friction."""
     return Paired(column=column, more=REDUCED, less=ORIGINAL, by=BY, amount=margin, where=where)
 
 
 def claims_kept(scenario: str, *weathers: str) -> Paired:
-    """Friction takes less completion than the margin."""
+    """Returns the claim that friction takes less completion than the margin."""
     return frictions(scene(scenario, *weathers), claim=Claim.HARDLY_MORE)
 
 
@@ -67,7 +70,7 @@ def weathers(
 
 
 def cut_ins(more: str, less: str) -> Paired:
-    """States that more runs complete in one variant of the cut-in than in another, friction untouched."""
+    """Returns the claim that more runs complete in one variant of the cut-in, friction untouched."""
     return Paired(
         column="completion", more=rows_of("cutin", more), less=rows_of("cutin", less),
         by=("weather", "seed"), amount=SHARE,

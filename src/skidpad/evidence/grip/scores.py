@@ -37,14 +37,14 @@ EGO = 0
 
 @cache
 def penalties() -> dict[str, float]:
-    """Factors of the benchmark score, by infraction."""
+    """Returns the factors of the benchmark score, by infraction."""
     return msgspec.yaml.decode(
         (files("skidpad.evidence.grip") / "score.yaml").read_bytes(), type=dict[str, float]
     )
 
 
 def grip_series(log: RunLog) -> NDArray[np.float32]:
-    """(T, 9) x, y, v, cvip, steer, brake, throttle of the ego, then x, y of the nearest-first NPC.
+    """Returns (T, 9) x, y, v, cvip, steer, brake, throttle of the ego, then x, y of the first NPC.
 
     x lateral (left positive), y along the road, m; brake is the pedal pressed or not (B-103).
     With several NPCs cvip takes the nearer at each tick (B-093).
@@ -61,7 +61,7 @@ def grip_series(log: RunLog) -> NDArray[np.float32]:
 
 
 def centre_distance(log: RunLog) -> Floats:
-    """(T,) distance of box centres, ego to the nearest other vehicle; inf without one (B-102)."""
+    """Returns (T,) m between box centres, ego to the nearest other vehicle; inf without one (B-102)."""
     a = log.actors
     distance = np.hypot(a.x[:, 1:] - a.x[:, :1], a.y[:, 1:] - a.y[:, :1]).astype(np.float64)
     distance[~log.present[:, 1:]] = np.inf
@@ -81,7 +81,7 @@ def grip_metrics(
     ratio: float,
     off_road: NDArray[np.bool_] | None = None,
 ) -> GripMetrics:
-    """The row of a run.
+    """Returns the row of a run; nearly all None for an empty log.
 
     route_length: m; ratio: of friction, at standstill; off_road: (T,) ticks with all wheels off
     every lane, None: never.
@@ -128,7 +128,10 @@ def grip_metrics(
 
 
 def route_share(outcome: Outcome, distance: float, route_length: float | None) -> float | None:
-    """Percent of the route: all of it when the scenario came to its end, else the way driven."""
+    """Returns the percent of the route: all of it when the scenario came to its end, else the way driven.
+
+    0 when the stack failed; None where the way driven counts and there is no route. Lengths in m.
+    """
     if outcome is Outcome.AGENT_ERROR:
         return 0.0
     if outcome not in ENDED:
@@ -139,7 +142,7 @@ def route_share(outcome: Outcome, distance: float, route_length: float | None) -
 def score(
     route: float, log: RunLog, contacts: tuple[ContactEvent, ...], strayed: float = 0.0
 ) -> float:
-    """Route completion times a penalty for each infraction (B-105).
+    """Returns route completion in % times a penalty for each infraction (B-105).
 
     strayed: share of the way driven off all lanes; the benchmark multiplies by what remains (B-106).
     """
@@ -156,7 +159,7 @@ def score(
 
 
 def side_slips(log: RunLog) -> Floats:
-    """(T, n) angle in deg between where a vehicle looks and where it goes; 0 below 3 m/s."""
+    """Returns (T, n) deg between where a vehicle looks and where it goes, by size; 0 below V_SLIP."""
     a = log.actors
     speed = np.hypot(a.vx, a.vy)
     turn = np.arctan2(a.vy, a.vx) - a.yaw
@@ -166,20 +169,20 @@ def side_slips(log: RunLog) -> Floats:
 
 
 def loses_control(log: RunLog, slips: Floats, actor: int, end: int) -> bool:
-    """It slides or has spun for a while in the rows before `end` (B-145)."""
+    """Returns whether an actor slides or has spun for LOST_TIME in the rows before `end` (B-145)."""
     yaw = np.abs(np.degrees((log.actors.yaw[:end, actor] + np.pi) % (2.0 * np.pi) - np.pi))
     lost = (slips[:end, actor] > SLIP_LOST) | (yaw > YAW_LOST)
     return longest(lost) * log.header.dt >= LOST_TIME
 
 
 def longest(flags: NDArray[np.bool_]) -> int:
-    """Length of the longest run of True."""
+    """Returns the length of the longest run of True; 0 without any."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return int((edges[1::2] - edges[0::2]).max(initial=0))
 
 
 def corrections(steer: Floats, dt: float) -> float:
-    """Changes of steering direction per second, larger than a dead band."""
+    """Returns changes of steering direction per second, of moves larger than STEER_DEAD."""
     move = np.diff(steer)
     move = move[np.abs(move) > STEER_DEAD]
     turns = np.count_nonzero(np.diff(np.sign(move)))
@@ -187,13 +190,13 @@ def corrections(steer: Floats, dt: float) -> float:
 
 
 def npc_contact_row(log: RunLog) -> int | None:
-    """First row in which two NPCs touch, by their boxes."""
+    """Returns the first row in which two NPCs touch, by their boxes; None: they never do."""
     rows = [_touching_row(log, i, j) for i, j in combinations(range(1, len(log.table)), 2)]
     return min((r for r in rows if r is not None), default=None)
 
 
 def _touching_row(log: RunLog, i: int, j: int) -> int | None:
-    """Separating axes of two boxes, for all rows at once."""
+    """Returns the first row in which the boxes of two actors are within TOUCH; None: never."""
     a, t = log.actors, log.table
     dx, dy = a.x[:, j] - a.x[:, i], a.y[:, j] - a.y[:, i]
     apart = ~(log.present[:, i] & log.present[:, j])

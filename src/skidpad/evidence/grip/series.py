@@ -15,7 +15,7 @@ STRIDE = 4  # 20 Hz to 5 Hz, for resamples only (decision G-4)
 
 
 def stack_runs(runs: list[Floats]) -> Floats:
-    """(n, T) from n series of their own lengths; NaN after the end of each."""
+    """Returns (n, T) from n series of their own lengths; NaN after the end of each."""
     out = np.full((len(runs), max((len(r) for r in runs), default=0)), np.nan)
     for row, run in zip(out, runs, strict=True):
         row[: len(run)] = run
@@ -23,7 +23,7 @@ def stack_runs(runs: list[Floats]) -> Floats:
 
 
 def median_series(runs: Floats) -> Floats:
-    """Median per tick over the runs still alive, until fewer than half are (B-123).
+    """Returns the median per tick over the runs still alive, until fewer than half are (B-123).
 
     runs: (n, T), NaN after the end of a run. Returns (T',), T' <= T.
     """
@@ -37,12 +37,12 @@ def median_series(runs: Floats) -> Floats:
 
 
 def median_warping(a: Floats, b: Floats, cost: Cost = Cost.SQUARED) -> float:
-    """Warping distance between the medians of two sets of runs (n, T), (m, U) at full rate (B-108)."""
+    """Returns the warping distance between the medians of two sets of runs (n, T), (m, U) (B-108)."""
     return warping_distance(median_series(a), median_series(b), cost)
 
 
 def warping_interval(a: Floats, b: Floats, cost: Cost = Cost.SQUARED) -> Interval:
-    """Limits of `median_warping` over resampled runs, paired where both sets are equally many.
+    """Returns limits of `median_warping` over resampled runs, paired where both sets are equally many.
 
     Resamples run at 5 Hz; the squared cost grows with the number of ticks, so they are scaled back
     to full rate.
@@ -61,8 +61,10 @@ def warping_interval(a: Floats, b: Floats, cost: Cost = Cost.SQUARED) -> Interva
 
 
 def noise_floor(runs: Floats, cost: Cost = Cost.SQUARED) -> float | None:
-    """Distance between the medians of the two halves of runs under one condition: what chance
-    alone gives (decision G-4). None below four runs."""
+    """Returns the distance between the medians of the two halves of runs under one condition.
+
+    It is what chance alone gives (decision G-4). None below four runs.
+    """
     if len(runs) < 4:
         return None
     return median_warping(runs[0::2], runs[1::2], cost)

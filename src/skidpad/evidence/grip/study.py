@@ -48,12 +48,12 @@ class Share:
 
     @property
     def value(self) -> float | None:
-        """The share; None without runs."""
+        """Returns the share; None without runs."""
         return self.k / self.n if self.n else None
 
     @property
     def interval(self) -> Interval:
-        """Clopper and Pearson, 95 %."""
+        """Returns the limits by Clopper and Pearson, 95 %."""
         return clopper_pearson(self.k, self.n)
 
 
@@ -73,18 +73,18 @@ class Pair:
 
     @property
     def common(self) -> pl.DataFrame:
-        """Both sides joined by seed; the reduced one has the suffix."""
+        """Returns both sides joined by seed; columns of the reduced one end in `_reduced`."""
         return self.original.join(self.reduced, on="seed", suffix="_reduced").sort("seed")
 
     @property
     def identical(self) -> bool:
-        """Whether every pair is the same drive."""
+        """Returns whether every pair is the same drive; False without a pair."""
         both = self.common
         return len(both) > 0 and bool((both["log_hash"] == both["log_hash_reduced"]).all())
 
 
 def pairs(results: pl.DataFrame) -> list[Pair]:
-    """All cells of a campaign, in the order of the table."""
+    """Returns all cells of a campaign, sorted, without the runs that crashed or failed."""
     finished = results.filter(~pl.col("outcome").is_in(NOT_RUN)).sort(*CELL, "seed")
     found = []
     for (scenario, cutin, weather), rows in finished.group_by(CELL, maintain_order=True):
@@ -94,7 +94,7 @@ def pairs(results: pl.DataFrame) -> list[Pair]:
 
 
 def completion(runs: pl.DataFrame, given_triggered: bool = False) -> Share:
-    """Runs without an accident, of all or of those whose scenario happened (G-2).
+    """Returns the runs without an accident, of all or of those whose scenario happened (G-2).
 
     A run that ended in a collision counts as triggered: the accident is what the scenario is about.
     """
@@ -104,7 +104,7 @@ def completion(runs: pl.DataFrame, given_triggered: bool = False) -> Share:
 
 
 def completion_p(pair: Pair) -> float:
-    """Exact McNemar over pairs of equal seed."""
+    """Returns the p value of completion over pairs of equal seed, by McNemar's exact test."""
     both = pair.common
     worse = int((both["completion"] & ~both["completion_reduced"]).sum())
     better = int((~both["completion"] & both["completion_reduced"]).sum())
@@ -112,13 +112,13 @@ def completion_p(pair: Pair) -> float:
 
 
 def changed_outcome(pair: Pair) -> Share:
-    """Pairs of which one ended in a collision and the other did not (B-143)."""
+    """Returns the pairs of which one ended in a collision and the other did not (B-143)."""
     both = pair.common
     return Share(int((both["completion"] != both["completion_reduced"]).sum()), len(both))
 
 
 def mean_interval(values: pl.Series) -> tuple[float, Interval | None] | None:
-    """Mean over runs with its limits; None where there are too few."""
+    """Returns the mean over runs with its limits, None where they are too few; None without a value."""
     known = values.drop_nulls().to_numpy()
     if not known.size:
         return None
@@ -126,7 +126,7 @@ def mean_interval(values: pl.Series) -> tuple[float, Interval | None] | None:
 
 
 def compare_pair(pair: Pair, column: str) -> Comparison | None:
-    """Reduced minus original, paired by seed."""
+    """Returns reduced minus original, paired by seed; None without a pair that has both."""
     both = pair.common.drop_nulls([column, f"{column}_reduced"])
     difference = both[f"{column}_reduced"].cast(pl.Float64) - both[column].cast(pl.Float64)
     return compare_pairs(difference.to_numpy()) if len(both) else None
@@ -144,7 +144,7 @@ class CellSeries:
 
 
 def cell_series(runs: pl.DataFrame, read: Callable[[int], pl.DataFrame]) -> CellSeries:
-    """Series of these runs, read one by one."""
+    """Returns the series of these runs; `read` gives the table of a seed."""
     tables = [read(seed).to_numpy().astype(np.float64) for seed in runs["seed"].to_list()]
     return CellSeries(
         {name: stack_runs([t[:, k] for t in tables]) for k, name in enumerate(COLUMNS)}
@@ -175,8 +175,9 @@ def distances(
 
 
 def delays(original: CellSeries, reduced: CellSeries) -> Floats:
-    """(n,) s by which each run with reduced friction is late, by the best constant shift of its
-    speed and distance series against its pair's (B-142). NaN where no shift halves the difference.
+    """Returns (n,) s by which each run with reduced friction is late against its pair (B-142).
+
+    By the best constant shift of its speed series; NaN where no shift halves the difference.
     """
     both = zip(original.values["v"], reduced.values["v"], strict=False)
     return np.array([_delay(a, b) for a, b in both])

@@ -37,7 +37,7 @@ class Threshold:
 
     @property
     def text(self) -> str:
-        """`0.21 (95 % 0.18 to 0.24)`, `below 0.1`."""
+        """Returns text such as `0.21 (95 % 0.18 to 0.24)` or `below 0.1`."""
         if self.mu is None:
             return f"below {self.least:.2g}"
         low, high = self.interval
@@ -58,34 +58,37 @@ class Situation:
 
     @cached_property
     def levels(self) -> list[float]:
-        """Levels of friction, the dry road first."""
+        """Returns the levels of friction, the dry road first."""
         found: list[float] = self.runs["road_mu"].unique().sort(descending=True).to_list()
         return found
 
     def at(self, mu: float) -> Share:
-        """Runs without an accident at a level."""
+        """Returns the runs without an accident at a level of friction."""
         return completion(self.runs.filter(pl.col("road_mu") == mu))
 
     @property
     def baseline(self) -> Share:
-        """The same on dry road."""
+        """Returns the runs without an accident on dry road."""
         return self.at(self.levels[0])
 
     @property
     def tells(self) -> bool:
-        """It is completed on dry road, so that what happens on less friction is due to that."""
+        """Returns whether it is completed on dry road, so that what happens on less friction is due to that.
+
+        BASELINE_MIN of its runs must be.
+        """
         return (self.baseline.value or 0.0) >= BASELINE_MIN
 
     @cached_property
     def outcomes(self) -> NDArray[np.bool_]:
-        """(seeds, levels) whether a seed's drive was completed, of seeds that finished everywhere."""
+        """Returns (seeds, levels) whether a seed's drive was completed, of seeds that finished everywhere."""
         table = self.runs.sort("road_mu", "seed", descending=[True, False])
         wide = table.pivot(on="road_mu", index="seed", values="completion", maintain_order=True)
         return wide.sort("seed").drop_nulls().drop("seed").to_numpy().astype(np.bool_)
 
     @cached_property
     def threshold(self) -> Threshold:
-        """Where completion falls to a half."""
+        """Returns the friction at which completion falls to a half."""
         return threshold(self.outcomes, self.levels)
 
     @property
@@ -97,14 +100,14 @@ class Situation:
 
     @cached_property
     def judgements(self) -> list[Judgement]:
-        """The study's claims on a lead that slows down, Holm-adjusted within this situation."""
+        """Returns the study's claims on a lead that slows down, Holm-adjusted within this situation."""
         wanted = [f for f in FINDINGS if f.id in JUDGED]
         table = as_studied(self.runs)
         return judge(wanted, [table] * len(wanted))
 
 
 def situations(results: pl.DataFrame) -> list[Situation]:
-    """All of a map, in the order of the table."""
+    """Returns all situations of a map, in the order of the table."""
     finished = results.filter(~pl.col("outcome").is_in(NOT_RUN))
     order = ("driver", "actors", "speed_kmh", "gap_m", "deceleration")
     found = []
@@ -120,9 +123,10 @@ def situations(results: pl.DataFrame) -> list[Situation]:
 
 
 def threshold(completed: NDArray[np.bool_], levels: Sequence[float]) -> Threshold:
-    """The median critical friction of seeds. completed (seeds, levels), levels falling from dry.
+    """Returns the median critical friction of seeds.
 
-    The limits are widened by the distance of levels, between which nothing was driven.
+    completed: (seeds, levels), levels falling from dry. The limits are widened by the distance of
+    levels, between which nothing was driven.
     """
     dry, least = levels[0], levels[-1]
     if not len(completed):
@@ -141,7 +145,10 @@ def threshold(completed: NDArray[np.bool_], levels: Sequence[float]) -> Threshol
 
 
 def as_studied(runs: pl.DataFrame) -> pl.DataFrame:
-    """Runs as the study's findings read them: levels as weathers, and dry road as original friction."""
+    """Returns the runs with columns as the study's findings read them: levels as weathers.
+
+    The dry road stands for original friction in every weather; levels without a preset are left out.
+    """
     known = runs.filter(pl.col("preset") != "")
     named = known.with_columns(
         scenario=pl.lit(LEAD), weather="preset", cutin=pl.lit("fixed"), friction=pl.lit(REDUCED)

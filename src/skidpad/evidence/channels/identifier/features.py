@@ -55,7 +55,7 @@ _UPPER = np.array([i in GREATEST for i in PAIR_INDICATORS])
 
 
 def feature_row(readings: IndicatorReadings, risk: RiskMatrix, signals: SignalReadings) -> Floats:
-    """Returns the features of one cycle, (len(ROW_NAMES),)."""
+    """Returns the features of one cycle in the order of ROW_NAMES; NO_CONFLICT for times of no conflict."""
     pairs = np.where(_UPPER, _greatest(readings.by_pair()), _least(readings.by_pair()))
     ahead, behind = risk.risk_ahead.reshape(1, -1), risk.risk_behind.reshape(1, -1)
     times = np.minimum(
@@ -81,22 +81,23 @@ def feature_row(readings: IndicatorReadings, risk: RiskMatrix, signals: SignalRe
 
 
 def _least(values: Floats) -> Floats:
-    """Returns the least value of each row, nan values left out."""
+    """Returns the least value of each row, nan values left out; nan for a row of nan alone."""
     least: Floats = np.fmin.reduce(values, axis=1)
     return least
 
 
 def _greatest(values: Floats) -> Floats:
-    """Returns the greatest value of each row, nan values left out."""
+    """Returns the greatest value of each row, nan values left out; nan for a row of nan alone."""
     greatest: Floats = np.fmax.reduce(values, axis=1)
     return greatest
 
 
 @kernel
 def window_features(t: Floats, rows: Floats, at: NDArray[np.int64], out: Floats) -> None:
-    """Features (m, 4 f) at the cycles `at` (m,) from all rows (k, f) of the 5 s up to each.
+    """Writes into out (m, 4 f) the features at the cycles with indices `at` (m,), in the order OVER_TIME.
 
-    Nothing after a cycle and nothing older than the window counts.
+    t: (k,) s; rows: (k, f) of the drive, of which the WINDOW s up to each cycle count; nan where
+    none of them was evaluated.
     """
     f = rows.shape[1]
     for i in range(at.size):
@@ -119,7 +120,10 @@ def window_features(t: Floats, rows: Floats, at: NDArray[np.int64], out: Floats)
 
 
 def features_at(t: Floats, rows: Floats, at: NDArray[np.int64]) -> Floats:
-    """Features (m, len(FEATURE_NAMES)) at cycles `at` of a drive."""
+    """Returns the features (m, len(FEATURE_NAMES)) at the cycles with indices `at` (m,) of a drive.
+
+    t: (k,) s of all cycles; rows: (k, len(ROW_NAMES)).
+    """
     out = np.empty((at.size, len(OVER_TIME) * rows.shape[1]))
     window_features(t, rows, at, out)
     return out
@@ -135,7 +139,10 @@ class FeatureHistory:
         self._out = np.empty((1, len(FEATURE_NAMES)))
 
     def update(self, t: float, row: Floats) -> Floats:
-        """Add a cycle; the features (len(FEATURE_NAMES),) now. Valid until the next call."""
+        """Adds the row of a cycle at `t` s and returns the features (len(FEATURE_NAMES),) at it.
+
+        The result is valid until the next call.
+        """
         self.t[:-1], self.rows[:-1] = self.t[1:], self.rows[1:]
         self.t[-1], self.rows[-1] = t, row
         window_features(self.t, self.rows, self._at, self._out)

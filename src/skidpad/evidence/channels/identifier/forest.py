@@ -25,7 +25,10 @@ class Forest(NamedTuple):
 
 
 def check_forest(forest: Forest, features: int) -> Forest:
-    """`forest` if walking it stays inside and ends; else FileError."""
+    """Returns `forest` when every walk through it stays inside and ends; else raises FileError.
+
+    features: how many features a row has.
+    """
     n = forest.feature.size
     same = all(a.shape == (n,) for a in forest[1:7]) and forest.baseline.shape == (1,)
     if not same or n == 0:
@@ -44,7 +47,7 @@ def check_forest(forest: Forest, features: int) -> Forest:
 
 @kernel
 def probabilities(forest: Forest, x: Floats, out: Floats) -> None:
-    """Probability for each row of features x (m, f) into out (m,)."""
+    """Writes the probability for each row of features x (m, f) into out (m,)."""
     for i in range(x.shape[0]):
         total = forest.baseline[0]
         for r in range(forest.roots.size):

@@ -62,7 +62,10 @@ class Model:
     def identifier(
         self, truth: str = "world", route: str = ALL_ROUTES
     ) -> Mapping[HazardType, Detector]:
-        """The detectors that never saw `route`; those of all routes when it was not trained on."""
+        """Returns the detectors that never saw `route`; those of all routes when it was not trained on.
+
+        Raises ConfigError for a truth that the model was not trained on.
+        """
         known = {t for t, _ in self.detectors}
         if truth not in known:
             raise ConfigError(
@@ -72,7 +75,7 @@ class Model:
 
     @property
     def features(self) -> tuple[str, ...]:
-        """What it was given to learn from."""
+        """Returns the names of the features that it was given to learn from."""
         return tuple(self.card.get("features", FEATURE_NAMES))
 
     @property
@@ -81,7 +84,7 @@ class Model:
         return not set(self.features) <= set(TRAINED_ON)
 
     def trained_on(self) -> set[tuple[str, str]]:
-        """Route and seed of each recording that it was trained on."""
+        """Returns route and seed of each recording that it was trained on."""
         return {(str(r["route"]), str(r["seed"])) for r in self.card["recordings"]}
 
 
@@ -95,7 +98,10 @@ class LearnedIdentifier:
     probability: dict[HazardType, float] = field(default_factory=dict)
 
     def update(self, t: float, row: Floats) -> list[HazardType]:
-        """Hazards that are present at `t`."""
+        """Takes in the features `row` of the cycle at `t` s and returns the hazards that are present at it.
+
+        A hazard is present after `confirm` cycles in a row at its limit or above.
+        """
         x = self.history.update(t, row)[None]
         out = np.empty(1)
         found = []
@@ -110,7 +116,10 @@ class LearnedIdentifier:
 
 
 def probability_of(forest: Forest, t: Floats, rows: Floats) -> Floats:
-    """Probability (k,) at every cycle of a drive, as `LearnedIdentifier` would say in its course."""
+    """Returns the probability (k,) at every cycle of a drive, as `LearnedIdentifier` finds it on the way.
+
+    t: (k,) s; rows: (k, len(ROW_NAMES)).
+    """
     out = np.empty(t.size)
     for first in range(0, t.size, BLOCK):
         at = np.arange(first, min(first + BLOCK, t.size))
@@ -119,7 +128,10 @@ def probability_of(forest: Forest, t: Floats, rows: Floats) -> Floats:
 
 
 def events_of(t: Floats, p: Floats, limit: float, confirm: int) -> list[tuple[float, float]]:
-    """(start, end) of each event in probabilities over time, repeats within 2 s merged."""
+    """Returns (start, end) in s of each event in probabilities p (k,) over t (k,), pauses under PAUSE merged.
+
+    An event begins in the cycle in which p has been `limit` or more `confirm` times in a row.
+    """
     so_far = np.concatenate([np.zeros(confirm, dtype=np.int64), np.cumsum(p >= limit)])
     present = t[so_far[confirm:] - so_far[:-confirm] == confirm]
     if not present.size:
@@ -130,7 +142,7 @@ def events_of(t: Floats, p: Floats, limit: float, confirm: int) -> list[tuple[fl
 
 
 def model_bytes(model: Model) -> bytes:
-    """The model as .npz: arrays and a JSON card, nothing that runs."""
+    """Returns the model as bytes of an .npz file: arrays and a JSON card, nothing that runs."""
     arrays: dict[str, Any] = {}
     index: list[dict[str, Any]] = []
     for (truth, route), detectors in model.detectors.items():
@@ -162,20 +174,23 @@ def model_bytes(model: Model) -> bytes:
 
 
 def place_features(forest: Forest, places: NDArray[np.int64]) -> Forest:
-    """The forest with its features counted elsewhere: feature i is at places[i]."""
+    """Returns the forest with feature i counted as places[i]; leaves stay leaves."""
     inner = forest.feature >= 0
     feature = np.where(inner, places[np.maximum(forest.feature, 0)], forest.feature)
     return forest._replace(feature=feature.astype(np.int64))
 
 
 def _places_in(features: Sequence[str]) -> NDArray[np.int64]:
-    """Where each feature stands in this list; 0 for those that no forest of it asks for."""
+    """Returns the index in `features` of each of FEATURE_NAMES; 0 for those that it lacks."""
     own = {name: i for i, name in enumerate(features)}
     return np.array([own.get(name, 0) for name in FEATURE_NAMES], dtype=np.int64)
 
 
 def load_model(path: Path | None) -> Model:
-    """The model at `path`; None or the word `bundled`: the one that comes with Skidpad."""
+    """Returns the model in the file at `path`; None or the word `bundled`: the one that comes with Skidpad.
+
+    Raises FileError for a file that is no usable model.
+    """
     name = BUNDLED if path is None else str(path)
     file = Path(__file__).parent / "models" / "hazards.npz" if name == BUNDLED else Path(name)
     data = read_bytes(file, "model", SIZE_LIMIT)

@@ -52,7 +52,15 @@ class TrainingDrive:
 def train_model(
     drives: Sequence[TrainingDrive], say: Callable[[str], None] = lambda _: None
 ) -> Model:
-    """Detectors per truth for all routes, and without each route in turn."""
+    """Trains detectors per truth on all routes, and without each route in turn, and returns the model.
+
+    A truth that a drive lacks is left out, as is a hazard with fewer than EVENTS_MIN true events.
+    Routes are held out only when there are more than FOLDS. say: is called with a line per training.
+
+    Raises:
+        ConfigError: fewer than FOLDS drives.
+        MissingExtra: scikit-learn is not installed.
+    """
     require_learning()
     routes = sorted({d.route for d in drives})
     if len(drives) < FOLDS:
@@ -77,7 +85,10 @@ def train_model(
 
 
 def _detector(drives: Sequence[TrainingDrive], truth: str, hazard: HazardType) -> Detector | None:
-    """Trees over all drives; limit and confirmation from routes that the fold did not see."""
+    """Returns a detector with trees of all drives; None with under EVENTS_MIN true events or one class.
+
+    Limit and confirmation come from drives that the trees of a fold did not see.
+    """
     true = sum(s.hazard is hazard for d in drives for s in d.truths[truth])
     if true < EVENTS_MIN:
         return None
@@ -97,7 +108,7 @@ def _detector(drives: Sequence[TrainingDrive], truth: str, hazard: HazardType) -
 
 
 def _folds(drives: Sequence[TrainingDrive]) -> list[int]:
-    """Group of each drive: routes in turn, or drives in turn when there is one route."""
+    """Returns the group of each drive, 0 to FOLDS - 1: routes in turn, or drives where routes are too few."""
     routes = sorted({d.route for d in drives})
     if len(routes) < FOLDS:
         return [i % FOLDS for i in range(len(drives))]
@@ -107,7 +118,10 @@ def _folds(drives: Sequence[TrainingDrive]) -> list[int]:
 def _calibrate(
     judged: Sequence[tuple[TrainingDrive, Floats]], truth: str, hazard: HazardType
 ) -> tuple[float, int]:
-    """Limit and confirmation with the best harmonic mean of precision and recall of events."""
+    """Returns the limit and the confirmation in cycles with the best F1 score of events.
+
+    judged: drives with the probability (k,) that was found for them. The larger limit wins a tie.
+    """
     best = (-1.0, 0.5, 1)
     for confirm in CONFIRM:
         for limit in LIMITS.tolist():
@@ -122,7 +136,10 @@ def _calibrate(
 
 
 def _fit_trees(drives: Sequence[TrainingDrive], truth: str, hazard: HazardType) -> Forest | None:
-    """Trees by scikit-learn, as tables; None when only one class is there."""
+    """Returns trees fitted by scikit-learn; None when all cycles are of one class.
+
+    Of the cycles without the hazard each THINth is used.
+    """
     from sklearn.ensemble import HistGradientBoostingClassifier
     from threadpoolctl import threadpool_limits
 
@@ -151,7 +168,7 @@ def _fit_trees(drives: Sequence[TrainingDrive], truth: str, hazard: HazardType) 
 
 
 def forest_of(machine: Any) -> Forest:
-    """The trees of a fitted HistGradientBoostingClassifier of two classes."""
+    """Returns the trees of a fitted HistGradientBoostingClassifier of two classes as tables."""
     tables = [trees[0].nodes for trees in machine._predictors]
     sizes = [len(nodes) for nodes in tables]
     roots = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64)
@@ -197,7 +214,7 @@ def _card(drives: Sequence[TrainingDrive], routes: Sequence[str]) -> dict[str, A
 
 
 def card_text(model: Model) -> str:
-    """The model card as Markdown."""
+    """Returns the model card as Markdown."""
     c = model.card
     events = "\n".join(
         f"| {truth} | {', '.join(f'{h} {n}' for h, n in row.items())} |"
@@ -225,7 +242,7 @@ def card_text(model: Model) -> str:
 
 
 def require_learning() -> None:
-    """Raise MissingExtra without scikit-learn."""
+    """Raises MissingExtra when scikit-learn is not installed."""
     try:
         import sklearn  # noqa: F401
     except ImportError as error:

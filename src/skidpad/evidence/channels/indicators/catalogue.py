@@ -104,7 +104,7 @@ class Threshold(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError("a threshold goes with the bound lower or upper, and with no other")
 
     def violated(self, value: float) -> bool:
-        """Whether an evaluated `value` raises an alarm; equality passes (C-101)."""
+        """Returns whether an evaluated `value` raises an alarm; equality passes (C-101), as does no bound."""
         if self.threshold is None:
             return False
         return value < self.threshold if self.bound is Bound.LOWER else value > self.threshold
@@ -176,7 +176,7 @@ class IndicatorType:
 
     @property
     def key(self) -> AddedName:
-        """The name as thresholds and layouts use it."""
+        """Returns the name as thresholds and layouts use it."""
         return AddedName(self.name)
 
     def default_threshold(self) -> Threshold:
@@ -191,7 +191,7 @@ class IndicatorType:
         )
 
     def make(self) -> Callable[..., Any]:
-        """Returns what computes the value for one channel or pair."""
+        """Returns a new function for the value of one channel or pair; only for a package's indicator."""
         assert self.factory is not None, "Skidpad computes its own indicators"
         return self.factory()
 
@@ -236,7 +236,7 @@ class SafetyCase(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @cache
 def safety_case() -> SafetyCase:
-    """The tree of C-030 and C-031, with the homes of indicators settled as in DC-28."""
+    """Returns the safety case that comes with Skidpad, read once from its file."""
     return msgspec.yaml.decode(_built_in("safety_case.yaml"), type=SafetyCase)
 
 

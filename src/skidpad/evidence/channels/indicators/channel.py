@@ -47,7 +47,10 @@ class ChannelIndicators:
         self._path_scores: deque[float] = deque(maxlen=similarity.VARIANCE_WINDOW)
 
     def begin(self, usable: Usable | None) -> None:
-        """Take the cycle's message; after a long silence nothing is remembered."""
+        """Takes in the cycle's message; None: the channel said nothing.
+
+        All that is remembered is dropped at a message more than GAP_MAX s after the last, or before it.
+        """
         self.frame = None if usable is None else usable.frame
         if usable is None:
             self._path_scores.clear()
@@ -61,7 +64,7 @@ class ChannelIndicators:
                 memory.clear()
 
     def comfort(self, frame: ChannelFrame) -> Values:
-        """Comfort of the driven and of the planned path."""
+        """Returns comfort of the driven and of the planned path; to be called once per frame."""
         printed = self.settings.form is Form.PRINTED
         return {
             Indicator.HISTORY_COMFORT: self._history_comfort(frame),
@@ -86,7 +89,10 @@ class ChannelIndicators:
         return comfort.path_comfort(times, xs, ys, headings, settings.steepness, printed)
 
     def _fitted_comfort(self, t: float, poses: Floats) -> float:
-        """Returns comfort from accelerations fitted to `poses` (k, 4) now and a second ago."""
+        """Returns comfort from accelerations fitted to `poses` (k, 4) now and a second ago; nan without both.
+
+        poses: rows of t, x, y, heading.
+        """
         times, x, y, heading = np.ascontiguousarray(poses.T)
         along, across = comfort.fitted_acceleration(times, x, y, float(heading[len(heading) // 2]))
         drop_repeat(self._fits, t)
@@ -98,7 +104,10 @@ class ChannelIndicators:
         return comfort.comfort_score(along, across, jerk, self.settings.steepness, False)
 
     def prediction(self, frame: ChannelFrame) -> Values:
-        """The plan against earlier ones, and predictions against what happened."""
+        """Returns the indicators of the plan against earlier ones and of predictions against what happened.
+
+        Keeps the sampled plan and predictions for the indicators of pairs.
+        """
         n, step = len(frame.objects), prediction.WAYPOINT_STEP
         self.inside = sample_plan(frame.plan, frame.ego, 0.0, step, self.ways)
         self.object_ways = np.empty((n, prediction.WAYPOINTS, 2))
@@ -119,7 +128,7 @@ class ChannelIndicators:
         }
 
     def _path_agreement(self, frame: ChannelFrame) -> float:
-        """Returns the agreement of the plan with the past ones, weighted by age, and keeps it."""
+        """Returns the agreement of the plan with past ones, weighted by age; nan without any. Keeps it."""
         drop_repeat(self._plans, frame.t)
         scores = np.full(len(self._plans), np.nan)
         old = np.empty_like(self.ways)
@@ -154,7 +163,7 @@ class ChannelIndicators:
         }
 
     def _frame_to_validate(self, t: float) -> ChannelFrame | None:
-        """The frame whose predictions are due: the previous one, or that of 1 s ago."""
+        """Returns the frame whose predictions are due: the previous, or that of 1 s ago; None without."""
         delay = self.settings.validation_delay
         if delay == 0.0:
             return self._frames[-1] if self._frames else None
@@ -162,13 +171,16 @@ class ChannelIndicators:
 
 
 def drop_repeat(history: deque[Entry], t: float) -> None:
-    """Forget the newest entry if it is of `t`: the same message in two cycles counts once."""
+    """Removes the newest entry if it is of `t`, so that the same message in two cycles counts once."""
     if history and history[-1][0] == t:
         history.pop()
 
 
 def nearest(history: deque[Entry], t: float) -> Entry | None:
-    """The entry of `history`, in order of time, that is nearest to `t` and in the same cycle."""
+    """Returns the entry of `history` that is nearest to `t` s; None where none is within SAME_CYCLE.
+
+    history: in order of time.
+    """
     first = bisect_left(history, t - SAME_CYCLE, key=lambda entry: float(entry[0]))
     there = takewhile(lambda e: e[0] <= t + SAME_CYCLE, islice(history, first, None))
     return min(there, key=lambda entry: abs(entry[0] - t), default=None)

@@ -29,7 +29,7 @@ class Form(str, Enum):
 def accelerations(
     t: Floats, x: Floats, y: Floats, heading: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Longitudinal (n - 2,) and lateral (n - 2,) acceleration and jerk (n - 3,) of n positions.
+    """Returns longitudinal (n - 2,) and lateral (n - 2,) acceleration and jerk (n - 3,) of n positions.
 
     Differences of positions give velocities at the middles of intervals (DC-03), theirs the
     accelerations, resolved along and across the heading (DC-02); jerk is the difference of the
@@ -61,7 +61,7 @@ def accelerations(
 def comfort_score(
     along: float, across: float, jerk: float, steepness: float, printed: bool
 ) -> float:
-    """Score in [0, 1] of one longitudinal and lateral acceleration and jerk, NaN if any is NaN.
+    """Returns the score in [0, 1] of two accelerations in m/s^2 and a jerk in m/s^3; NaN if any is NaN.
 
     1 - ((NV(along) + NV(across)) / 2 + NV(jerk)) / 2 (C-043), where the printed normalisation is
     NV(s) = 1 / (1 + exp(-w s)) (C-042) and the completed one tanh(w |s| / 2) (C-044, DC-01).
@@ -81,7 +81,7 @@ def comfort_score(
 def path_comfort(
     t: Floats, x: Floats, y: Floats, heading: Floats, steepness: float, printed: bool
 ) -> float:
-    """Comfort of n stored positions, (n,) each; NaN with fewer than MIN_POINTS (C-040).
+    """Returns the comfort of n stored positions, (n,) each; NaN with fewer than MIN_POINTS (C-040).
 
     The raw values are averaged over the path: signed in the printed form, else by size (C-045).
     """
@@ -97,9 +97,10 @@ def path_comfort(
 
 @kernel
 def direction_of_motion(t: Floats, x: Floats, y: Floats, first: float, out: Floats) -> None:
-    """Heading at each of n positions from the motion to the next; held where it stands.
+    """Writes the heading in rad at each of n positions, of the motion to the next, into out (n,).
 
-    `first` is the heading at the start; a path driven in reverse keeps the car's own heading.
+    It is held below V_STANDING. `first` is the heading at the start; a path driven in reverse keeps
+    the car's own heading.
     """
     heading = first
     n = len(t)
@@ -114,7 +115,10 @@ def direction_of_motion(t: Floats, x: Floats, y: Floats, first: float, out: Floa
 
 @kernel
 def planned_path_comfort(plan: Floats, ego: Floats, steepness: float, printed: bool) -> float:
-    """Comfort of the ego's place followed by its plan (C-046): plan (m, 3), ego (5,)."""
+    """Returns the comfort of the ego's place followed by its plan (C-046); NaN for a plan too short.
+
+    plan: (m, 3) x, y, t, up to the first row that is not finite; ego: (5,).
+    """
     k = 0
     for i in range(plan.shape[0]):
         if not np.isfinite(plan[i, 0] + plan[i, 1] + plan[i, 2]):
@@ -134,10 +138,10 @@ def planned_path_comfort(plan: Floats, ego: Floats, steepness: float, printed: b
 
 @kernel
 def fitted_acceleration(t: Floats, x: Floats, y: Floats, heading: float) -> tuple[float, float]:
-    """Longitudinal and lateral acceleration of a least-squares parabola through n positions.
+    """Returns longitudinal and lateral acceleration of a least-squares parabola through n positions.
 
     The leading coefficient comes from the polynomial orthogonal to 1 and t, so no system is solved.
-    NaN with fewer than FIT_MIN_POINTS or when all times coincide. `heading` at the middle.
+    NaN with fewer than FIT_MIN_POINTS or when all times coincide. heading: rad, at the middle.
     """
     n = len(t)
     if n < FIT_MIN_POINTS:

@@ -40,7 +40,7 @@ class Layout:
 
     @classmethod
     def of(cls, channels: Sequence[str]) -> Layout:
-        """The layout for these channels."""
+        """Returns the layout for these channels, their pairs and added indicators; ConfigError for none."""
         if not channels:
             raise ConfigError("indicators need at least one channel, got none")
         pairs = tuple(combinations(range(len(channels)), 2))
@@ -61,7 +61,7 @@ class Layout:
         return cls(tuple(channels), pairs, tuple(places), span, added)
 
     def indices(self, indicators: Iterable[AnyIndicator]) -> Ints:
-        """Places of all subjects of `indicators`, in their order."""
+        """Returns the places in a row of all subjects of `indicators`, in their order."""
         row = np.arange(len(self.places))
         return np.concatenate([row[self.span[i]] for i in indicators])
 
@@ -79,18 +79,18 @@ class IndicatorReadings:
         return view
 
     def by_channel(self) -> Floats:
-        """View (len(CHANNEL_INDICATORS), n channels)."""
+        """Returns a view (len(CHANNEL_INDICATORS), n channels) of the values."""
         n = len(self.layout.channels)
         return self.values[: len(CHANNEL_INDICATORS) * n].reshape(-1, n)
 
     def by_pair(self) -> Floats:
-        """View (len(PAIR_INDICATORS), n pairs)."""
+        """Returns a view (len(PAIR_INDICATORS), n pairs) of the values."""
         n = len(CHANNEL_INDICATORS) * len(self.layout.channels)
         end = n + len(PAIR_INDICATORS) * len(self.layout.pairs)
         return self.values[n:end].reshape(len(PAIR_INDICATORS), -1)
 
     def shared_rows(self) -> list[set[int]]:
-        """Per channel the rows of its objects that some other channel also reports."""
+        """Returns per channel the rows of its objects that some other channel also reports."""
         rows: list[set[int]] = [set() for _ in self.layout.channels]
         for (a, b), matched in zip(self.layout.pairs, self.matched, strict=True):
             if matched is not None:

@@ -49,13 +49,13 @@ class PairIndicators:
         self._offsets: deque[tuple[float, float, float]] = deque()  # t, b to a in m
 
     def silent(self) -> None:
-        """A cycle in which a channel said nothing."""
+        """Notes a cycle in which a channel said nothing: no matches; variances are nan until refilled."""
         self.matched = None
         self._locations.append(NAN)
         self._paths.append(NAN)
 
     def similarity(self, a: ChannelFrame, b: ChannelFrame) -> Values:
-        """Agreement of ego poses and of objects now; pairs the objects for `prediction` too."""
+        """Returns agreement of ego poses and objects now; keeps the matched objects for `prediction`."""
         self.matched = similarity.match_points(a.objects, b.objects, self.settings.pairing_distance)
         location, orientation, area = similarity.object_similarity(
             a.objects, self.a.areas, b.objects, self.b.areas, self.matched
@@ -92,12 +92,18 @@ class PairIndicators:
         }
 
     def _shift(self, since: float, dx: float, dy: float) -> float:
-        """How far, m, the channels' places have moved apart since then."""
+        """Returns by how many m the channels' places have moved apart since that time; nan where unknown.
+
+        since: s; dx, dy: m from b to a now.
+        """
         earlier = nearest(self._offsets, since)
         return NAN if earlier is None else float(np.hypot(dx - earlier[1], dy - earlier[2]))
 
     def prediction(self, similar: Values) -> Values:
-        """Plans and predictions of both against each other, and agreement with what is `similar`."""
+        """Returns agreement of both channels' plans and predictions, and the mean agreement of all.
+
+        similar: what `similarity` returned in this cycle.
+        """
         assert self.matched is not None
         a, b, decay = self.a, self.b, self.settings.decay
         m = min(a.inside, b.inside)

@@ -18,7 +18,7 @@ Lap = Callable[[str], None]
 
 
 def no_lap(_: str) -> None:
-    """Does nothing, where nothing is timed."""
+    """Does nothing; stands for `lap` where nothing is timed."""
 
 
 class IndicatorPanel:
@@ -30,7 +30,7 @@ class IndicatorPanel:
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything."""
+        """Forgets all earlier cycles."""
         self.channels = [ChannelIndicators(self.settings) for _ in self.layout.channels]
         self.pairs = [
             PairIndicators(self.channels[a], self.channels[b], self.settings)
@@ -42,9 +42,10 @@ class IndicatorPanel:
         ]
 
     def update(self, messages: Sequence[Usable | None], lap: Lap = no_lap) -> IndicatorReadings:
-        """The values of one cycle; `lap(name)` is called when the part `name` is done.
+        """Returns the values of one cycle; `lap(name)` is called when the part `name` is done.
 
-        Those of risk (safety score, share of the risk behind) are left open.
+        messages: one per channel, None: it said nothing. Those of risk (safety score, share of the
+        risk behind) are left nan.
         """
         values = np.full(len(self.layout.places), np.nan)
         for channel, message in zip(self.channels, messages, strict=True):
@@ -72,7 +73,7 @@ class IndicatorPanel:
         return IndicatorReadings(self.layout, values, tuple(pair.matched for pair in self.pairs))
 
     def _add_foreign(self, row: Floats) -> None:
-        """Writes the values of the indicators that packages added."""
+        """Writes the values of the indicators that packages added into the row; nan stays without a frame."""
         for kind, functions in self.added:
             first = self.layout.span[kind.key].start
             for subject, function in enumerate(functions):

@@ -20,7 +20,7 @@ MATCH_TOLERANCE = 1.0  # m (C-075)
 
 @kernel
 def trajectory_similarity(a: Floats, b: Floats, decay: float) -> float:
-    """Weighted mean of 1 / (1 + d_n) over corresponding way-points (C-070 to C-073).
+    """Returns the weighted mean of 1 / (1 + d_n) over corresponding way-points (C-070 to C-073).
 
     a, b (m, 2) at common times; the weight of way-point n is decay^(n - 1). NaN when m is 0.
     """
@@ -37,7 +37,7 @@ def trajectory_similarity(a: Floats, b: Floats, decay: float) -> float:
 def object_trajectory_similarity(
     ways_a: Floats, inside_a: Ints, ways_b: Floats, inside_b: Ints, pairs: Ints, decay: float
 ) -> float:
-    """Mean over pairs of the similarity of their predictions (C-073).
+    """Returns the mean over pairs (p, 2) of the similarity of their predictions (C-073).
 
     ways (n, m, 2) are sampled at common times and extended at last velocity, inside (n,) is each
     one's own duration in way-points; the longer of the two counts. Pairs without any prediction
@@ -59,7 +59,7 @@ def object_trajectory_similarity(
 
 @kernel
 def discrete_frechet(a: Floats, b: Floats) -> float:
-    """Discrete Frechet distance in m of the polylines a (n, 2) and b (m, 2), by rows (C-077)."""
+    """Returns the discrete Frechet distance in m of polylines a (n, 2) and b (m, 2); NaN for an empty one."""
     n, m = a.shape[0], b.shape[0]
     if n == 0 or m == 0:
         return np.nan
@@ -84,7 +84,7 @@ def discrete_frechet(a: Floats, b: Floats) -> float:
 
 @kernel
 def plan_agreement(a: Floats, b: Floats) -> float:
-    """1 / (1 + Frechet distance) of two plans over their overlap; NaN below two way-points."""
+    """Returns 1 / (1 + Frechet distance) of two plans (m, 2) over their overlap; NaN below two way-points."""
     if a.shape[0] < 2:
         return np.nan
     return 1.0 / (1.0 + discrete_frechet(a, b))
@@ -92,7 +92,7 @@ def plan_agreement(a: Floats, b: Floats) -> float:
 
 @kernel
 def cross_channel_agreement(a: Floats, b: Floats) -> float:
-    """`plan_agreement` after moving b's start onto a's (C-079): a, b (m, 2) at common times."""
+    """Returns `plan_agreement` after moving b's start onto a's (C-079): a, b (m, 2) at common times."""
     moved = b.copy()
     for n in range(b.shape[0]):
         moved[n, 0] += a[0, 0] - b[0, 0]
@@ -102,7 +102,10 @@ def cross_channel_agreement(a: Floats, b: Floats) -> float:
 
 @kernel
 def weighted_history(scores: Floats, decay: float) -> float:
-    """Weighted mean of scores (h,), newest first, each older one times `decay` (C-078, DC-08)."""
+    """Returns the weighted mean of scores (h,), newest first, each older one times `decay` (C-078, DC-08).
+
+    Scores that are not finite are left out; nan without any.
+    """
     total = weights = 0.0
     weight = 1.0
     for score in scores:
@@ -123,12 +126,12 @@ def follow_up(
     tolerance: float,
     search: float,
 ) -> tuple[int, int, int]:
-    """How many objects followed their prediction, missed it, or left (C-075, C-076).
+    """Returns how many objects followed their prediction, missed it, or left (C-075, C-076).
 
     predicted (n, >=2) is where they should be now, inside (n,) > 0 where a prediction reaches
     that far, actual (m, >=2) where objects are. With identities an object is looked up by its own;
-    without, the nearest within `search` m is taken, one to one (decision C-10). Returns followed
-    (within `tolerance` m), missed, left.
+    without (any id below 0), the nearest within `search` m is taken, one to one (decision C-10). An
+    object followed when it is within `tolerance` m, left when it has no partner.
     """
     followed = missed = left = 0
     by_id = len(ids_then) > 0 and np.all(ids_then >= 0) and np.all(ids_now >= 0)

@@ -37,5 +37,5 @@ class IndicatorSettings:
 
     @property
     def validation_delay(self) -> float:
-        """Age in s of the prediction that motion is held against: 0 = the previous cycle."""
+        """Returns the age in s of the prediction that motion is held against; 0: the previous cycle's."""
         return 1.0 if self.form is Form.CORRECTED else 0.0

@@ -19,20 +19,20 @@ PAIRING_DISTANCE = 4.0  # m (C-054)
 
 @kernel
 def location_similarity(ego_a: Floats, ego_b: Floats) -> float:
-    """1 / (1 + d) of two ego positions (C-050)."""
+    """Returns 1 / (1 + d) of two ego positions d m apart (C-050)."""
     return 1.0 / (1.0 + hypot(ego_a[0] - ego_b[0], ego_a[1] - ego_b[1]))
 
 
 @kernel
 def angle_similarity(a: float, b: float) -> float:
-    """1 - |a - b| / pi with the difference wrapped to [0, pi], in rad (C-053)."""
+    """Returns 1 - |a - b| / pi with the difference wrapped to [0, pi], in rad (C-053)."""
     difference = abs(a - b) % (2.0 * np.pi)
     return 1.0 - min(difference, 2.0 * np.pi - difference) / np.pi
 
 
 @kernel
 def sample_variance(values: Floats) -> float:
-    """Sample variance (divisor n - 1) of a full window; NaN while a value is missing (C-052)."""
+    """Returns the sample variance (divisor n - 1) of a full window; NaN while a value is missing (C-052)."""
     mean = np.mean(values)
     total = 0.0
     for v in values:
@@ -42,13 +42,13 @@ def sample_variance(values: Floats) -> float:
 
 @kernel
 def count_similarity(n_a: int, n_b: int) -> float:
-    """1 / (1 + |n_a - n_b|) (C-056)."""
+    """Returns 1 / (1 + |n_a - n_b|) (C-056)."""
     return 1.0 / (1.0 + abs(n_a - n_b))
 
 
 @kernel
 def pair_points(a: Floats, b: Floats, max_distance: float) -> Ints:
-    """One-to-one pairs (p, 2) of rows of a (n, >=2) and b (m, >=2), nearest pair first (C-054).
+    """Returns one-to-one pairs (p, 2) of rows of a (n, >=2) and b (m, >=2), nearest pair first (C-054).
 
     No pair is further apart than `max_distance`, in m; ties go to the earlier rows.
     """
@@ -90,7 +90,7 @@ def pair_points(a: Floats, b: Floats, max_distance: float) -> Ints:
 
 
 def match_points(a: Floats, b: Floats, max_distance: float) -> Ints:
-    """`pair_points`, or the best assignment where taking the nearest first leaves a pair out."""
+    """Returns `pair_points`, or the best assignment where taking the nearest first leaves a pair out."""
     pairs: Ints = pair_points(a, b, max_distance)
     if len(pairs) == min(len(a), len(b)):
         return pairs
@@ -110,7 +110,7 @@ def match_points(a: Floats, b: Floats, max_distance: float) -> Ints:
 
 @kernel
 def polygon_area(polygon: Floats, size: int) -> float:
-    """Area in m^2 of the first `size` vertices of (k, 2), by the shoelace formula (C-059)."""
+    """Returns the area in m^2 of the first `size` vertices of (k, 2), by the shoelace formula (C-059)."""
     total = 0.0
     for i in range(size):
         j = i + 1 if i + 1 < size else 0
@@ -120,7 +120,7 @@ def polygon_area(polygon: Floats, size: int) -> float:
 
 @kernel
 def polygon_areas(polygons: Floats, size: Ints) -> Floats:
-    """Areas (n,) of polygons (n, k, 2) with `size` (n,) vertices each."""
+    """Returns the areas (n,) in m^2 of polygons (n, k, 2) with `size` (n,) vertices each."""
     out = np.empty(len(size))
     for i in range(len(size)):
         out[i] = polygon_area(polygons[i], size[i])
@@ -129,7 +129,7 @@ def polygon_areas(polygons: Floats, size: Ints) -> Floats:
 
 @kernel
 def area_ratio(a: float, b: float) -> float:
-    """Smaller over larger area (C-058); two zero areas agree, one alone does not (C-059)."""
+    """Returns smaller over larger area (C-058): 1 for two areas of zero, 0 for one (C-059)."""
     larger = max(a, b)
     if larger > 0.0:
         return min(a, b) / larger
@@ -140,9 +140,9 @@ def area_ratio(a: float, b: float) -> float:
 def object_similarity(
     objects_a: Floats, areas_a: Floats, objects_b: Floats, areas_b: Floats, pairs: Ints
 ) -> tuple[float, float, float]:
-    """Location, orientation and area similarity: means over pairs (C-055, C-057, C-058).
+    """Returns location, orientation and area similarity: means over pairs (C-055, C-057, C-058).
 
-    objects (n, 5), areas (n,), pairs (p, 2). Both channels empty: 1; no pair: NaN (C-060).
+    objects (n, 5), areas (n,) in m^2, pairs (p, 2). Both channels empty: 1; no pair: NaN (C-060).
     """
     if objects_a.shape[0] == 0 and objects_b.shape[0] == 0:
         return 1.0, 1.0, 1.0
@@ -164,7 +164,10 @@ def object_similarity(
 
 @kernel
 def class_agreement(classes_a: Ints, classes_b: Ints, pairs: Ints) -> float:
-    """Share of pairs with equal classes among those where both channels name one (C-097)."""
+    """Returns the share of pairs with equal classes where both channels name one (C-097); NaN without any.
+
+    A class below 0 is not named.
+    """
     known = equal = 0
     for k in range(pairs.shape[0]):
         a, b = classes_a[pairs[k, 0]], classes_b[pairs[k, 1]]

@@ -54,7 +54,11 @@ def false_cause(
     motion: Mapping[str, Floats],
     safety: Floats,
 ) -> FalseCause:
-    """The first that applies. `motion`: t, v and yaw rate (k,) of the ego; `safety`: score (k,)."""
+    """Returns the first cause, in the order of FalseCause, that applies within REACH s of a false alarm.
+
+    true: hazards of the truth it is judged by; other: those of the other truth. motion: t in s, v and
+    yaw_rate (k,) of the ego; safety: score (k,), below 0.8 a conflict.
+    """
     if any(s.hazard is found.hazard and _near(s, found) for s in other):
         return FalseCause.OTHER_TRUTH
     if any(s.hazard is not found.hazard and _near(s, found) for s in true):
@@ -72,7 +76,10 @@ def false_cause(
 def missed_cause(
     missed: Span, rule: Rule, signals: Sequence[tuple[float, dict[Signal, float]]]
 ) -> str:
-    """Which clause of the rule kept it from firing: the one that held in the fewest cycles."""
+    """Returns what the clause lacked that held in the fewest cycles within REACH s of a missed hazard.
+
+    signals: time in s and values of each cycle. When all clauses held it says "never together".
+    """
     near = [v for t, v in signals if missed.t_start - REACH <= t <= missed.t_end + REACH]
     if not near:
         return "no cycle was recorded"
@@ -106,7 +113,7 @@ OTHER = {"sim": "world", "world": "sim"}
 
 
 def moments(cycles: Sequence[Cycle], safety: Sequence[float]) -> Floats:
-    """(k, 3) speed and yaw rate of the ego and the least safety score, for causes."""
+    """Returns (k, 3): speed in m/s and yaw rate in rad/s of the ego, and the least safety score per cycle."""
     motion = ego_motion(cycles)
     out: Floats = np.column_stack([motion["v"], motion["yaw_rate"], np.array(safety, np.float64)])
     return out
@@ -119,7 +126,11 @@ def mistakes(
     motion: Floats,
     why_missed: Callable[[str, Span], str],
 ) -> Iterator[Mistake]:
-    """Every surplus detection and every missed hazard, with its cause; motion: of `moments`."""
+    """Yields every surplus detection and every missed hazard with its cause.
+
+    detected: spans by identifier; t: (k,) s; motion: of `moments`; why_missed: called with an
+    identifier and a missed span, returns the cause.
+    """
     moving = {"t": t, "v": motion[:, 0], "yaw_rate": motion[:, 1]}
     for identifier, spans in detected.items():
         for truth, true in truths.items():
@@ -135,7 +146,10 @@ def mistakes(
 
 
 def ego_motion(cycles: Sequence[Cycle]) -> dict[str, Floats]:
-    """Time, speed and yaw rate of the ego as the first channel that reports says; NaN without."""
+    """Returns t in s, v in m/s and yaw_rate in rad/s (k,) of the first channel with a finite pose.
+
+    NaN where no channel has one; the yaw rate, over ten cycles, is 0 in the first and last five.
+    """
     t = np.array([c.t for c in cycles])
     egos = np.full((len(cycles), 5), np.nan)
     for k, cycle in enumerate(cycles):

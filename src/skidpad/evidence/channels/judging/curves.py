@@ -71,7 +71,10 @@ class Swept(NamedTuple):
 def sweep_counts(
     sweeps: Mapping[str, Mapping[HazardType, Sweep]], truths: Mapping[str, Sequence[Span]]
 ) -> Iterator[Swept]:
-    """The curves of all identifiers against all truths."""
+    """Yields the curves of all identifiers against all truths.
+
+    sweeps: found spans by identifier, hazard and limit; truths: true spans by name.
+    """
     for identifier, of in sweeps.items():
         for truth, true in truths.items():
             for hazard, rows in points(of, true).items():
@@ -79,12 +82,15 @@ def sweep_counts(
 
 
 def columns(signals: Sequence[Mapping[Signal, float]]) -> Table:
-    """The signals of a drive by name."""
+    """Returns the signals of a drive as a column (k,) per signal."""
     return {s: np.array([row[s] for row in signals], dtype=np.float64) for s in Signal}
 
 
 def found_by(rule: Rule, t: Floats, table: Table, begin: float) -> tuple[Span, ...]:
-    """What the rule finds from `begin` on, as it does cycle by cycle."""
+    """Returns the spans that the rule finds and that end at `begin` s or later, as cycle by cycle.
+
+    t: (k,) s; table: the signals of the drive.
+    """
     present = np.zeros(t.size)
     for clauses in rule.alternatives:
         held = np.ones(t.size, dtype=bool)
@@ -97,12 +103,15 @@ def found_by(rule: Rule, t: Floats, table: Table, begin: float) -> tuple[Span, .
 def spans(
     hazard: HazardType, t: Floats, p: Floats, limit: float, confirm: int, begin: float
 ) -> tuple[Span, ...]:
-    """Events of a probability over time that reach beyond `begin`."""
+    """Returns the events of a probability p (k,) over t (k,) that end at `begin` s or later.
+
+    limit, confirm: of `events_of`.
+    """
     return tuple(Span(hazard, a, b) for a, b in events_of(t, p, limit, confirm) if b >= begin)
 
 
 def with_limit(rule: Rule, signal: Signal, change: Callable[[float], float]) -> Rule:
-    """The rule with every clause on `signal` changed."""
+    """Returns the rule with the value of every clause on `signal` changed by `change`."""
     alternatives = tuple(
         tuple(replace(c, value=change(c.value)) if c.signal is signal else c for c in clauses)
         for clauses in rule.alternatives
@@ -111,7 +120,10 @@ def with_limit(rule: Rule, signal: Signal, change: Callable[[float], float]) -> 
 
 
 def of_rules(profile: Profile, t: Floats, table: Table, begin: float) -> dict[HazardType, Sweep]:
-    """What the profile would find, by limit of each hazard's leading clause."""
+    """Returns what the profile would find, by hazard and limit of its leading clause; {} for AS_PRINTED.
+
+    Only spans that end at `begin` s or later count.
+    """
     rules = {r.hazard: r for r in load_rules(profile)}
     out: dict[HazardType, Sweep] = {}
     for hazard, (signal, limits) in LEADS.get(profile, {}).items():
@@ -121,14 +133,18 @@ def of_rules(profile: Profile, t: Floats, table: Table, begin: float) -> dict[Ha
 
 
 def constant(value: float) -> Callable[[float], float]:
-    """The function that is `value` everywhere."""
+    """Returns a function that gives `value` for every argument."""
     return lambda _: value
 
 
 def of_distances(
     channels: Sequence[str], looked: Sequence[Looked], begin: float
 ) -> dict[HazardType, Sweep]:
-    """What `tracked` would find of both tailgating hazards, by how sure a gap must be short."""
+    """Returns what `tracked` would find of both tailgating hazards, by hazard and standard deviations.
+
+    These, SURES, say how sure it must be that a gap is short. Only spans that end at `begin` s or
+    later count.
+    """
     found: dict[HazardType, dict[float, tuple[Span, ...]]] = {hazard: {} for hazard in SIDES}
     for sure in SURES:
         for hazard, short in _short(Tracked(channels, sure=sure), looked, begin).items():
@@ -139,7 +155,7 @@ def of_distances(
 def told_the_grip(
     channels: Sequence[str], looked: Sequence[Looked], grip: float, begin: float
 ) -> tuple[Span, ...]:
-    """What `tracked` would find of both tailgating hazards if it knew the grip."""
+    """Returns what `tracked` would find of both tailgating hazards from `begin` s on if it knew the grip."""
     found = _short(Tracked(channels, SafeDistance.on(grip)), looked, begin)
     return tuple(s for short in found.values() for s in short)
 
@@ -153,7 +169,7 @@ class Looked(NamedTuple):
 
 
 def look(channels: Sequence[str], cycles: Sequence[Cycle]) -> list[Looked]:
-    """Transforms each cycle into path coordinates."""
+    """Returns each cycle with what every channel saw in path coordinates, in order of time."""
     lookouts = [Lookout() for _ in channels]
     rows = ((c.t, [None if f is None else usable(f).frame for f in c.frames]) for c in cycles)
     return [
@@ -165,7 +181,7 @@ def look(channels: Sequence[str], cycles: Sequence[Cycle]) -> list[Looked]:
 def _short(
     tracked: Tracked, looked: Sequence[Looked], begin: float
 ) -> dict[HazardType, tuple[Span, ...]]:
-    """Returns spans (s) of short gaps ahead and behind that end at `begin` or later."""
+    """Returns the spans of short gaps ahead and behind that end at `begin` s or later, by hazard."""
     rows = [tracked.distances(*cycle) for cycle in looked]
     t = np.array([cycle.t for cycle in looked])
     short = {
@@ -178,7 +194,10 @@ def _short(
 def of_learned(
     detectors: Mapping[HazardType, Detector], t: Floats, rows: Floats, begin: float
 ) -> dict[HazardType, Sweep]:
-    """What a learned identifier would find, by limit of probability."""
+    """Returns what a learned identifier would find, by hazard and limit of probability (LIMITS).
+
+    t: (k,) s; rows: (k, f) features. Only spans that end at `begin` s or later count.
+    """
     out: dict[HazardType, Sweep] = {}
     for hazard, d in detectors.items():
         p = probability_of(d.forest, t, rows)
@@ -189,7 +208,7 @@ def of_learned(
 def points(
     sweeps: Mapping[HazardType, Sweep], true: Sequence[Span]
 ) -> dict[HazardType, tuple[Point, ...]]:
-    """Counts of each sweep against a truth."""
+    """Returns the counts at each limit against a truth, by scored hazard."""
     out = {}
     for hazard in (h for h in SCORED_HAZARDS if h in sweeps):
         here = [s for s in true if s.hazard is hazard]

@@ -43,14 +43,14 @@ class Evaluation:
 
     @property
     def identifiers(self) -> list[str]:
-        """Rule profiles and learned identifiers that judged every segment."""
+        """Returns the rule profiles and learned identifiers that judged every segment."""
         names = dict.fromkeys(name for s in self.segments for name in s.detected)
         return [n for n in names if all(n in s.detected for s in self.segments)]
 
     def tallies(
         self, identifier: str, truth: str, tolerance: float = TOLERANCES[0]
     ) -> list[dict[HazardType, Tally]]:
-        """Counts per segment, of the segments that have this truth."""
+        """Returns the counts by hazard of each segment that has this truth; `tolerance` is in s."""
         return [
             tally(s.detected[identifier], s.truths[truth], s.hours, tolerance)
             for s in self.segments
@@ -60,12 +60,12 @@ class Evaluation:
     def scores(
         self, identifier: str, truth: str, tolerance: float = TOLERANCES[0]
     ) -> dict[HazardType, Score]:
-        """Scores of the three scored hazards."""
+        """Returns the scores of the three scored hazards over all segments that have this truth."""
         rows = self.tallies(identifier, truth, tolerance)
         return {h: score([row[h] for row in rows]) for h in SCORED_HAZARDS}
 
     def by_route(self, identifier: str, truth: str) -> dict[str, dict[HazardType, Tally]]:
-        """Returns the counts of each route (C-216)."""
+        """Returns the counts by route and scored hazard, of the segments that have this truth (C-216)."""
         out: dict[str, dict[HazardType, Tally]] = {}
         with_truth = [s for s in self.segments if truth in s.truths]
         for segment, row in zip(with_truth, self.tallies(identifier, truth), strict=True):
@@ -75,7 +75,7 @@ class Evaluation:
         return out
 
     def truths_agree(self) -> dict[HazardType, Score]:
-        """World-model truth held against simulator truth, as if it were a detector (C-212)."""
+        """Returns scores of world-model truth against simulator truth, as if it were a detector (C-212)."""
         rows = [
             tally(s.truths["world"], s.truths["sim"], s.hours)
             for s in self.segments
@@ -84,7 +84,7 @@ class Evaluation:
         return {h: score([row[h] for row in rows]) for h in SCORED_HAZARDS}
 
     def curve(self, truth: str) -> dict[float, dict[HazardType, Tally]]:
-        """Counts by factor on the threshold, over the segments that have this truth (C-105)."""
+        """Returns counts by factor on the threshold, over the segments that have this truth (C-105)."""
         out: dict[float, dict[HazardType, Tally]] = {}
         for segment in (s for s in self.segments if truth in s.truths):
             for factor, spans in segment.curve.items():
@@ -95,7 +95,10 @@ class Evaluation:
         return out
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything, for JSON: of natural drivers, and of the risky ones apart (never pooled)."""
+        """Returns everything as plain data: of natural drivers, and of risky ones apart (never pooled).
+
+        On top stand the natural ones, where there are any; all are under "strata".
+        """
         parts = {
             stratum: Evaluation([s for s in self.segments if s.stratum is stratum])
             for stratum in Stratum
@@ -146,7 +149,7 @@ class Evaluation:
         }
 
     def _precision_recall(self) -> dict[str, dict[str, dict[str, list[list[float]]]]]:
-        """Counts and weights at each limit, by truth, identifier and hazard."""
+        """Returns rows of limit, tp, fp, fn, found and true weight, by truth, identifier and hazard."""
         curves: dict[tuple[str, str, str], list[tuple[Point, ...]]] = {}
         for s in self.segments:
             for c in s.points:
@@ -161,7 +164,7 @@ class Evaluation:
         return out
 
     def _causes(self) -> list[dict[str, Any]]:
-        """How often which cause stands behind false alarms and misses (C-215)."""
+        """Returns how often each cause stands behind false alarms and misses, in falling order (C-215)."""
         counted = Counter(
             (m.identifier, m.truth, m.hazard.value, m.missed, m.cause)
             for s in self.segments
@@ -173,7 +176,7 @@ class Evaluation:
         ]
 
     def segment_table(self) -> pl.DataFrame:
-        """One row per segment: practical rules against world-model truth, and the drive's facts."""
+        """Returns a row per segment: practical rules against world-model truth, and the drive's facts."""
         greatest: dict[str, Floats] = {}
         for s in self.segments:
             if len(s.times):
@@ -224,7 +227,7 @@ def _facts(s: Segment) -> dict[str, Any]:
 
 
 def _row(s: Score) -> dict[str, Any]:
-    """Returns a hazard's score as plain data; the median lead time in s is None without any."""
+    """Returns a hazard's score as plain data; the median lead time in s is None where none is known."""
     total = s.total
     leads = sorted(total.lead_times)
     return {
@@ -244,9 +247,13 @@ def _row(s: Score) -> dict[str, Any]:
 
 
 def read_labels(path: Path) -> dict[str, list[Span]]:
-    """Human labels by recording ("" where the file has no column `recording`), both worlds.
+    """Returns human labels by recording ("" where the file has no column `recording`), of both worlds.
 
     CSV with the columns hazard, start_s, end_s, world (sim or channels), annotator, note.
+
+    Raises:
+        FileError: the file cannot be read.
+        ConfigError: a row lacks a column or has a value that is not allowed.
     """
     try:
         with path.open(encoding="utf-8", newline="") as file:

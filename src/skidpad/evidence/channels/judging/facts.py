@@ -59,7 +59,7 @@ class Observer:
         self.unequal = np.zeros(n, dtype=bool)  # channels reported different numbers of objects
 
     def see(self, k: int, evidence: CycleEvidence) -> None:
-        """Keep what cycle number k of the drive showed."""
+        """Stores what cycle number k of the drive showed; k counts from 0."""
         for name, indicator in SERIES:
             values = evidence.readings[indicator]
             self.series[name][k] = np.fmin.reduce(values) if values.size else np.nan
@@ -70,7 +70,10 @@ class Observer:
         self.unequal[k] = len(set(counts)) > 1
 
     def facts(self) -> dict[str, float | None]:
-        """Numbers of the drive; None where there was too little to say."""
+        """Returns the numbers of the drive, by column; None where there was too little to say.
+
+        Ends the monitor's open violations.
+        """
         v, turning = self.motion["v"], np.abs(self.motion["yaw_rate"]) > YAW_RATE_TURN
         standing = v < V_STANDING
         few = (self.objects > 0) & (self.objects < MANY_OBJECTS)
@@ -97,7 +100,7 @@ class Observer:
         }
 
     def _causes(self, events: Sequence[Event[Place]]) -> dict[str, float | None]:
-        """Violations by indicator and by what was going on when they began (C-215)."""
+        """Returns the number of violations by indicator and by cause when they began, by column (C-215)."""
         counted = Counter((e.key[0], self._cause(e.t_start)) for e in events)
         return {
             f"{CAUSE_PREFIX}{cause.name.lower()}_{indicator.value}": float(n)
@@ -105,7 +108,7 @@ class Observer:
         }
 
     def _cause(self, t: float) -> ViolationCause:
-        """The first that applies at time t."""
+        """Returns the first cause, in the order of ViolationCause, that applies at time t s."""
         k = int(np.argmin(np.abs(self.motion["t"] - t)))
         if self.silent[k]:
             return ViolationCause.SILENT
@@ -119,7 +122,10 @@ class Observer:
 
 
 def times_of(times: pl.DataFrame) -> dict[str, float]:
-    """Times of a drive in ms, without its first cycles; nothing of a short drive."""
+    """Returns figures of a drive's processor times in ms by name, its first WARM_CYCLES left out.
+
+    {} for a drive of at most twice as many cycles.
+    """
     if len(times) <= 2 * WARM_CYCLES:
         return {}
     warm = times[WARM_CYCLES:]
@@ -142,7 +148,10 @@ def warm_times(times: pl.DataFrame) -> Floats:
 
 
 def route_shares(times: Floats, greatest: Floats) -> dict[str, float]:
-    """Shares of a drive's times (k, 4) against thresholds: 25 ms, and the modules' route maxima (C-233)."""
+    """Returns shares of a drive's times (k, 4) against BUDGET_MS and the modules' route maxima (C-233).
+
+    greatest: (4,) ms, the route's maxima in the order TIMED. {} without times.
+    """
     if not len(times):
         return {}
     limits = [BUDGET_MS, *greatest[1:].tolist()]
@@ -154,7 +163,10 @@ def route_shares(times: Floats, greatest: Floats) -> dict[str, float]:
 
 
 def _apart(values: Floats, a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float | None:
-    """Mean over cycles a less mean over cycles b."""
+    """Returns the mean over cycles a less that over cycles b, values that are not finite left out.
+
+    None with fewer than CYCLES_MIN values on either side.
+    """
     known = np.isfinite(values)
     a, b = a & known, b & known
     if a.sum() < CYCLES_MIN or b.sum() < CYCLES_MIN:

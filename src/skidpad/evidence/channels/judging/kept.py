@@ -28,7 +28,7 @@ FOLDER = Path(__file__).parents[1]  # all that judges
 
 @lru_cache(maxsize=1)
 def code_hash() -> str:
-    """SHA-256 over the code and the rules that judge."""
+    """Returns SHA-256 over the code and the rules that judge, in hexadecimal digits."""
     total = hashlib.sha256()
     for file in sorted(p for p in FOLDER.rglob("*") if p.suffix in (".py", ".yaml")):
         total.update(file.relative_to(FOLDER).as_posix().encode() + b"\0" + file.read_bytes())
@@ -36,7 +36,10 @@ def code_hash() -> str:
 
 
 def segment_bytes(segment: Segment, made_by: Mapping[str, str]) -> bytes:
-    """The segment as .npz; made_by: what it hangs on."""
+    """Returns the segment as bytes of an .npz file, sealed by a checksum.
+
+    made_by: the code and options that the judgement depends on.
+    """
     plain = {f.name: getattr(segment, f.name) for f in fields(segment) if f.name not in ARRAYS}
     text = msgspec.json.encode({"made_by": dict(made_by), "segment": plain}, enc_hook=_plain)
     buffer = io.BytesIO()
@@ -47,7 +50,7 @@ def segment_bytes(segment: Segment, made_by: Mapping[str, str]) -> bytes:
 
 
 def _seal(text: bytes, arrays: Mapping[str, Any]) -> bytes:
-    """SHA-256 over everything that is kept."""
+    """Returns SHA-256 over everything that is stored."""
     total = hashlib.sha256(text)
     for name in ARRAYS:
         total.update(f"{arrays[name].dtype.str} {arrays[name].shape}".encode())
@@ -56,7 +59,7 @@ def _seal(text: bytes, arrays: Mapping[str, Any]) -> bytes:
 
 
 def segment_from(data: bytes, made_by: Mapping[str, str]) -> Segment | None:
-    """The segment; None when something else made it, or it is damaged."""
+    """Returns the segment in `data`; None when something else than `made_by` made it, or it is damaged."""
     try:
         arrays = read_arrays(data, KIND, KIND)
         text = arrays["text"].tobytes()
@@ -77,5 +80,5 @@ def segment_from(data: bytes, made_by: Mapping[str, str]) -> Segment | None:
 
 
 def _plain(value: Any) -> Any:
-    """A number of numpy as Python's."""
+    """Returns a number of numpy as Python's."""
     return value.item()

@@ -15,7 +15,10 @@ LEARNED = "learned on {} truth"
 
 
 def with_model(segment: Segment, model: Model) -> Segment:
-    """The segment with what the model finds by the detectors that never saw its route."""
+    """Returns the segment with what the model finds added, by the detectors that never saw its route.
+
+    An empty segment is returned unchanged.
+    """
     if not segment.t.size:
         return segment
     begin = evaluated_from(segment.t)

@@ -42,7 +42,11 @@ Swept = Mapping[HazardType, Mapping[float, Sequence[Span]]]
 
 
 def reference(cycles: Sequence[Cycle], channels: Sequence[str], begin: float) -> Swept:
-    """Hazards from `begin` on by the truth's rule on each channel's smoothed world, by limit."""
+    """Returns hazards from `begin` s on by the truth's rule on each channel's smoothed world, by limit.
+
+    Limits are SPARES in m for tailgating and FACTORS for localisation. Cycles without truth are left
+    out.
+    """
     known = [c for c in cycles if c.truth is not None]
     seen = [_tails(known, c) for c in range(len(channels))]
     tails = {
@@ -74,26 +78,26 @@ def reference(cycles: Sequence[Cycle], channels: Sequence[str], begin: float) ->
 
 
 def at_the_truths_limits(swept: Swept) -> tuple[Span, ...]:
-    """The point of each curve at which the limits are those of the truth."""
+    """Returns the spans at the limits of the truth itself, in order of their start."""
     spans = [s for hazard, of in swept.items() for s in of[OF_TRUTH[hazard]]]
     return tuple(sorted(spans, key=lambda s: s.t_start))
 
 
 def _merge_to_spans(marks: Iterable[Mark]) -> list[Span]:
-    """Spans of the marks, those of one hazard with short pauses as one."""
+    """Returns the spans of the marks, those of one hazard with pauses under 2 s as one."""
     hazards = merge_marks(list(marks), World.SIM)
     return merge_spans(Span(h.hazard, h.t_start, h.t_end) for h in hazards)
 
 
 def _tails(cycles: Sequence[Cycle], c: int) -> list[Mark]:
-    """Marks of close following in the world of channel c, within the largest limit."""
+    """Returns marks of close following in the world of channel number c, within the largest limit."""
     perceived = _perceived_truth(cycles, c, _smoothed_egos(cycles, c))
     rows = [k._replace(truth=t) for k, t in zip(cycles, perceived, strict=True) if t is not None]
     return tail_marks(rows, max(SPARES))
 
 
 def _offset(cycles: Sequence[Cycle], a: int, b: int) -> Floats:
-    """Rows t, dx, dy (k, 3) from channel a to b: medians of what both say around each cycle."""
+    """Returns rows t, dx, dy (k, 3) from channel number a to b: medians of both around each cycle."""
     rows = [
         (k.t, *(two.ego[:2] - one.ego[:2]))
         for k in cycles
@@ -108,7 +112,7 @@ def _offset(cycles: Sequence[Cycle], a: int, b: int) -> Floats:
 
 
 def _smoothed_egos(cycles: Sequence[Cycle], c: int) -> Floats:
-    """(k, 5) the channel's own states, smoothed."""
+    """Returns (k, 5) the own states of channel number c, smoothed; NaN where too little is known."""
     rows = [f.ego if (f := k.frames[c]) is not None else np.full(5, np.nan) for k in cycles]
     raw = np.array(rows).reshape(-1, 5)
     t = np.array([k.t for k in cycles])
@@ -116,9 +120,10 @@ def _smoothed_egos(cycles: Sequence[Cycle], c: int) -> Floats:
 
 
 def smooth_states(t: Floats, states: Floats) -> Floats:
-    """States (k, 5) by straight lines through 1 s before and after; NaN where too little is known.
+    """Returns states (k, 5) by straight lines through 1 s before and after; NaN where too little is known.
 
-    Velocity is the line's slope; the heading stays as it was said.
+    t: (k,) s. Velocity is the line's slope; the heading is that of the nearest state. Fewer than
+    LEAST states in the window are too little.
     """
     out = np.full_like(states, np.nan)
     seen = np.asarray(np.isfinite(states).all(axis=1))
@@ -140,7 +145,10 @@ def smooth_states(t: Floats, states: Floats) -> Floats:
 
 
 def _perceived_truth(cycles: Sequence[Cycle], c: int, egos: Floats) -> list[TruthFrame | None]:
-    """What the channel knows of the true actors, in the form of the truth."""
+    """Returns what channel number c knows of the true actors, as a truth per cycle; None without its ego.
+
+    egos: (k, 5) of `_smoothed_egos`.
+    """
     t = np.array([k.t for k in cycles])
     tracks = _tracks(cycles, c)
     states = {actor: smooth_states(t, raw) for actor, raw in tracks.items()}
@@ -172,7 +180,7 @@ def _perceived_truth(cycles: Sequence[Cycle], c: int, egos: Floats) -> list[Trut
 
 
 def _tracks(cycles: Sequence[Cycle], c: int) -> dict[int, Floats]:
-    """Per actor the states (k, 5) that the channel reported of it; NaN: not seen."""
+    """Returns by actor the states (k, 5) that channel number c reported of it; NaN: not seen."""
     tracks: dict[int, Floats] = {}
     for k, cycle in enumerate(cycles):
         frame, truth = cycle.frames[c], cycle.truth

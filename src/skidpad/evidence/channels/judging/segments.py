@@ -83,7 +83,7 @@ class Segment:
 
     @property
     def stratum(self) -> Stratum:
-        """Whom it was driven among."""
+        """Returns the kind of drivers that it was driven among."""
         return Stratum(self.context.get("stratum", Stratum.NATURAL.value))
 
 
@@ -110,7 +110,9 @@ def judge(
     """Judges a recording by every rule profile and truth after its warm-up; spans are keyed by profile.
 
     With `curve` the practical rules are applied again with each clause on that signal scaled by
-    CURVE_FACTORS (C-105).
+    CURVE_FACTORS (C-105). labels: human ones, a truth of their own; truths: those that are wanted, of
+    which simulator truth needs a recording that holds it; context: stratum, weights and the like;
+    timer: measures the practical rules' time.
     """
     t = np.array([c.t for c in cycles])
     begin = evaluated_from(t)
@@ -158,7 +160,7 @@ def judge(
 
 
 def evaluated_from(t: Floats) -> float:
-    """s from which on a drive with cycles at t (k,) is evaluated (decision C-12)."""
+    """Returns the s from which a drive with cycles at t (k,) is evaluated (decision C-12); 0 without any."""
     return float(t[0]) + WARM_UP if t.size else 0.0
 
 
@@ -194,13 +196,13 @@ def _practical(
 
 
 def grip_of(cycles: Sequence[Cycle]) -> float:
-    """The ego's true grip of a drive: median over its time of the mean of its tyres."""
+    """Returns the ego's true grip of a drive: the median over time, within GRIPS; else NOMINAL_GRIP."""
     grips = [c.truth.ego_mu for c in cycles if c.truth is not None and c.truth.ego_mu > 0.0]
     return float(np.clip(np.median(grips), *GRIPS)) if grips else NOMINAL_GRIP
 
 
 def _places(spans: Iterable[Span]) -> list[Span]:
-    """Those in which the grip plays no part."""
+    """Returns the spans of localisation, in which grip plays no part."""
     return [s for s in spans if s.hazard is HazardType.INCONSISTENT_LOCALISATION]
 
 
@@ -217,8 +219,10 @@ def _truths(
     detected: Mapping[str, tuple[Span, ...]],
     weights: Weights,
 ) -> tuple[dict[str, tuple[Span, ...]], int, int]:
-    """True hazards by truth, how many of the simulator's no channel saw, and how many of those
-    the practical rules found all the same."""
+    """Returns true hazards by truth, how many of the simulator's no channel saw, and how many of those
+
+    the practical rules found all the same.
+    """
     found: dict[str, tuple[Span, ...]] = {}
     unseen: list[Span] = []
     if "sim" in wanted and any(c.truth is not None for c in cycles):
@@ -232,7 +236,7 @@ def _truths(
 
 
 def _why_missed(identifier: str, missed: Span, signals: Signals) -> str:
-    """Returns the clause that kept a profile from firing; a learned identifier has none."""
+    """Returns the clause that kept a profile from firing; NO_RULE for a learned identifier."""
     if identifier not in {p.value for p in Profile}:
         return NO_RULE
     rules = {r.hazard: r for r in load_rules(Profile(identifier))}
@@ -246,7 +250,7 @@ def _scored_spans(spans: Iterable[Span]) -> tuple[Span, ...]:
 
 
 def _found_spans(events: TimeFilter[HazardType], begin: float) -> list[Span]:
-    """The events of a finished drive that reach into its evaluated part."""
+    """Returns the events of a finished drive that end at `begin` s or later, in order of their start."""
     spans = [Span(e.key, e.t_start, e.t_end) for e in events.finish()]
     return sorted((s for s in spans if s.t_end >= begin), key=lambda s: s.t_start)
 
@@ -254,7 +258,7 @@ def _found_spans(events: TimeFilter[HazardType], begin: float) -> list[Span]:
 def _apply_scaled(
     t: Floats, signals: Table, signal: Signal, factor: float, begin: float
 ) -> tuple[Span, ...]:
-    """What the practical rules find with every threshold on `signal` times `factor`."""
+    """Returns what the practical rules find with every threshold on `signal` times `factor`."""
     rules = (r for r in load_rules(Profile.PRACTICAL) if r.hazard in SCORED_HAZARDS)
     changed = (with_limit(rule, signal, lambda value: value * factor) for rule in rules)
     found = (span for rule in changed for span in found_by(rule, t, signals, begin))

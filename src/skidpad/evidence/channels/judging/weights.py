@@ -20,9 +20,10 @@ class Weights(NamedTuple):
     jumps: float = 1.0  # of a channel's position
 
     def weigh(self, hazard: TrueHazard) -> Span:
-        """Returns a true hazard that counts by the habit that brought it about.
+        """Returns a true hazard as a span that counts by the habit that brought it about.
 
-        Who is tailgated has a follower's headway to thank, who tailgates the gap that somebody left him.
+        Being tailgated comes from a follower's headway, tailgating from a cut-in, a jump from the
+        channel; anything else counts 1.
         """
         match hazard.hazard:
             case HazardType.INCONSISTENT_LOCALISATION if hazard.kind == JUMP_KIND:
@@ -42,7 +43,7 @@ class Weights(NamedTuple):
 
 
 def weights_from(context: Mapping[str, str]) -> Weights:
-    """Reads weights from a recording's context; FileError where they are damaged."""
+    """Returns the weights in a recording's context, 1 where it has none; FileError where they are damaged."""
     text, jumps = context.get("weights", "{}"), context.get("weight_of_jumps", "1")
     try:
         drivers = {f"actor {i}": (float(a), float(b)) for i, (a, b) in json.loads(text).items()}

@@ -33,7 +33,7 @@ class SafeDistance:
         return cls(b_follower=grip * G, b_leader=min(HARD_BRAKING, grip * G))
 
     def of(self, v_follower: float, v_leader: float) -> float:
-        """Least gap in m that keeps the follower from hitting, speeds in m/s.
+        """Returns the least gap in m that keeps the follower from hitting, speeds in m/s.
 
         RSS compares where both stand; a follower that brakes harder than its leader may come
         nearest before, when both are equally fast.

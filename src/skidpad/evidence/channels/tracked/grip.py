@@ -42,7 +42,7 @@ class OwnGrip:
         self.over_since: float | None = None
 
     def update(self, t: float, frames: Sequence[ChannelFrame | None]) -> float | None:
-        """The grip at t, in the range that `SafeDistance.on` takes."""
+        """Takes in a cycle and returns the grip at t s, within GRIPS; None while nothing has shown it."""
         speeds = [hypot(*f.ego[3:].tolist()) for f in frames if f is not None]
         wanted = [a for f in frames if f is not None and (a := planned_acceleration(f)) is not None]
         if not speeds or not wanted or not np.isfinite([*speeds, *wanted]).all():
@@ -81,7 +81,10 @@ def _start(since: float | None, t: float) -> float:
 
 
 def planned_acceleration(frame: ChannelFrame) -> float | None:
-    """Returns the m/s^2 with which a plan begins; None where it is too short or its times do not rise."""
+    """Returns the m/s^2 with which a plan begins; None where it is too short or its times do not rise.
+
+    Of the plan, PLAN_POINTS count, at least four of them.
+    """
     plan = frame.plan[PLAN_POINTS]
     if len(plan) < 4:
         return None
@@ -99,7 +102,7 @@ def slope(t: Floats, values: Floats) -> float:
 
 
 def limit_shown(v: float, a: float, ask: float) -> float | None:
-    """The grip that a car at v m/s shows which asks for `ask` and gets a, in m/s^2; None: none."""
+    """Returns the grip that a car at v m/s shows which asks for `ask` and gets a, in m/s^2; None: none."""
     if v > V_BRAKE and ask < ASK_BRAKE and SHORT * ask < a < LEAST_BRAKE:
         return -a / (BRAKE_SHARE * G)
     if V_DRIVE[0] < v < V_DRIVE[1] and ask > ASK_DRIVE and LEAST_DRIVE < a < SHORT * ask:

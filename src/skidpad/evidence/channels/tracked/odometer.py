@@ -22,7 +22,7 @@ class Odometer:
         self.errors: deque[tuple[float, float, float]] = deque()  # t, position less odometry
 
     def update(self, t: float, frame: ChannelFrame | None) -> None:
-        """Takes in one cycle; None: no message."""
+        """Takes in the cycle at t s; None, or an ego that is not finite, forgets all before."""
         if frame is None or not np.isfinite(frame.ego).all():
             self.before = None
             self.errors.clear()
@@ -39,7 +39,10 @@ class Odometer:
             self.errors.popleft()
 
     def moves(self) -> dict[float, tuple[float, float]]:
-        """m in x and y by which the position has moved beside odometry, by the s since when."""
+        """Returns m in x and y by which the position has moved beside odometry, by the time in s since when.
+
+        The times are those of the last WINDOW s; {} after a cycle without a message.
+        """
         if not self.errors:
             return {}
         _, x, y = self.errors[-1]
@@ -47,7 +50,7 @@ class Odometer:
 
 
 def greatest_leap(odometers: Sequence[Odometer]) -> float:
-    """m by which one channel's position left odometry and the other channels; NaN: all are silent.
+    """Returns the m by which one channel's position left odometry and the others'; NaN: all are silent.
 
     What all positions do alike is an error of the odometry, as of a car that slides sideways.
     """
@@ -56,7 +59,10 @@ def greatest_leap(odometers: Sequence[Odometer]) -> float:
 
 
 def _own_leap(i: int, known: Sequence[dict[float, tuple[float, float]]]) -> float:
-    """Returns the largest move of channel `i` in m or, if less, its largest difference from another's."""
+    """Returns the largest move of channel `i` in m or, if less, its largest difference from another's.
+
+    known: moves of all channels that have any.
+    """
     own, rest = known[i], [*known[:i], *known[i + 1 :]]
     apart = [max(dist(own[t], other[t]) for t in own.keys() & other.keys()) for other in rest]
     return min([max(hypot(*move) for move in own.values()), *apart])

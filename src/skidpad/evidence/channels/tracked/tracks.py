@@ -52,7 +52,7 @@ class Track:
     alone: float | None = None  # s since when another channel has not had it
 
     def predict(self, dt: float, v_ego: float) -> None:
-        """Both move on; the ego's speed is its own word."""
+        """Moves the gap, and its variances, on by dt s; v_ego is the ego's speed in m/s."""
         rate = (v_ego - self.v) if self.behind else (self.v - v_ego)
         sign = -1.0 if self.behind else 1.0
         self.gap += rate * dt
@@ -65,7 +65,7 @@ class Track:
         )
 
     def correct(self, gap: float, v: float) -> None:
-        """A report of both, one after the other."""
+        """Corrects gap in m and speed in m/s by a report of both, one after the other."""
         a, b, c = self.p
         s = a + SIGMA_GAP**2
         k, m = a / s, c / s
@@ -79,7 +79,10 @@ class Track:
         self.p = (a - k * c, (1.0 - m) * b, (1.0 - m) * c)
 
     def judge(self, t: float, v_ego: float, safe: SafeDistance, sure: float) -> None:
-        """Compare the gap with the safe one; alarm when surely short for long, off when surely not."""
+        """Compares the gap with the safe one: alarm on when surely short for CONFIRM s, off when surely not.
+
+        t: s; sure: standard deviations. Never an alarm with the ego slower than V_LEAST.
+        """
         pair = (self.v, v_ego) if self.behind else (v_ego, self.v)
         need, h = safe.of(*pair), 0.25
         other = (self.v + h, v_ego) if self.behind else (v_ego, self.v + h)
@@ -120,7 +123,7 @@ class Lookout:
         self.way = Way()
 
     def see(self, frame: ChannelFrame | None) -> Seen | None:
-        """Looks at one cycle; None: no message, or one without a place of the ego."""
+        """Takes in one cycle and returns what it shows; None without a message or a usable ego."""
         if frame is None or not Way.usable(frame):
             return None
         self.way.update(frame)
@@ -155,14 +158,14 @@ class Tracks:
         return iter(self.tracks.values())
 
     def update(self, t: float, seen: Seen | None) -> None:
-        """Takes in one cycle; without a message tracks wait for their end."""
+        """Takes in the cycle at t s and judges all tracks; without a message tracks wait for their end."""
         self.observe(t, seen)
         if seen is not None:
             for track in self:
                 track.judge(t, seen.v_ego, self.safe, self.sure)
 
     def observe(self, t: float, seen: Seen | None) -> None:
-        """Follow the objects of one cycle without a judgement."""
+        """Follows the objects of the cycle at t s without a judgement; drops tracks unseen for COAST s."""
         if seen is not None:
             for sighting in seen.sightings:
                 self._report(t, sighting, seen)
@@ -189,7 +192,10 @@ class Tracks:
         known.t, known.place = t, sighting.xy
 
     def _key(self, sighting: Sighting) -> int:
-        """The object's identity, or that of the nearest track where the channel gives none."""
+        """Returns the object's identity, or that of the nearest track where the channel gives none.
+
+        A new negative one where no track is within NEAR.
+        """
         if sighting.key >= 0:
             return sighting.key
         near = [
@@ -204,7 +210,7 @@ class Tracks:
 
 
 def _vehicles_near(frame: ChannelFrame) -> NDArray[np.int64]:
-    """Rows of objects within reach that may tailgate or be tailgated."""
+    """Returns the rows of vehicles within REACH of the ego, which may tailgate or be tailgated."""
     labels = frame.classes.tolist()
     rows = np.array([i for i, label in enumerate(labels) if label in VEHICLES], dtype=np.int64)
     dx, dy = (frame.objects[rows, :2] - frame.ego[:2]).T

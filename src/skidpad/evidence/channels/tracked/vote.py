@@ -52,7 +52,7 @@ class Tracked:
         self.apart: list[deque[tuple[float, float]]] = [deque() for _ in self.pairs]
 
     def update(self, t: float, frames: Sequence[ChannelFrame | None]) -> dict[Signal, float]:
-        """The signals at t: metres of gap that are missing, chi-square, s until plans part."""
+        """Returns the signals at t s: metres of gap that are missing, chi-square, s until plans part."""
         seen = [out.see(f) for out, f in zip(self.lookouts, frames, strict=True)]
         return self.distances(t, seen, frames) | {
             Signal.OFFSET_CHI2: self._offset(t, frames),
@@ -63,7 +63,10 @@ class Tracked:
     def distances(
         self, t: float, seen: Sequence[Seen | None], frames: Sequence[ChannelFrame | None]
     ) -> dict[Signal, float]:
-        """The first of them alone, by what lookouts have seen in the frames."""
+        """Returns the signals of missing gap at t s alone, by what lookouts have seen in the frames.
+
+        0.0 where no gap is short. A channel's alarm counts unless more channels speak against it.
+        """
         self._learn_grip(t, frames)
         self._follow(t, seen)
         out = {
@@ -94,7 +97,7 @@ class Tracked:
         return out | {side: self._smooth(side, t, out[side]) for side in SIDES}
 
     def _smooth(self, side: Signal, t: float, deficit: float) -> float:
-        """The median of a deficit over the last cycles; before there are enough, missing ones are 0."""
+        """Returns the median of a deficit over the last cycles; those missing at the start count 0."""
         if not self.smoothing:
             return deficit
         window = self.recent[side]
@@ -108,7 +111,7 @@ class Tracked:
         return sorted(values)[len(values) // 2]
 
     def _same(self, channel: int, track: Track) -> Track | None:
-        """The same object as another channel has it."""
+        """Returns the track of the same object in the channel of this number; None where it has none."""
         for other in self.tracks[channel]:
             near = dist(other.place, track.place) < SAME
             if near and other.behind is track.behind:
@@ -121,7 +124,7 @@ class Tracked:
             tracks.update(t, one)
 
     def _learn_grip(self, t: float, frames: Sequence[ChannelFrame | None]) -> None:
-        """The safe distance is that of the grip which the vehicle shows, unless it was told one."""
+        """Sets the safe distance to that of the grip which the vehicle shows, unless it was told one."""
         if self.own_grip is None:
             return
         before, grip = self.own_grip.grip, self.own_grip.update(t, frames)
@@ -131,13 +134,13 @@ class Tracked:
                 tracks.safe = safe
 
     def _leap(self, t: float, frames: Sequence[ChannelFrame | None]) -> float:
-        """m by which one channel left odometry and the others; NaN: unknown."""
+        """Returns the m by which one channel left odometry and the others; NaN: unknown."""
         for odometer, frame in zip(self.odometers, frames, strict=True):
             odometer.update(t, frame)
         return greatest_leap(self.odometers)
 
     def _offset(self, t: float, frames: Sequence[ChannelFrame | None]) -> float:
-        """Greatest chi-square over pairs of the mean offset of 0.5 s; NaN without a full window."""
+        """Returns the greatest chi-square over pairs of the mean offset of 0.5 s; NaN until that is known."""
         worst = nan
         for (a, b), window in zip(self.pairs, self.offsets, strict=True):
             one, two = frames[a], frames[b]
@@ -156,7 +159,10 @@ class Tracked:
         return worst
 
     def _plans(self, t: float, frames: Sequence[ChannelFrame | None]) -> float:
-        """Least over pairs of the s until both plans' footprints share no ground, held for 0.5 s."""
+        """Returns the least over pairs of the s until both plans' footprints share no ground, held for 0.5 s.
+
+        inf: they share it to their end; nan without a full window.
+        """
         least = nan
         for (a, b), window in zip(self.pairs, self.apart, strict=True):
             one, two = frames[a], frames[b]
@@ -178,9 +184,10 @@ def _has_footprint(frame: ChannelFrame) -> bool:
 
 
 def parting(one: ChannelFrame, two: ChannelFrame) -> float:
-    """Time in s after which the ego on one plan and on the other would stand side by side or apart.
+    """Returns the s after which the ego on one plan and on the other would stand side by side or apart.
 
     Each plan is taken from its own channel's ego, so that an offset of positions parts no plans.
+    inf: not within both plans.
     """
     length = float(np.ptp(one.ego_polygon[:, 0]))
     width = float(np.ptp(one.ego_polygon[:, 1]))

@@ -25,12 +25,12 @@ class Way:
 
     @staticmethod
     def usable(frame: ChannelFrame) -> bool:
-        """Whether the ego has a place and an outline."""
+        """Returns whether the ego has a finite place and an outline."""
         x, y, *rest = frame.ego.tolist()
         return len(frame.ego_polygon) > 2 and abs(x) + abs(y) < FAR and all(map(isfinite, rest))
 
     def update(self, frame: ChannelFrame) -> None:
-        """Appends where the ego is in this cycle."""
+        """Appends where the ego is, STEP or more from the last place; a move over LEAP drops all before."""
         place = (float(frame.ego[0]), float(frame.ego[1]))
         moved = dist(place, self.past[-1]) if self.past else STEP
         if moved > LEAP:
@@ -39,7 +39,7 @@ class Way:
             self.past.append(place)
 
     def line(self, frame: ChannelFrame) -> Line:
-        """The line of this cycle, after `update`."""
+        """Returns the line of this cycle; to be called after `update`."""
         return Line(list(self.past), frame)
 
 
@@ -86,7 +86,7 @@ class Line:
         self.heading = np.arctan2(ways[:, 1], ways[:, 0])
 
     def places(self, states: Floats) -> list[Placed]:
-        """Places n > 0 states (n, 5) on the line."""
+        """Returns where n > 0 states (n, 5) are on the line."""
         apart = states[:, None, :2] - self.points[None]
         k = np.argmin(apart[:, :, 0] ** 2 + apart[:, :, 1] ** 2, axis=1)
         h = self.heading[k]
@@ -99,6 +99,6 @@ class Line:
 
 
 def _unit(a: tuple[float, float], b: tuple[float, float]) -> tuple[float, float]:
-    """The direction from a to b, which are more than STEP apart."""
+    """Returns the unit vector from a to b, which are more than STEP apart."""
     d = max(dist(a, b), 1e-9)
     return (b[0] - a[0]) / d, (b[1] - a[1]) / d

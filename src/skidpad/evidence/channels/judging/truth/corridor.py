@@ -21,7 +21,10 @@ class Trail:
         self.places: deque[tuple[float, float]] = deque(maxlen=round(REACH / SPACING))
 
     def add(self, ego: Floats) -> None:
-        """Adds the present place (5,) of the ego."""
+        """Adds the present place of the ego (5,), when it is SPACING m or more from the last one.
+
+        A move of more than LEAP m drops all earlier places.
+        """
         x, y = float(ego[0]), float(ego[1])
         if self.places:
             moved = np.hypot(x - self.places[-1][0], y - self.places[-1][1])
@@ -33,7 +36,7 @@ class Trail:
 
     @property
     def points(self) -> Floats:
-        """Places of the way, (k, 2), oldest first."""
+        """Returns places of the way, (k, 2), oldest first."""
         return np.array(self.places).reshape(-1, 2)
 
 
@@ -58,7 +61,10 @@ class Corridor:
         self.half_width = float(np.abs(polygon[:, 1]).max(initial=0.0))
 
     def places(self, objects: Floats, polygons: Floats) -> tuple[Flags, Flags]:
-        """Which of n objects (n, 5) with polygons (n, k, 2) are on the path, and which ahead."""
+        """Returns which of n objects (n, 5) with polygons (n, k, 2) are on the path, and which are ahead.
+
+        On the path are those that reach into it and head along it within SAME_PATH; both are (n,) bool.
+        """
         steps = np.diff(self.points, axis=0)
         length = np.maximum(_lengths(self.points), 1e-9)
         tangent = steps / length[:, None]

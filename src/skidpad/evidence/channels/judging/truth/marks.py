@@ -49,7 +49,10 @@ class Mark:
 
 
 def offsets(rows: Floats, about: str, factor: float = 1.0) -> list[Mark]:
-    """Jumps and drifts of an offset given as rows of t, dx, dy; factor: on both limits."""
+    """Returns marks of jumps and drifts of an offset given as rows of t in s, dx and dy in m.
+
+    about: name of the channel or pair; factor: on both limits, JUMP and DRIFT.
+    """
     rows = rows[np.isfinite(rows).all(axis=1)]
     marks = []
     for k, (t, dx, dy) in enumerate(rows):
@@ -63,7 +66,10 @@ def offsets(rows: Floats, about: str, factor: float = 1.0) -> list[Mark]:
 
 
 def lasting(marks: list[Mark], duration: float) -> list[Mark]:
-    """Marks that belong to runs of at least `duration` for the same hazard and object."""
+    """Returns the marks that belong to runs of at least `duration` s for the same hazard and object.
+
+    Marks more than 0.15 s apart are two runs.
+    """
     kept: list[Mark] = []
     runs: dict[tuple[HazardType, str], list[Mark]] = {}
 
@@ -84,7 +90,7 @@ def lasting(marks: list[Mark], duration: float) -> list[Mark]:
 
 
 def merge_marks(marks: list[Mark], world: World) -> list[TrueHazard]:
-    """Marks of one hazard whose pause is under 2 s, as one (C-140, C-141)."""
+    """Returns the marks as hazards, those of one hazard with a pause under PAUSE as one (C-140, C-141)."""
     out: list[TrueHazard] = []
     for hazard in HazardType:
         group: list[Mark] = []

@@ -37,7 +37,7 @@ VEHICLES = {
 
 
 def simulator_truth(cycles: Sequence[Cycle], channels: Sequence[str]) -> list[TrueHazard]:
-    """Hazards by true states; empty when the recording holds none."""
+    """Returns hazards by true states; [] when the recording holds none."""
     known = [c for c in cycles if c.truth is not None]
     marks = lasting(tail_marks(known, 0.0), MIN_DURATION)
     marks.extend(_position_errors(known, channels))
@@ -45,7 +45,10 @@ def simulator_truth(cycles: Sequence[Cycle], channels: Sequence[str]) -> list[Tr
 
 
 def tail_marks(cycles: Sequence[Cycle], spare: float) -> list[Mark]:
-    """Marks of vehicles that follow so closely that at most `spare` m are left; cycles hold a truth."""
+    """Returns marks of vehicles that follow so closely that at most `spare` m would be left in braking.
+
+    Only in cycles with a truth in which the ego drives more than V_EGO_MIN.
+    """
     path = _DrivenPath([c.truth for c in cycles if c.truth is not None])
     marks: list[Mark] = []
     for k, cycle in enumerate(cycles):
@@ -64,7 +67,10 @@ class _DrivenPath:
         self.s = np.concatenate([[0.0], np.cumsum(steps)])
 
     def around(self, k: int) -> tuple[shapely.LineString | None, float]:
-        """The path from REACH before to REACH after cycle k, and where on it the ego is."""
+        """Returns the path from REACH before to REACH after cycle k, and at how many m on it the ego is.
+
+        (None, 0.0) where the ego stands throughout.
+        """
         first = int(np.searchsorted(self.s, self.s[k] - REACH))
         last = int(np.searchsorted(self.s, self.s[k] + REACH, side="right"))
         moved = np.concatenate([[True], np.diff(self.s[first:last]) > 1e-3])
@@ -82,7 +88,10 @@ def _mark_tailgating(
     frames: Sequence[ChannelFrame | None],
     spare: float,
 ) -> list[Mark]:
-    """Returns a mark per vehicle on the driven path whose clearance for braking is at most `spare` m."""
+    """Returns a mark per vehicle on the driven path that would have at most `spare` m left in braking.
+
+    k: number of the cycle among those with truth; t: its time in s.
+    """
     near = _near(truth, spare)
     line, s_ego = path.around(k) if near.size else (None, 0.0)
     if line is None:
@@ -129,7 +138,7 @@ def _mark_tailgating(
 def _near(truth: TruthFrame, spare: float) -> NDArray[np.int64]:
     """Returns rows of actors within reach: no path is shorter than the straight line.
 
-    Who has no wheels of ours (cyclists) has no grip, NaN; as a leader he brakes as hard as any.
+    A cyclist has no grip (NaN), and brakes as hard as any when it leads.
     """
     away = np.hypot(*(truth.actors[:, :2] - truth.ego[:2]).T)
     v = np.maximum(np.hypot(*truth.actors[:, 3:].T), np.hypot(*truth.ego[3:]))
@@ -139,7 +148,7 @@ def _near(truth: TruthFrame, spare: float) -> NDArray[np.int64]:
 
 
 def _size(polygons: Floats) -> Floats:
-    """m from the reference point to the farthest corner, of polygons (..., k, 2)."""
+    """Returns m from the reference point to the farthest corner, of polygons (..., k, 2)."""
     away = np.nan_to_num(np.hypot(polygons[..., 0], polygons[..., 1]))
     return np.asarray(away.max(axis=-1, initial=0.0), dtype=np.float64)
 
@@ -147,16 +156,20 @@ def _size(polygons: Floats) -> Floats:
 def would_hit(
     gap: float, v_leader: float, mu_leader: float, v_follower: float, mu_follower: float
 ) -> bool:
-    """Whether the follower hits a leader that brakes at 6 m/s^2 and reacts after 1 s (C-3)."""
+    """Returns whether the follower hits a leader that brakes at 6 m/s^2, reacting after 1 s (C-3).
+
+    gap: m, bumper to bumper; speeds in m/s; mu: grip of each.
+    """
     return least_gap(gap, v_leader, mu_leader, v_follower, mu_follower) <= 0.0
 
 
 def least_gap(
     gap: float, v_leader: float, mu_leader: float, v_follower: float, mu_follower: float
 ) -> float:
-    """Least m between both when the leader brakes at 6 m/s^2; negative: how far they would overlap.
+    """Returns the least m between both when the leader brakes at 6 m/s^2; negative: they would overlap.
 
-    The follower then brakes at all its grip; the leader at no more than its own. gap in m.
+    The follower brakes at all its grip after REACTION_TIME; the leader at no more than its own.
+    gap: m, bumper to bumper; speeds in m/s; mu: grip of each.
     """
     a_leader = min(BRAKE_LEADER, mu_leader * G)
     a_follower = mu_follower * G
@@ -170,7 +183,7 @@ def least_gap(
 
 
 def _is_reported(actor: Floats, frames: Sequence[ChannelFrame | None], within: float = 3.0) -> bool:
-    """Whether any channel has an object within `within` m of the actor."""
+    """Returns whether any channel has an object within `within` m of the actor."""
     return any(
         bool((np.hypot(*(frame.objects[:, :2] - actor[:2]).T) < within).any())
         for frame in frames
@@ -192,7 +205,10 @@ def _position_errors(cycles: Sequence[Cycle], channels: Sequence[str]) -> list[M
 
 
 def footprint(shape: Floats, state: Floats) -> shapely.Geometry:
-    """A polygon (k, 2) in its own frame, placed at the state (5,) in the world."""
+    """Returns a polygon (k, 2) in its own frame as placed at the state (5,) in the world.
+
+    Vertices that are not finite are left out; with fewer than three it is a point.
+    """
     points = shape[np.isfinite(shape).all(axis=1)]
     if len(points) < 3:
         return shapely.Point(state[:2])
@@ -201,6 +217,6 @@ def footprint(shape: Floats, state: Floats) -> shapely.Geometry:
 
 
 def _extent(polygon: Floats) -> tuple[float, float, float]:
-    """Front and rear from the reference point along the body, and half width."""
+    """Returns front and rear from the reference point along the body, and half width, in m."""
     x, y = polygon[:, 0], polygon[:, 1]
     return float(x.max()), float(-x.min()), float(np.abs(y).max())

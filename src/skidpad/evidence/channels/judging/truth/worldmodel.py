@@ -50,7 +50,7 @@ def world_model_truth(cycles: Sequence[Cycle], channels: Sequence[str]) -> list[
 
 
 def _apart(cycle: Cycle, channels: Sequence[str]) -> list[Mark]:
-    """Pairs of channels of which at least one is beyond an alert limit."""
+    """Returns a mark per pair of channels of which at least one must be beyond an alert limit."""
     marks = []
     for a in range(len(channels)):
         for b in range(a + 1, len(channels)):
@@ -67,7 +67,10 @@ def _apart(cycle: Cycle, channels: Sequence[str]) -> list[Mark]:
 
 
 def _sweeps(cycle: Cycle, ego: ChannelFrame, trail: Trail, channels: Sequence[str]) -> list[Mark]:
-    """Objects of any channel on the path of `ego` that its plan and their prediction bring together."""
+    """Returns marks of objects on the path of `ego` where its plan and their prediction meet.
+
+    Objects of all channels count, the ego's own among them.
+    """
     plan = ego.plan[np.isfinite(ego.plan).all(axis=1)]
     plan_t = np.concatenate([[0.0], plan[:, 2]])
     plan_xy = np.vstack([ego.ego[:2], plan[:, :2]])
@@ -110,7 +113,7 @@ def _along(times: Floats, path_t: Floats, path: Floats) -> Floats:
 
 
 def _stride(path: Floats) -> float:
-    """Longest step of a path, m."""
+    """Returns the longest step of a path (n, 2) in m; 0 for one point."""
     return float(np.hypot(*(path[1:] - path[:-1]).T).max(initial=0.0))
 
 
@@ -122,7 +125,10 @@ class _Sweep(NamedTuple):
 
     @classmethod
     def of(cls, shape: Floats, state: Floats, path: Floats) -> _Sweep:
-        """It turns into the direction of motion; where it hardly moves it keeps its heading."""
+        """Returns the footprint `shape` along a path (n, 2), turned into the direction of motion.
+
+        state: of the mover now; its heading is kept where it hardly moves and in reverse.
+        """
         points = shape[np.isfinite(shape).all(axis=1)]
         if len(points) == 0:
             points = np.zeros((1, 2))
@@ -138,12 +144,12 @@ class _Sweep(NamedTuple):
         return cls(np.stack([x, y], axis=2), moves)
 
     def between(self, steps: NDArray[np.int64]) -> NDArray[np.object_]:
-        """(m,) hulls of the footprint at each of `steps` together with the step after it."""
+        """Returns (m,) hulls of the footprint at each of `steps` together with the step after it."""
         after = np.minimum(steps + 1, len(self.corners) - 1)
         return _hulls(np.concatenate([self.corners[steps], self.corners[after]], axis=1))
 
     def at(self, steps: NDArray[np.int64], share: float) -> NDArray[np.object_]:
-        """(m,) footprints when a share of the way to the next step is done."""
+        """Returns (m,) footprints when a share of the way from each of `steps` to the next is done."""
         return _hulls(self.corners[steps] + share * self.moves[steps][:, None])
 
 
@@ -157,7 +163,7 @@ def _hulls(corners: Floats) -> NDArray[np.object_]:
 
 
 def _meet(mine: _Sweep, theirs: _Sweep, near: NDArray[np.int64]) -> bool:
-    """Whether two footprints overlap at any time within the steps `near`."""
+    """Returns whether two footprints overlap at any time within the steps `near`."""
     steps = near[shapely.intersects(mine.between(near), theirs.between(near))]
     return steps.size > 0 and any(
         bool(shapely.intersects(mine.at(steps, share), theirs.at(steps, share)).any())

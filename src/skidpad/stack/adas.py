@@ -71,10 +71,10 @@ class AdasConfig:
 
     @classmethod
     def from_mapping(cls, plain: Mapping[str, Any]) -> AdasConfig:
-        """Makes a configuration from plain data; every key is optional, see KEYS.
+        """Returns a configuration from plain data; every key is optional, see KEYS.
 
         `functions` (names) takes the place of `configuration` (0 to 4, default 4); `set` holds
-        single settings on top of `profile`.
+        single settings on top of `profile`. ConfigError for an unknown key or name, or a number out of range.
         """
         for key in plain:
             require_choice("stack option", key, KEYS)
@@ -119,7 +119,7 @@ class AdasStack:
 
     @property
     def mode(self) -> str:
-        """The mode of the last tick as text for people (A-139)."""
+        """The mode of the last tick as text for people (A-139), with those of added functions."""
         own = mode_text(self.report, Function.LCA in self.functions, self.verified_by)
         return own + self.added.mode
 
@@ -128,7 +128,10 @@ class AdasStack:
         return self.added.sensors()
 
     def switch(self, functions: Functions) -> None:
-        """Turn functions on and off while driving (A-011); the controllers start afresh."""
+        """Turns functions on and off while driving (A-011); tiers and controllers start afresh.
+
+        functions: all that are on from now on. Added functions of packages are not touched.
+        """
         c = self.config
         self.functions, self.assists = functions, Function.TLA in functions
         self.hierarchy = Hierarchy(functions, c.settings, c.dt)
@@ -142,7 +145,7 @@ class AdasStack:
         self.v_told = v
 
     def relocated(self) -> None:
-        """The ego stands elsewhere: what was seen and summed before no longer counts (A-109)."""
+        """Forgets what was seen and summed before, as the ego now stands elsewhere (A-109)."""
         self.front.reset()
         self.hierarchy.reset()
         self.lock.reset()
@@ -152,7 +155,10 @@ class AdasStack:
             self.bends.reset()
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
-        """Returns the command of one tick: it senses, decides and actuates (A-010)."""
+        """Senses, decides and returns the command of one tick (A-010).
+
+        HELD, and no decision, while a supervisor drives. `report` is renewed either way.
+        """
         self._follow_supervision(frame.supervision)
         v = frame.ego.speed
         view = self.tracker.update(frame.ego.pose)
@@ -177,7 +183,7 @@ class AdasStack:
         return self.added.update(frame, command)
 
     def _follow_supervision(self, phase: Supervision) -> None:
-        """The warm-up begins where the ego was put (A-185)."""
+        """Notes which supervisor drives; forgets the old place where a warm-up begins (A-185)."""
         if phase is Supervision.WARM_UP and self.supervision is not Supervision.WARM_UP:
             self.relocated()
         self.supervision = phase
@@ -185,7 +191,10 @@ class AdasStack:
     def _light(
         self, frame: SensorFrame, v: float, view: LaneView
     ) -> tuple[LightReading, LightState | None]:
-        """The light ahead by map, and what the camera sees while the map reports one (M-4)."""
+        """Returns the light ahead by map, and the colour that the camera sees while there is one (M-4).
+
+        NO_LIGHT and None without the assist; None, too, where no lamp is seen.
+        """
         if not self.assists:
             return NO_LIGHT, None
         light = self.scan.look(frame.ego.pose, v, view, frame.lights)
@@ -194,7 +203,7 @@ class AdasStack:
         return light, self.lamps.look(frame.images)
 
     def _speed_for_bends(self, frame: SensorFrame, v: float, view: LaneView) -> float:
-        """m/s that bends ahead allow; inf without the function."""
+        """Returns the m/s that bends ahead allow; inf without the function."""
         if self.bends is None:
             return inf
 
@@ -213,8 +222,10 @@ class AdasStack:
         sight: Sight,
         stop_distance: float | None,
     ) -> tuple[Situation, Sight]:
-        """What the tiers see; a target that the cameras do not confirm at standstill is dropped
-        before them, so that all tiers go on without it (A-116, D-043)."""
+        """Returns what the tiers see, and the sight; a target not confirmed at standstill is in neither.
+
+        It is dropped before them, so that all tiers go on without it (A-116, D-043).
+        """
         active, self.verified_by = self.resume.active, ""
         told_kmh = kmh_from_mps(self.v_told)
         s = Situation(

@@ -85,7 +85,10 @@ class Transform:
 
 
 def load_agent(where: str) -> type[Stack]:
-    """The agent class named by `path.py:Class` (or module:Class), as a stack."""
+    """Returns a stack class that drives with the agent class named by `path.py:Class` (or module:Class).
+
+    ConfigError where the class lacks one of METHODS; errors of `import_class`.
+    """
     kind = import_class(where, "agent")
     for method in METHODS:
         if not callable(getattr(kind, method, None)):
@@ -111,11 +114,17 @@ class AgentStack:
         self.planned = False
 
     def sensors(self) -> tuple[SensorSpec, ...]:
-        """The cameras and lidars that it asked for; the rest is read from the ego's own motion."""
+        """Returns the specs of the cameras and lidars that the agent asked for.
+
+        The rest is read from the ego's own motion.
+        """
         return self.specs
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
-        """Calls the agent's `run_step` once."""
+        """Calls the agent's `run_step` once and returns its command; StackError when it returns no control.
+
+        Before the first call it gives the agent its plan.
+        """
         if not self.planned:
             self._plan(frame.ego.pose)
             self.planned = True
@@ -138,7 +147,10 @@ class AgentStack:
             destroy()
 
     def _plan(self, start: Pose) -> None:
-        """The way along the ego's lane, as GPS and as world coordinates."""
+        """Gives the agent ROUTE_LENGTH m along the ego's lane, as GPS and as world coordinates.
+
+        Does nothing for an agent without `set_global_plan`; less, or nothing, where the road ends.
+        """
         give = getattr(self.agent, "set_global_plan", None)
         place: LanePoint | None = self.map.project(start.x, start.y, start.z)
         if not callable(give):
@@ -153,7 +165,10 @@ class AgentStack:
         give(gps, world)
 
     def _reading(self, wanted: Mapping[str, Any], frame: SensorFrame) -> Any:
-        """Returns the data of one wanted sensor in CARLA's units and axes, as the Leaderboard hands them."""
+        """Returns the data of one wanted sensor in CARLA's units and axes, as the Leaderboard hands them.
+
+        StackError for a camera without an image.
+        """
         kind, ego = _kind(wanted), frame.ego
         if kind == GNSS:
             place = _gps(ego.pose)
@@ -172,7 +187,7 @@ class AgentStack:
 
 
 def _instance(kind: type[Any]) -> Any:
-    """Newer agents take no argument or a host, older ones the path of their configuration."""
+    """Returns an instance: newer agents take no argument, older ones the path of their configuration, ""."""
     try:
         return kind()
     except TypeError:
@@ -189,7 +204,7 @@ def _kind(wanted: Mapping[str, Any]) -> str:
 
 
 def _spec(wanted: Mapping[str, Any]) -> SensorSpec:
-    """A camera or lidar as the agent describes it, in CARLA's axes.
+    """Returns a camera or lidar as the agent describes it, in CARLA's axes.
 
     What it leaves out is as in the leaderboard: there lidars have 64 channels and reach 85 m.
     """
@@ -219,7 +234,10 @@ def _spec(wanted: Mapping[str, Any]) -> SensorSpec:
 
 
 def _image(id: str, modality: Modality, frame: SensorFrame) -> NDArray[np.uint8]:
-    """(H, W, 4) BGRA bytes, as CARLA's sensors deliver them."""
+    """Returns (H, W, 4) BGRA bytes, as CARLA's sensors deliver them; StackError without an image.
+
+    Depth is coded over the colours as CARLA does; labels are the red bytes.
+    """
     if id not in frame.images:
         raise StackError(
             f"camera {id.removeprefix(MARK)!r} delivers no image: run with --sensors pixels"
@@ -242,7 +260,7 @@ def _image(id: str, modality: Modality, frame: SensorFrame) -> NDArray[np.uint8]
 
 
 def _gps(pose: Pose) -> dict[str, float]:
-    """Latitude, longitude in deg and height, around 0 N 0 E; north is left of the x axis."""
+    """Returns latitude, longitude in deg and height in m, around 0 N 0 E; north is left of the x axis."""
     lat, lon = geolocation(pose.x, pose.y, 0.0, 0.0)
     return {"lat": lat, "lon": lon, "z": pose.z}
 

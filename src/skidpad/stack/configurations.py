@@ -38,7 +38,7 @@ GOVERNED: dict[int, Functions] = {
 
 
 def numbered_driver(number: int) -> AdasDriver:
-    """Returns the driver of configuration 0 to 6."""
+    """Returns the driver of configuration 0 to 6; ConfigError for another number."""
     if number in GOVERNED:
         return AdasDriver(label=str(number), functions=GOVERNED[number], envelope=True)
     return AdasDriver(label=str(number), functions=functions_of(number))
@@ -55,7 +55,10 @@ def functions_of(configuration: int) -> Functions:
 
 
 def parse_functions(text: str) -> tuple[Functions, tuple[str, ...]]:
-    """Returns the functions of a text like `acc,lca`: those of the stack, and those of packages."""
+    """Returns the functions of a text like `acc,lca`: those of the stack, and names of those of packages.
+
+    ConfigError for a name that nothing has.
+    """
     names = {name.strip() for name in text.split(",") if name.strip()}
     own = {function.value for function in Function}
     added = tuple(sorted(names - own))

@@ -105,11 +105,11 @@ class AddedFunctions:
 
     @property
     def mode(self) -> str:
-        """The texts of those that say something."""
+        """The texts of those that say something, each as " [text]"; "" for none."""
         texts = (getattr(function, "mode", "") for function in self._functions)
         return "".join(f" [{text}]" for text in texts if text)
 
     def numbers(self) -> dict[str, Mapping[str, float]]:
-        """Returns the numbers of the last tick, by the name of the function."""
+        """Returns the numbers of the last tick by name of function; functions without any are left out."""
         pairs = zip(self.kinds, self._functions, strict=True)
         return {kind.name: f.numbers() for kind, f in pairs if hasattr(f, "numbers")}

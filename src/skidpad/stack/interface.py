@@ -26,7 +26,7 @@ class Stack(Protocol):
     ) -> None: ...
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
-        """The command for the coming step."""
+        """Returns the command for the coming step."""
         ...
 
 

@@ -40,7 +40,10 @@ NO_REPORT = StackReport()
 
 
 def load_stack(where: str) -> type[Stack]:
-    """The class named by `module:Class` or `path/to/file.py:Class`."""
+    """Returns the class named by `module:Class` or `path/to/file.py:Class`, which runs its module.
+
+    ConfigError where it has no `tick`; errors of `import_class`.
+    """
     found = import_class(where, "stack")
     if not callable(getattr(found, "tick", None)):
         raise ConfigError(f"stack {where!r}: class {found.__name__} has no method tick(frame)")
@@ -48,7 +51,10 @@ def load_stack(where: str) -> type[Stack]:
 
 
 def import_class(where: str, what: str) -> type[Any]:
-    """The class named by `module:Class` or `path/to/file.py:Class`; `what` it is, for messages."""
+    """Returns the class named by `module:Class` or `path/to/file.py:Class`; `what` it is, for messages.
+
+    ConfigError for another form, a failing import or a missing class, FileError for a missing file.
+    """
     place, colon, name = where.rpartition(":")
     if not colon or not place or not name.isidentifier():
         raise ConfigError(f"a {what} is given as module:Class or file.py:Class, got {where!r}")
@@ -63,7 +69,7 @@ def import_class(where: str, what: str) -> type[Any]:
 
 @contextmanager
 def _kept_home() -> Iterator[None]:
-    """What foreign code does to the working folder is undone; a child that it forks ends here."""
+    """Undoes what foreign code does to the working folder; ends a child process that it forks."""
     process, home = os.getpid(), _folder()
     try:
         yield
@@ -74,7 +80,10 @@ def _kept_home() -> Iterator[None]:
 
 
 def _from_file(path: Path, what: str) -> ModuleType:
-    """Returns the module in a .py file, imported under a name of its own; raises an error if that fails."""
+    """Returns the module in a .py file, imported and kept in sys.modules under a name of its own.
+
+    FileError where there is no such file, ConfigError where its import fails.
+    """
     if not path.is_file():
         raise FileError(f"{what} file {str(path)!r} does not exist")
     name = f"skidpad_user_{what}_{path.stem}"
@@ -148,7 +157,7 @@ class GuardedStack:
         return command
 
     def close(self) -> None:
-        """The run is over; what a stack does wrong here no longer matters to it."""
+        """Ends the stack's run by its `close`, if any; what it does wrong here no longer matters."""
         with suppress(*FOREIGN):
             close = getattr(self.stack, "close", None)
             if callable(close):
@@ -156,7 +165,10 @@ class GuardedStack:
 
     @property
     def report(self) -> StackReport:
-        """What the stack says about its last tick; empty for a stack that says nothing."""
+        """What the stack says about its last tick; empty for a stack that says nothing of the kind.
+
+        StackError where reading it fails or a value cannot be recorded.
+        """
         if self._is_own:
             own: StackReport = getattr(self.stack, "report", NO_REPORT)
             return own
@@ -173,14 +185,17 @@ class GuardedStack:
 
     @property
     def mode(self) -> str:
-        """The mode of the last tick in the stack's words; empty for one that has none."""
+        """The mode of the last tick in the stack's words; "" for a stack that has none or fails to say."""
         with suppress(*FOREIGN):
             mode = self._call(getattr, self.stack, "mode", "")
             return clean(mode, LONGEST_MODE) if isinstance(mode, str) else ""
         return ""
 
     def sensors(self) -> tuple[SensorSpec, ...]:
-        """The further sensors that the stack asks for."""
+        """Returns the specs of the further sensors that the stack asks for.
+
+        StackError where it fails, or asks for an unknown sensor or one with an id that is taken.
+        """
         try:
             wanted = self._call(_sensors_of, self.stack)
         except FOREIGN as error:
@@ -189,7 +204,10 @@ class GuardedStack:
         return wanted
 
     def _call(self, function: Callable[..., T], *arguments: Any) -> T:
-        """Call foreign code in the folder that it last chose."""
+        """Calls foreign code in the folder that it last chose and returns what it returns.
+
+        A child process that it forks ends here.
+        """
         if self._is_own:
             return function(*arguments)
         home = _folder()
@@ -206,7 +224,7 @@ class GuardedStack:
 
 
 def _has_added(settings: Mapping[str, Any]) -> bool:
-    """Tells whether functions of packages drive along in our stack."""
+    """Returns whether functions of packages drive along in our stack."""
     own = {function.value for function in Function}
     return not own.issuperset(settings.get("functions", ()))
 
@@ -259,7 +277,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _check_report(name: str, report: StackReport, tick: int) -> None:
-    """Raises an error where a report's values cannot be recorded."""
+    """Raises StackError where a report holds what is neither None nor a number that can be recorded."""
     for field in REPORTED:
         value: Any = getattr(report, field)
         if value is None:

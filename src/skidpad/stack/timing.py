@@ -8,10 +8,10 @@ ROUNDING = 1e-6  # of a tick
 
 
 def ticks_to_reach(duration: float, dt: float) -> int:
-    """Smallest number of ticks that lasts at least `duration`: 2 for 0.067 s at 0.05 s."""
+    """Returns the smallest number of ticks of dt s that lasts at least `duration` s: 2 for 0.067 at 0.05."""
     return ceil(duration / dt - ROUNDING)
 
 
 def ticks_within(duration: float, dt: float) -> int:
-    """Largest number of ticks that lasts at most `duration`: 3 for 0.17 s at 0.05 s."""
+    """Returns the largest number of ticks of dt s that lasts at most `duration` s: 3 for 0.17 at 0.05."""
     return floor(duration / dt + ROUNDING)

@@ -26,20 +26,26 @@ class Label:
 
 
 def mosaic(images: Sequence[NDArray[np.uint8]]) -> NDArray[np.uint8]:
-    """(96, 128, 3): the centre above, left and right beside each other below."""
+    """Returns (96, 128, 3): the centre above, left and right beside each other below.
+
+    images: centre (64, 128, 3), left and right (32, 64, 3).
+    """
     centre, left, right = images
     return np.concatenate([centre, np.concatenate([left, right], axis=1)], axis=0)
 
 
 def network_input(picture: NDArray[np.uint8]) -> Floats32:
-    """(1, 3, 96, 128) of a mosaic, -0.5 to 0.5."""
+    """Returns a mosaic as the network's input, (1, 3, 96, 128) from -0.5 to 0.5."""
     planes = picture.transpose(2, 0, 1)[None].astype(np.float32)
     scaled: Floats32 = planes / np.float32(255.0) - np.float32(0.5)
     return scaled
 
 
 def coded(label: Label) -> Floats32:
-    """(OUTPUTS,) what the network should say; presence is 1, 0, or 0.5 where it does not matter."""
+    """Returns (OUTPUTS,) what the network should say: scaled offsets, presence, nearness.
+
+    Presence is 1, 0, or 0.5 for a gap from SEEN m on, where it does not matter.
+    """
     offsets = [OFFSET_SCALE * y / d for y, d in zip(label.offsets, AHEAD, strict=True)]
     if label.gap is None:
         return np.array([*offsets, 0.0, 0.0], dtype=np.float32)
@@ -49,7 +55,7 @@ def coded(label: Label) -> Floats32:
 
 
 def decoded(output: Floats32) -> Label:
-    """What the network says; the presence is a logit."""
+    """Returns what the network says as a label; no gap where the presence, a logit, is not above 0."""
     offsets = tuple(float(v) * d / OFFSET_SCALE for v, d in zip(output, AHEAD, strict=False))
     logit, near = float(output[-2]), float(output[-1])
     if logit <= 0.0:

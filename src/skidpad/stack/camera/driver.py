@@ -72,7 +72,7 @@ class CameraDriver:
         return CAMERAS
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
-        """Returns the command of one tick from the front picture and the own speed."""
+        """Returns the command of one tick from the three images and the own speed; renews `report`."""
         label = seen(self.picture(frame))
         v = frame.ego.speed
         offsets, gap = self._path(label), self._gap(label)
@@ -100,13 +100,16 @@ class CameraDriver:
         return mosaic(images_of(frame.extra))
 
     def _path(self, label: Label) -> Floats:
-        """Offsets of the lane ahead, a little smoothed."""
+        """Returns the offsets in m of the lane ahead at AHEAD, a little smoothed."""
         fresh = np.array(label.offsets)
         self.offsets = fresh if self.offsets is None else REST * self.offsets + (1 - REST) * fresh
         return self.offsets
 
     def _gap(self, label: Label) -> float | None:
-        """The median of the last gaps, once enough of them are there."""
+        """Notes the label's gap and returns the median in m of the last SAMPLES.
+
+        None with less than CONFIRMED.
+        """
         self.gaps.append(label.gap)
         known = [gap for gap in self.gaps if gap is not None]
         return median(known) if len(known) >= CONFIRMED else None
@@ -121,5 +124,5 @@ def steer_of(offsets: Floats, v: float) -> float:
 
 
 def curvature(offsets: Floats) -> float:
-    """1/m of the parabola through the offsets, by least squares; left positive."""
+    """Returns the 1/m of the parabola through offsets in m at AHEAD, by least squares; left positive."""
     return 2.0 * float(np.polyfit(AHEAD, offsets, 2)[0])

@@ -36,7 +36,7 @@ CAMERAS = (
 
 
 def images_of(readings: Mapping[str, CameraImage]) -> tuple[NDArray[np.uint8], ...]:
-    """(H, W, 3) bytes of centre, left and right; StackError without images."""
+    """Returns (H, W, 3) bytes of centre, left and right; StackError where an image is missing."""
     found = []
     for camera in CAMERAS:
         image = readings[camera.id].rgb if camera.id in readings else None

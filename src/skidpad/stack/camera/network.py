@@ -25,7 +25,7 @@ def _network() -> Any:
 
 
 def seen(picture: NDArray[np.uint8]) -> Label:
-    """What the network makes of a mosaic of the three images."""
+    """Returns what the network makes of a mosaic of the three images."""
     net = _network()
     net.setInput(network_input(picture))
     output: Floats32 = np.asarray(net.forward(), dtype=np.float32).reshape(-1)

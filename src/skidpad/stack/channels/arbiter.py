@@ -75,9 +75,12 @@ class Arbiter:
         progress: Sequence[float],
         abstaining: Collection[int] = (),
     ) -> Choice:
-        """frames: this cycle's messages, None: nothing came; scores NaN: not evaluated;
+        """Takes in one cycle and returns the channel that drives from now on, and why.
+
+        t: s; frames: this cycle's messages, None: nothing came; scores: 0 to 1, NaN: not evaluated;
         progress: m/s at the end of each plan; abstaining: channels that say they cannot judge what
-        lies ahead, chosen only where all that are alive say so."""
+        lies ahead, chosen only where all that are alive say so.
+        """
         for i, frame in enumerate(frames):
             if frame is not None:
                 self.heard_at[i] = t
@@ -103,7 +106,10 @@ class Arbiter:
         return Choice(self.driving, reason)
 
     def _may_switch(self, t: float, scores: Sequence[float]) -> bool:
-        """Whether the driver may be relieved now: hysteresis in time."""
+        """Returns whether another channel may take over at t: hysteresis in time.
+
+        Not within `dwell` s of a change; then at once from none or an unsafe channel, else after `settle` s.
+        """
         s = self.settings
         if t - self.changed_at < s.dwell - 1e-9:
             return False
@@ -114,7 +120,10 @@ class Arbiter:
     def _choose_channel(
         self, able: Sequence[int], scores: Sequence[float], progress: Sequence[float]
     ) -> Choice:
-        """Returns the channel to drive with and why; None stands for a minimal risk manoeuvre or silence."""
+        """Returns the channel that the scores ask for and why; None for a minimal-risk stop.
+
+        able: channels that may be chosen. Without a score the driving one stays.
+        """
         s = self.settings
         if not able:
             return Choice(None, Reason.ALL_SILENT)

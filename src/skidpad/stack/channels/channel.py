@@ -64,7 +64,7 @@ class Channel:
         self.abstains = False  # it does not know the line that it comes to
 
     def keep_below(self, v_max: float) -> None:
-        """Plan from now on for no more than `v_max` (m/s, > 0); inf: as it would by itself."""
+        """Plans from now on for no more than `v_max` (m/s, > 0); inf: as it would by itself."""
         factor = min(self.settings.speed_factor, v_max / float(self.route.points.limit.max()))
         self._params = self._params._replace(speed_factor=factor)
 
@@ -115,7 +115,10 @@ class Channel:
         sizes: Floats,
         predictions: Floats,
     ) -> Floats:
-        """Returns the plan (n, 3) from the ego on along the route, slowed by blocks and stops."""
+        """Returns the plan (n, 3) of x, y, t from the ego on along the route, slowed by blocks and stops.
+
+        offset: m of the ego left of the route. Sets `a_planned`, m/s^2, and `v_planned`.
+        """
         c, v = self.settings, float(view.ego[3])
         blocks = find_blocks(
             self.route.points, self.at, v, objects, sizes, predictions, self._times, self._params
@@ -132,7 +135,7 @@ class Channel:
         return plan
 
     def _stop(self, view: ChannelView, objects: Floats, v: float) -> float:
-        """m from the ego's centre to the nearest line at which it must stop; inf: none."""
+        """Returns the m from the ego's centre to the nearest line at which it must stop; inf: none."""
         front = self.at * STEP + 0.5 * self.car.length
         for line in self.route.lines:
             gap = line.s - front
@@ -145,7 +148,7 @@ class Channel:
         return inf
 
     def _comes_to_a_line_unseen(self, v: float) -> bool:
-        """Whether a light or a line that this channel does not obey is within the way of stopping.
+        """Returns whether a light or line that this channel does not obey is within its way of stopping.
 
         From where another channel can still take over and brake comfortably, to the line itself.
         """
@@ -161,7 +164,10 @@ class Channel:
     def _must_stop(
         self, line: Line, gap: float, view: ChannelView, objects: Floats, v: float
     ) -> bool:
-        """Returns whether the ego must stop before a line `gap` in m ahead, by light or by right of way."""
+        """Returns whether the ego must stop before a line `gap` m ahead, by light or by right of way.
+
+        Never for what the channel does not read. Yellow counts where YELLOW_BRAKE is enough.
+        """
         if line.kind is SignalKind.LIGHT:
             if not self.settings.reads_lights:
                 return False
@@ -173,7 +179,10 @@ class Channel:
         return not self._may_pass(line, gap, objects, v, view.ego[:2])
 
     def _may_pass(self, line: Line, gap: float, objects: Floats, v: float, ego: Floats) -> bool:
-        """Whether to pass a stop line after a stop, or a yield line when slow, when nothing comes."""
+        """Returns whether to pass a stop line after a stop, or a yield line when slow, when nothing comes.
+
+        To be called once a cycle: it notes the halt at the line and counts the waiting.
+        """
         if self.halted == line.s and gap > HALT_REACH:
             self.halted = None
         near = gap < HALT_REACH
@@ -188,7 +197,10 @@ class Channel:
         return self._road_is_free(line, objects, ego)
 
     def _road_is_free(self, line: Line, objects: Floats, ego: Floats) -> bool:
-        """No tracked object will be in the junction behind the line within the critical gap."""
+        """Returns whether no tracked object moves in the junction behind a line or will within CLEAR_TIME.
+
+        Of those outside, only objects to the left of the ego that come nearer count, within CLEAR_REACH.
+        """
         if not len(objects):
             return True
         path = self.route.points
@@ -205,7 +217,7 @@ class Channel:
 
 
 def _boxes(sizes: Floats) -> Floats:
-    """(n, 4, 2) corners of boxes with length and width (n, 2), in their own frames."""
+    """Returns (n, 4, 2) corners in m of boxes with length and width (n, 2), in their own frames."""
     half = 0.5 * sizes[:, None, :]
     signs = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
     boxes: Floats = half * signs[None]

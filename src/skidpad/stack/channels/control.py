@@ -41,14 +41,17 @@ class Controller:
         yaw_rate: float,
         a: float,
     ) -> VehicleCommand:
-        """The command for acceleration `a`, the ego near point `at` of the path."""
+        """Returns the command for acceleration `a` in m/s^2; call it once per step of dt.
+
+        path: points STEP apart; at: the one near the ego; pose: x, y, yaw of its centre; v: m/s.
+        """
         steer = self._steer(path, at, pose, v, yaw_rate)
         return self._pedals(v, a, steer)
 
     def _steer(
         self, path: PathPoints, at: int, pose: tuple[float, float, float], v: float, rate: float
     ) -> float:
-        """Pure pursuit from the rear axle (Coulter 1992), corrected by the yaw rate that it asks."""
+        """Returns steer by pure pursuit from the rear axle (Coulter 1992), corrected by the yaw rate."""
         car = self.car
         x = pose[0] - 0.5 * car.wheelbase * cos(pose[2])
         y = pose[1] - 0.5 * car.wheelbase * sin(pose[2])
@@ -61,7 +64,10 @@ class Controller:
         return min(max(angle / car.steer_max, -1.0), 1.0)
 
     def _pedals(self, v: float, a: float, steer: float) -> VehicleCommand:
-        """Returns the command for an acceleration a in m/s^2 at v in m/s, trimmed by the measured one."""
+        """Returns the command for an acceleration a in m/s^2 at v in m/s, trimmed by the measured one.
+
+        Holds the brake below V_STANDING unless it is to start.
+        """
         if v < V_STANDING and a <= 0.05:
             self.trim, self.v_before = 0.0, None
             return VehicleCommand(brake=BRAKE_STANDING, steer=steer)

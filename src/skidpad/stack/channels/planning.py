@@ -49,7 +49,7 @@ class Blocks(NamedTuple):
 
 @inner_kernel
 def idm(v: float, v_desired: float, gap: float, v_lead: float, p: PlanParams) -> float:
-    """Acceleration in m/s^2 behind a leader at `gap` m (inf: none)."""
+    """Returns the acceleration in m/s^2 behind a leader at `gap` m (inf: none), A_HARDEST at least."""
     if v <= v_desired:
         free = p.a_max * (1.0 - (v / max(v_desired, 0.1)) ** 4)
     else:
@@ -63,7 +63,7 @@ def idm(v: float, v_desired: float, gap: float, v_lead: float, p: PlanParams) ->
 
 @inner_kernel
 def desired_speeds(path: PathPoints, at: int, n: int, p: PlanParams, out: Floats) -> None:
-    """Speed allowed by limits and bends at the n points from `at` on, braking ahead of each."""
+    """Writes the m/s that limits and bends allow at the n points from `at` on, braking ahead of each."""
     for k in range(n):
         j = min(at + k, path.x.size - 1)
         v = p.speed_factor * path.limit[j]
@@ -86,7 +86,11 @@ def find_blocks(
     times: Floats,
     p: PlanParams,
 ) -> Blocks:
-    """Leaders and crossers among objects (n, 5) with sizes (n, 2) and predictions (n, q, 2)."""
+    """Returns per object what it blocks: leaders with their speed, crossers standing, inf for others.
+
+    objects (n, 5): x, y, heading, vx, vy; sizes (n, 2): length, width; predictions (n, q, 2) at `times`
+    (q,) in s; at: point of the path at the ego. Crossers count within CROSSING_MARGIN s of the ego.
+    """
     n = objects.shape[0]
     s, speed = np.full(n, np.inf), np.zeros(n)
     for i in range(n):
@@ -138,8 +142,9 @@ def roll_out(
     p: PlanParams,
     out: Floats,
 ) -> float:
-    """Fill out (m, 3) with x, y, t every `step` s; returns the first acceleration wanted.
+    """Fills out (m, 3) with x, y, t every `step` s; returns the first acceleration wanted, m/s^2.
 
+    at: point of the path at the ego; offset: m of it left of the path; v: m/s.
     s_stop: m from the ego's centre to a line at which it must stop, inf: none.
     """
     reach = int(v * horizon + 0.5 * p.a_max * horizon * horizon + v * v / (2.0 * p.b_comfort)) + 10
@@ -173,7 +178,7 @@ def roll_out(
 
 @inner_kernel
 def _point(path: PathPoints, at: int, s: float, offset: float, out: Floats) -> None:
-    """Writes x and y in m of the path `s` samples beyond `at`, at an offset that fades, into `out`."""
+    """Writes x and y in m of the path `s` m beyond point `at`, at an offset that fades, into `out`."""
     j = min(at + int(s), path.x.size - 2)
     u = min(max(at + s - j, 0.0), 1.0)
     h = path.heading[j] + u * (path.heading[j + 1] - path.heading[j])

@@ -28,10 +28,11 @@ def predict(
     times: Floats,
     out: Floats,
 ) -> None:
-    """Positions of objects (n, 5) at `times` (p,) into out (n, p, 2), at constant speed.
+    """Writes positions of objects at `times` (p,) into out (n, p, 2), at constant speed.
 
-    A vehicle that moves with its lane keeps its offset from the centre line and takes the
-    straightest way on; everything else goes straight on.
+    objects (n, 5): x, y, heading, vx, vy; z: m, height of the road for all. A vehicle that moves with its
+    lane keeps its offset from the centre line and takes the straightest way on; everything else goes
+    straight on, and what is slower than V_MOVING stays.
     """
     for i in range(objects.shape[0]):
         x, y, vx, vy = objects[i, 0], objects[i, 1], objects[i, 3], objects[i, 4]

@@ -56,7 +56,10 @@ class RoutePath:
 
 
 def route_path(map: RoadMap, lanes: Sequence[int], s_start: float = 0.0) -> RoutePath:
-    """The centre line of lanes that follow each other, from `s_start` m along the first."""
+    """Returns the centre line of lanes that follow each other, from `s_start` m along the first.
+
+    ConfigError where a lane does not follow the one before. UNSIGNED_LIMIT where the map gives none.
+    """
     rows, starts, lines, s = [], [], [], -s_start
     for i, lane in enumerate(lanes):
         if i and lane not in map.successors(lanes[i - 1]):
@@ -83,7 +86,7 @@ def route_path(map: RoadMap, lanes: Sequence[int], s_start: float = 0.0) -> Rout
 
 
 def _lines(map: RoadMap, lane: int, start: float) -> list[Line]:
-    """Returns the stop lines of lights, stop and yield signs on a lane that begins at `start` in m."""
+    """Returns the lines of lights, stop and yield signs on a lane that begins at `start` m of the path."""
     table = map.signals
     kinds = (SignalKind.LIGHT, SignalKind.STOP, SignalKind.YIELD)
     return [
@@ -94,7 +97,10 @@ def _lines(map: RoadMap, lane: int, start: float) -> list[Line]:
 
 @kernel
 def locate(path: PathPoints, x: float, y: float, near: int, search: int) -> tuple[int, float]:
-    """(point, left offset in m): the path point nearest to (x, y) around point `near`."""
+    """Returns the path point nearest to (x, y), and the m by which that lies left of the path there.
+
+    Only points within `search` of point `near` are looked at.
+    """
     best, best_d = near, np.inf
     for k in range(max(near - search, 0), min(near + search + 1, path.x.size)):
         d = (path.x[k] - x) ** 2 + (path.y[k] - y) ** 2
@@ -107,7 +113,7 @@ def locate(path: PathPoints, x: float, y: float, near: int, search: int) -> tupl
 def draw_route(
     map: RoadMap, start: int, length: float, rng: np.random.Generator
 ) -> tuple[int, ...]:
-    """Lanes from `start` on for at least `length` m, turns drawn; only lanes that go on."""
+    """Returns lanes from `start` on for at least `length` m, turns drawn by `rng`; shorter at a dead end."""
     lanes, total = [start], float(map.lanes.length[start])
     while total < length:
         ways = [n for n in map.successors(lanes[-1]) if map.arrays.drivable[n]]

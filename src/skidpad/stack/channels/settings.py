@@ -81,6 +81,6 @@ SETTINGS = {
 
 
 def load_channel_settings(channel: str) -> ChannelSettings:
-    """The planning settings of a shipped channel."""
+    """Returns the planning settings of a shipped channel; ConfigError lists the known ones."""
     require_choice("channel", channel, tuple(SETTINGS))
     return SETTINGS[channel]

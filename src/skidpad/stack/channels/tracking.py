@@ -91,14 +91,16 @@ class Tracker:
 
     @property
     def confirmed(self) -> NDArray[np.void]:
-        """Rows of TRACK that count as objects, in the odometry frame."""
+        """Rows of TRACK that count as objects, `confirm` detections at least, in the odometry frame."""
         rows = self._all[: self.count]
         chosen: NDArray[np.void] = rows[rows["hits"] >= self.settings.confirm]
         return chosen
 
     def objects(self, ego: Floats) -> Floats:
-        """(n, 5) x, y, heading, vx, vy of confirmed tracks in the world in which the ego is at
-        `ego` (x, y, heading, ...)."""
+        """Returns (n, 5) x, y, heading, vx, vy of confirmed tracks in the world.
+
+        ego: x, y, heading (and more) of the ego in the world.
+        """
         rows = self.confirmed
         turn = float(ego[2]) - float(self.pose[2])
         c, s = cos(turn), sin(turn)
@@ -116,7 +118,10 @@ class Tracker:
 
 @inner_kernel
 def _predict(tracks: NDArray[np.void], count: int, dt: float) -> None:
-    """Constant velocity with white acceleration (Bar-Shalom et al. 2001, 6.2)."""
+    """Moves `count` tracks on by dt s: constant velocity with white acceleration.
+
+    Source: Bar-Shalom et al. 2001, 6.2.
+    """
     q = SIGMA_ACCELERATION**2
     for i in range(count):
         t = tracks[i]
@@ -130,7 +135,7 @@ def _predict(tracks: NDArray[np.void], count: int, dt: float) -> None:
 
 @inner_kernel
 def _correct(t: Any, x: float, y: float, age: float) -> None:
-    """Kalman update with a position measured `age` (<= 0) s from now."""
+    """Corrects a track by a position measured `age` (<= 0) s from now (Kalman update)."""
     r = SIGMA_MEASURED**2
     h = age
     variance = t.p_xx + 2.0 * h * t.p_xv + h * h * t.p_vv + r
@@ -149,7 +154,7 @@ def _correct(t: Any, x: float, y: float, age: float) -> None:
 
 @inner_kernel
 def _start_moving(t: Any, x: float, y: float, age: float) -> None:
-    """State of an object seen twice: the difference of two places whose errors are independent."""
+    """Sets the state of an object seen twice: the difference of two places whose errors are independent."""
     t.vx, t.vy = (x - t.x) / t.unseen, (y - t.y) / t.unseen
     t.x, t.y = x - age * t.vx, y - age * t.vy
     r = SIGMA_MEASURED**2
@@ -158,7 +163,7 @@ def _start_moving(t: Any, x: float, y: float, age: float) -> None:
 
 @inner_kernel
 def _shape(t: Any, heading: float, length: float, width: float, label: int) -> None:
-    """Smooth heading and size, vote on the class."""
+    """Smooths heading and size of a track and votes on its class."""
     v = np.hypot(t.vx, t.vy)
     if v > V_TURNING:
         travel = np.arctan2(t.vy, t.vx)
@@ -178,8 +183,11 @@ def _shape(t: Any, heading: float, length: float, width: float, label: int) -> N
 
 @inner_kernel
 def _second_sight(t: Any, dx: float, dy: float) -> float:
-    """m of distance of what may be an object seen once, whose speed is not known, driven on along its
-    heading; it counts as farther than whatever is within a gate."""
+    """Returns how far aside a detection is of an object seen once that drove on along its heading.
+
+    dx, dy: m from the track to the detection. GATE is added, so that it counts as farther than all within
+    a gate; inf where it cannot be that object.
+    """
     c, s = np.cos(t.heading), np.sin(t.heading)
     ahead, aside = c * dx + s * dy, abs(c * dy - s * dx)
     if not 0.0 < ahead < V_FIRST * t.unseen or aside > 0.5 * GATE:
@@ -189,7 +197,10 @@ def _second_sight(t: Any, dx: float, dy: float) -> float:
 
 @inner_kernel
 def _distances(tracks: NDArray[np.void], count: int, x: Floats, y: Floats, age: float) -> Floats:
-    """(m, count) m from each detection to each track where they may be one, else inf."""
+    """Returns (m, count) m from each detection to each track where they may be one, else inf.
+
+    age: s (<= 0) of the detections from now.
+    """
     distance = np.full((len(x), count), np.inf)
     for j in range(len(x)):
         for i in range(count):
@@ -205,7 +216,10 @@ def _distances(tracks: NDArray[np.void], count: int, x: Floats, y: Floats, age: 
 
 @inner_kernel
 def _bury(tracks: NDArray[np.void], count: int, dt: float, confirm: int, coast: float) -> int:
-    """Close the gaps that tracks leave which were not seen for too long; how many are left."""
+    """Removes tracks that were not seen for too long, closing the gaps; returns how many are left.
+
+    Confirmed ones go after `coast` s, others after a cycle of dt s.
+    """
     kept = 0
     for i in range(count):
         t = tracks[i]
@@ -230,7 +244,11 @@ def _update(
     confirm: int,
     coast: float,
 ) -> tuple[int, int]:
-    """One cycle: predict, associate nearest first, correct, bear and bury. New count and id."""
+    """Moves all tracks through one cycle and returns their new count and the next free id.
+
+    Predicts, associates nearest first, corrects, removes lost tracks and begins new ones. objects (m, 5):
+    x, y, heading, length, width seen from the car at `pose` (odometry) `age` s ago (<= 0).
+    """
     _predict(tracks, count, dt)
     m = objects.shape[0]
     c, s = np.cos(pose[2]), np.sin(pose[2])

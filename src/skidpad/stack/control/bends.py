@@ -24,12 +24,12 @@ CurvatureAhead = Callable[[float], float]  # 1/m at so many m further along the 
 
 
 def bend_speed(curvature: float) -> float:
-    """Speed in m/s through a bend; inf on a straight."""
+    """Returns the m/s through a bend of `curvature` 1/m at A_LATERAL; inf on a straight."""
     return sqrt(A_LATERAL / abs(curvature)) if abs(curvature) > STRAIGHT else inf
 
 
 def speed_before(v_bend: float, distance: float) -> float:
-    """Speed in m/s `distance` m before a bend that is driven at v_bend."""
+    """Returns the m/s allowed `distance` m before a bend that is driven at v_bend; inf for inf."""
     return sqrt(v_bend * v_bend + stopping_speed(A_AHEAD, distance) ** 2)
 
 
@@ -45,7 +45,10 @@ class BendSpeed:
         self.allowed, self.wait = inf, 0
 
     def update(self, v: float, curvature: CurvatureAhead) -> float:
-        """m/s, from now on; inf: no bend within reach."""
+        """Returns the m/s that bends within braking distance allow; inf: none is within reach.
+
+        Looks along the road every LOOK_PERIOD s only; call it once per tick.
+        """
         if self.wait == 0:
             self.wait = self.period
             places = range(int(v * v / (2.0 * A_AHEAD) / STEP) + 2)
@@ -57,7 +60,7 @@ class BendSpeed:
 
 
 def slowed(request: Request, v: float, v_allowed: float) -> Request:
-    """The request, or braking for a bend where that is harder; no throttle above v_allowed (m/s)."""
+    """Returns the request, or braking for a bend where that is harder; no throttle above v_allowed (m/s)."""
     if v <= v_allowed:
         return request
     brake = clip((v - v_allowed) / BRAKE_SPAN, 0.0, BRAKE_MAX)

@@ -30,12 +30,15 @@ class Pid:
         self.reset()
 
     def reset(self) -> None:
-        """Clear the previous error and the integral (A-106)."""
+        """Clears the previous error and the integral (A-106)."""
         self.previous = 0.0
         self.integral = 0.0
 
     def update(self, error: float) -> float:
-        """Returns the controller's output for the error of one more step."""
+        """Returns the output for the error of one more step of dt.
+
+        After a reset the first error counts as a step.
+        """
         g = self.gains
         self.integral += error * self.dt
         self.integral = min(max(self.integral, -INTEGRAL_LIMIT), INTEGRAL_LIMIT)

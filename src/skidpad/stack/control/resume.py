@@ -30,7 +30,7 @@ class ResumeProtocol:
 
     @property
     def timer(self) -> float | None:
-        """Seconds since the last tick at a stop; None: no stop yet."""
+        """Seconds since the last tick at a stop; None: no stop yet, and none after `reset`."""
         return None if self.ticks is None else self.ticks * self.dt
 
     @property
@@ -43,7 +43,10 @@ class ResumeProtocol:
         return self.end is ResumeEnd.FIRST_CURVE and not self.past_curve
 
     def update(self, stop_requested: bool, v_kmh: float, curvature: float) -> None:
-        """Takes in one tick; curvature of the ego's lane in 1/m."""
+        """Takes in one tick; the count starts anew in each at a requested stop below STOPPED_BELOW_KMH.
+
+        curvature: of the ego's lane in 1/m.
+        """
         if stop_requested and v_kmh < STOPPED_BELOW_KMH:
             self.ticks, self.in_curve, self.past_curve = 0, False, False
         elif self.ticks is not None:
@@ -69,11 +72,11 @@ class SpeedCaps:
         return RESUME_KMH if self.resumes and resume_active else inf
 
     def cruise_kmh(self, resume_active: bool) -> float:
-        """Returns the target of free cruise in km/h (A-135, A-174)."""
+        """Returns the target in km/h of cruise without a lead (A-135, A-174)."""
         return min(self.v_cruise_kmh, self._resume(resume_active))
 
     def following_kmh(self, resume_active: bool) -> float:
-        """Returns the speed above which following gives no throttle; inf: no cap (A-129, A-178)."""
+        """Returns the km/h above which following gives no throttle; inf: no cap (A-129, A-178)."""
         if self.scope is CapScope.CRUISE:
             return inf
         return min(self.limiter, self._resume(resume_active))

@@ -26,7 +26,7 @@ class SteadySpeed:
         self.integral = 0.0
 
     def update(self, error: float) -> float:
-        """Throttle if positive, brake if negative; error: wanted minus driven speed in km/h."""
+        """Returns throttle if positive, brake if negative, for an error wanted minus driven in km/h."""
         if error < -COAST_BAND:
             self.integral = max(self.integral + INTEGRAL_GAIN * error * self.dt, 0.0)
             return BRAKE_GAIN * (error + COAST_BAND)

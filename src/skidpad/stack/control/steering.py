@@ -30,19 +30,22 @@ PathAhead = Callable[[float, float], LanePoint | None]
 
 
 def lookahead_distance(v_kmh: float) -> float:
-    """Look-ahead of lane centring in m (eq. 12)."""
+    """Returns the look-ahead of lane centring in m at a speed in km/h (eq. 12)."""
     return min(max(LOOKAHEAD_PER_KMH * v_kmh, LOOKAHEAD_MIN), LOOKAHEAD_MAX)
 
 
 def steering_gain(v_kmh: float) -> float:
-    """Steer per rad, falling with speed (eq. 14)."""
+    """Returns the steer per rad, falling with speed in km/h (eq. 14)."""
     if v_kmh < GAIN_FROM_KMH:
         return GAIN_LOW_SPEED
     return max(GAIN_MIN, GAIN_LOW_SPEED - GAIN_SLOPE * (v_kmh - GAIN_FROM_KMH))
 
 
 def angle_to(pose: Pose, target: LanePoint) -> float | None:
-    """Signed angle from the heading to the target in rad (eq. 13); None when it is too near."""
+    """Returns the signed angle from the heading to the target in rad (eq. 13).
+
+    None when it is nearer than TARGET_TOO_NEAR.
+    """
     dx, dy = target.x - pose.x, target.y - pose.y
     if hypot(dx, dy) < TARGET_TOO_NEAR:
         return None
@@ -51,7 +54,7 @@ def angle_to(pose: Pose, target: LanePoint) -> float | None:
 
 
 def steer_command(angle: float, v_kmh: float) -> float:
-    """Steer in [-1, 1] for the angle to the target in rad (A-146)."""
+    """Returns steer in [-1, 1] for the angle to the target in rad (A-146)."""
     damping = 1.0 - DAMPING * abs(angle) / pi
     return min(max(angle * steering_gain(v_kmh) * damping, -1.0), 1.0)
 
@@ -63,7 +66,7 @@ class LaneCentring:
         self.dynamic = lookahead is Lookahead.DYNAMIC
 
     def steer(self, pose: Pose, v: float, path: PathAhead) -> float:
-        """Steer for the ego at `pose` with speed v (m/s); 0 without a place to steer by."""
+        """Returns steer for the ego at `pose` with speed v (m/s); 0 without a place to steer by."""
         v_kmh = kmh_from_mps(v)
         distance = lookahead_distance(v_kmh) if self.dynamic else LOOKAHEAD_FIXED
         return steer_towards(pose, v_kmh, path(distance, pose.yaw))
@@ -76,13 +79,16 @@ class LazyDriver:
         self.lookahead, self.dead_band, self.gain = lookahead, dead_band, gain
 
     def steer(self, pose: Pose, v: float, path: PathAhead) -> float:
-        """Returns the steering command in -1..1 by a proportional law with a dead band."""
+        """Returns the steering command in -1..1 by a proportional law with a dead band; v: m/s.
+
+        0 without a place to steer by.
+        """
         command = steer_towards(pose, kmh_from_mps(v), path(self.lookahead, pose.yaw))
         return 0.0 if abs(command) < self.dead_band else self.gain * command
 
 
 def steer_towards(pose: Pose, v_kmh: float, target: LanePoint | None) -> float:
-    """Steer towards a place; 0 when there is none."""
+    """Returns steer in [-1, 1] towards a place; 0 when there is none or it is too near."""
     angle = None if target is None else angle_to(pose, target)
     return 0.0 if angle is None else steer_command(angle, v_kmh)
 
@@ -91,7 +97,7 @@ Steering = LaneCentring | LazyDriver
 
 
 def steering_of(functions: Functions, settings: StackSettings) -> Steering:
-    """Lane centring if it is switched on, else the lazy driver."""
+    """Returns lane centring if it is switched on, else the lazy driver."""
     if Function.LCA in functions:
         return LaneCentring(settings.lookahead)
     return LazyDriver(settings.lazy_lookahead, settings.lazy_dead_band, settings.lazy_gain)
@@ -110,7 +116,7 @@ class Smoothing:
         self.steer = 0.0
 
     def update(self, command: float) -> float:
-        """Returns the command, smoothed and limited in its change per tick."""
+        """Returns the command of one more tick, smoothed and limited in its change."""
         change = self.share * (command - self.steer)
         self.steer += min(max(change, -self.step), self.step)
         return self.steer

@@ -121,7 +121,7 @@ class SpeedControl(Protocol):
         ...
 
     def update(self, error: float) -> float:
-        """Throttle if positive, brake if negative; error: wanted minus driven speed in km/h."""
+        """Returns throttle if positive, brake if negative; error: wanted minus driven speed in km/h."""
         ...
 
 
@@ -129,7 +129,7 @@ class Rule(Protocol):
     """A tier."""
 
     def __call__(self, s: Situation) -> Request | None:
-        """A request, or None to pass on."""
+        """Returns a request, or None to leave it to the next tier."""
         ...
 
 
@@ -139,12 +139,12 @@ def clip(value: float, low: float, high: float) -> float:
 
 
 def time_gap(distance: float, v: float) -> float:
-    """Time to cover the measured distance at the ego's speed, s (eq. 10, A-110)."""
+    """Returns the s to cover a measured distance in m at the ego's speed, V_GAP_MIN at least (A-110)."""
     return distance / max(v, V_GAP_MIN)
 
 
 def stopping_speed(deceleration: float, distance: float) -> float:
-    """Speed from which `deceleration` just stops within `distance` (eq. 17, A-170)."""
+    """Returns the m/s from which `deceleration` just stops within `distance` (eq. 17, A-170); 0 beyond it."""
     return sqrt(2.0 * deceleration * max(distance, 0.0))
 
 
@@ -155,21 +155,27 @@ class HardStop:
         self.unconfirmed = unconfirmed
 
     def __call__(self, s: Situation) -> Request | None:
-        """Full brake."""
+        """Returns full brake for a lead nearer than TOO_CLOSE; None for none and up to HARD_STOP_ABOVE_KMH.
+
+        `unconfirmed` for a lead that is not confirmed.
+        """
         if s.lead is None or s.lead.distance >= TOO_CLOSE or s.v_kmh <= HARD_STOP_ABOVE_KMH:
             return None
         return Request(Tier.HARD_STOP, brake=1.0) if s.lead.confirmed else self.unconfirmed
 
 
 def low_speed_stop(s: Situation) -> Request | None:
-    """Tier 2: too close and slow; a standing ego's target was verified before (A-114)."""
+    """Returns tier 2, full brake, when too close and slow; None else.
+
+    The target of a standing ego was verified before (A-114).
+    """
     if s.lead is None or s.lead.distance >= TOO_CLOSE or s.v_kmh > HARD_STOP_ABOVE_KMH:
         return None
     return Request(Tier.STOPPED_TOO_CLOSE, brake=1.0)
 
 
 def needs_verification(s: Situation) -> bool:
-    """Tier 2 at creeping speed asks the cameras whether the target is real (A-115)."""
+    """Returns whether tier 2 at creeping speed needs the cameras to say that the target is real (A-115)."""
     return s.lead is not None and s.lead.distance < TOO_CLOSE and s.v_kmh <= CREEP_KMH
 
 
@@ -180,7 +186,10 @@ class Emergency:
         self.unconfirmed = unconfirmed
 
     def __call__(self, s: Situation) -> Request | None:
-        """Brake by urgency."""
+        """Returns braking by urgency for a time gap below EMERGENCY_GAP, else None.
+
+        `unconfirmed` for a lead that is not confirmed.
+        """
         if s.lead is None or s.lead.gap >= EMERGENCY_GAP:
             return None
         if not s.lead.confirmed:
@@ -200,7 +209,10 @@ class LeadAtLight:
         self.holding = False
 
     def __call__(self, s: Situation) -> Request | None:
-        """Hold, or approach the nearer of lead and line."""
+        """Returns a hold, or the approach to the nearer of lead and line; None without a red light or a lead.
+
+        A hold lasts until no stop is asked for.
+        """
         if s.stop_distance is None:
             self.holding = False
             return None
@@ -220,7 +232,7 @@ class LeadAtLight:
 
 
 def zones(gap: float) -> Request:
-    """Actuation of following by the error of the time gap in s (A-124 to A-128)."""
+    """Returns the actuation of following for a time gap in s, by its error (A-124 to A-128)."""
     error = round(gap - TARGET_GAP, 9)  # 2.8 - 2.5 falls just short of 0.3 (A-128)
     if error >= DEAD_BAND:
         more = OPEN_THROTTLE_MORE * min(error / OPEN_SPAN, 1.0)
@@ -243,7 +255,10 @@ class Following:
         self.pid = distance_pid
 
     def __call__(self, s: Situation) -> Request | None:
-        """Throttle or brake by the gap; no throttle above the cap (A-129)."""
+        """Returns throttle or brake by the gap, no throttle above the cap (A-129).
+
+        None without a lead in reach.
+        """
         if s.lead is None or (s.lead.gap >= FOLLOW_GAP and s.lead.distance >= FOLLOW_DISTANCE):
             return None
         request = zones(s.lead.gap) if self.by_zones else self._by_distance(s, s.lead)
@@ -263,7 +278,7 @@ class LightStop:
         self.pid = speed_pid
 
     def __call__(self, s: Situation) -> Request | None:
-        """Stop at the line."""
+        """Returns what stops at the line, from approach to hold; None where no stop is asked for."""
         d = s.stop_distance
         if d is None:
             return None
@@ -298,7 +313,7 @@ class Cruise:
         self.ticks_since_lead = self.coast_ticks
 
     def __call__(self, s: Situation) -> Request:
-        """Always a request, so that the hierarchy is total."""
+        """Returns a request in every case, so that the hierarchy is total: coasting, or the cruise speed."""
         if self.ticks_since_lead < self.coast_ticks and s.v_kmh > COAST_ABOVE_KMH:
             return Request(Tier.COAST, brake=COAST_BRAKE)
         u = self.speed.update(s.cruise_kmh - s.v_kmh)
@@ -307,7 +322,7 @@ class Cruise:
         return Request(Tier.CRUISE, brake=min(-u, CRUISE_BRAKE_MAX))
 
     def conclude(self, winner: Tier) -> None:
-        """Counts the ticks since a tier that followed a lead has won."""
+        """Counts the ticks since a tier that follows a lead has won; call it with each tick's winner."""
         self.ticks_since_lead = 0 if winner in COASTED_FROM else self.ticks_since_lead + 1
 
 
@@ -326,7 +341,7 @@ class Hierarchy:
         self.rules = self._rules(functions, settings)
 
     def _rules(self, functions: Functions, settings: StackSettings) -> tuple[Rule, ...]:
-        """Tiers 1 to 3 come with ACC, or with emergency braking alone (A-140)."""
+        """Returns the rules in order; tiers 1 to 3 come with ACC, or with emergency braking alone (A-140)."""
         unconfirmed = NO_ACTION if settings.unconfirmed is Unconfirmed.CONSUME else None
         following = Following(settings.follower, self.distance_pid)
         braking: tuple[Rule, ...] = (
@@ -357,7 +372,10 @@ class Hierarchy:
         self.last = Tier.NONE
 
     def decide(self, s: Situation) -> Request:
-        """The first request in the order of the tiers."""
+        """Returns the first request in the order of the tiers; call it once per tick.
+
+        Tiers 1 and 3 reset the controllers, cruise that begins the distance controller.
+        """
         request = NO_ACTION
         for rule in self.rules:  # the last one always makes a request
             found = rule(s)

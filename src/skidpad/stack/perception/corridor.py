@@ -46,7 +46,7 @@ class Corridor(NamedTuple):
 
 @kernel
 def lateral_offset(z: float, u: float, c: Corridor, sin_yaw: float, kappa: float) -> float:
-    """Offset of column u at depth z from the lane's path, left positive (eq. 5, 7; A-041, A-042).
+    """Returns the m by which column u at depth z m lies left of the lane's path (eq. 5, 7; A-041, A-042).
 
     sin_yaw: of the heading error to the lane, left positive; kappa: half the lane's curvature.
     """
@@ -55,13 +55,13 @@ def lateral_offset(z: float, u: float, c: Corridor, sin_yaw: float, kappa: float
 
 @kernel
 def half_width(z: float, c: Corridor) -> float:
-    """Half-width of the corridor at depth z in m (eq. 8)."""
+    """Returns the half-width of the corridor at depth z in m (eq. 8)."""
     return min(c.half_width + c.widening * z, c.half_width_max)
 
 
 @kernel
 def in_corridor(z: float, u: float, c: Corridor, sin_yaw: float, kappa: float) -> bool:
-    """Strictly inside in depth and width (A-054)."""
+    """Returns whether column u at depth z m is strictly inside in depth and width (A-054)."""
     if not (c.near < z < c.far):
         return False
     return bool(abs(lateral_offset(z, u, c, sin_yaw, kappa)) < half_width(z, c))
@@ -75,7 +75,7 @@ def _is_one(label: np.uint8, first: np.uint8, count: np.uint8) -> bool:
 
 @kernel
 def reachable_columns(c: Corridor, sin_yaw: float, kappa: float, width: int) -> tuple[int, int]:
-    """Columns first <= u < end outside which no depth lies in the corridor.
+    """Returns columns first <= u < end outside which no depth lies in the corridor.
 
     |d| < w means (cx - u) / f within kappa Z - sin_yaw +- w / Z. The first term is linear in Z
     and w / Z falls with Z, so the extremes over [near, far] bound both.
@@ -92,7 +92,10 @@ def reachable_columns(c: Corridor, sin_yaw: float, kappa: float, width: int) -> 
 def _found_in_row(
     labels: NDArray[np.uint8], row: int, col_first: int, col_end: int, wanted: Labels
 ) -> int:
-    """Counted without a branch, so that the compiler takes many pixels at once."""
+    """Returns how many pixels of a row in col_first <= u < col_end have a wanted label.
+
+    Counted without a branch, so that the compiler takes many pixels at once.
+    """
     first, classes = np.uint8(wanted.first), np.uint8(wanted.size)
     count = np.int32(0)
     for u in range(col_first, col_end):
@@ -111,7 +114,7 @@ def _count_beside(labels: NDArray[np.uint8], c: Corridor, col_first: int, col_en
 
 @inner_kernel
 def select(values: NDArray[np.float32], n: int, k: int) -> float:
-    """The k-th smallest (from 0) of values[:n]; reorders them so that smaller ones come first."""
+    """Returns the k-th smallest (from 0) of values[:n]; reorders them so that smaller ones come first."""
     left, right = 0, n - 1
     while left < right:
         pivot = values[(left + right) // 2]
@@ -136,7 +139,10 @@ def select(values: NDArray[np.float32], n: int, k: int) -> float:
 
 @kernel
 def percentile(values: NDArray[np.float32], n: int, fraction: float) -> float:
-    """Percentile of values[:n] with linear interpolation between neighbours; reorders them."""
+    """Returns the percentile of values[:n], interpolated between neighbours; reorders them.
+
+    fraction: 0 to 1; n >= 1.
+    """
     position = fraction * (n - 1)
     k = int(np.floor(position))
     low = select(values, n, k)
@@ -158,9 +164,10 @@ def read_pixels(
     kappa: float,
     scratch: NDArray[np.float32],
 ) -> float:
-    """The tier's distance in m, NaN for no target (A-044 to A-054).
+    """Returns the tier's distance in m, NaN for no target (A-044 to A-054).
 
-    inverse_depth (H, W) 1/m, labels (H, W) of the same view; scratch: room for every pixel read.
+    inverse_depth (H, W) 1/m, labels (H, W) of the same view; scratch: room for every pixel read;
+    fraction: of the percentile; sin_yaw, kappa: as in `lateral_offset`.
     """
     width = labels.shape[1]
     first, end = reachable_columns(c, sin_yaw, kappa, width)
@@ -203,7 +210,10 @@ def read_segments(
     sin_yaw: float,
     kappa: float,
 ) -> float:
-    """The same distance from runs of pixels, each weighing as many pixels as it covers (M-3)."""
+    """Returns the same distance from runs of pixels, each weighing as many pixels as it covers (M-3).
+
+    u (n,): middle column; width, top, bottom: px; depth: m.
+    """
     n = len(u)
     z = np.empty(n, dtype=np.float64)
     weight = np.empty(n, dtype=np.float64)
@@ -242,7 +252,7 @@ def read_held_segments(
     sin_yaw: float,
     kappa: float,
 ) -> float:
-    """As `read_segments`, between the depths `near` and `far`; the corridor is behind its pointer."""
+    """Returns what `read_segments` does, between the depths `near` and `far`; the corridor is held."""
     h = held.value
     c = Corridor(
         h.focal, h.cx, h.row_first, h.row_end, h.half_width, h.widening, h.half_width_max,
@@ -255,7 +265,7 @@ def read_held_segments(
 def weighted_percentile(
     values: NDArray[np.float64], weight: NDArray[np.float64], fraction: float
 ) -> float:
-    """Percentile of values that each stand `weight` times, interpolated as in `percentile`."""
+    """Returns the percentile of values that each stand `weight` times, interpolated as in `percentile`."""
     order = np.argsort(values, kind="mergesort")
     position = fraction * max(np.sum(weight) - 1.0, 0.0)
     k = np.floor(position)

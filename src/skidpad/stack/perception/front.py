@@ -88,7 +88,7 @@ class Front:
         self.switch(functions)
 
     def switch(self, functions: Functions) -> None:
-        """Sets what perception evaluates for these driving functions."""
+        """Sets what perception evaluates for these driving functions: following, and the roof's corridor."""
         self.follows = Function.ACC in functions
         narrow = self.settings.roof_corridor is RoofCorridor.FLAT_WITHOUT_LCA
         flat = narrow and Function.LCA not in functions
@@ -108,7 +108,7 @@ class Front:
                 part.reset()
 
     def look(self, frame: SensorFrame, v: float, view: LaneView) -> Sight:
-        """What this frame shows; v in m/s."""
+        """Returns what this frame shows; v in m/s. Call it once per tick: filters and memory move on."""
         s = self.settings
         bumper = self.bumper.read(frame, view.yaw_error, view.kappa)
         roof = self.roof.read(frame, view.yaw_error, view.kappa)
@@ -130,11 +130,14 @@ class Front:
         )
 
     def conclude(self, sight: Sight, stopping: bool) -> None:
-        """Passes the outcome of the tick on to the persistence of detections."""
+        """Passes the outcome of the tick on to the memory of detections.
+
+        stopping: a light asks for a stop.
+        """
         self.persistence.conclude(sight.distance is not None, self.follows, stopping)
 
     def verify(self, frame: SensorFrame, distance: float, view: LaneView) -> tuple[bool, str]:
-        """Whether wanted pixels near `distance` bear the target out, and who says so."""
+        """Returns whether wanted pixels near `distance` m bear the target out, and by which camera pair."""
         return self.verification.confirm(frame, distance, view.yaw_error, view.kappa)
 
 

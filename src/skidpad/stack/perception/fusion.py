@@ -52,7 +52,7 @@ def _rows(height: int, share: tuple[float, float]) -> tuple[int, int]:
 
 
 def bumper_corridor(camera: CameraSpec, wanted: Labels = VEHICLES) -> Corridor:
-    """What the bumper tier keeps. `camera` is the semantic one: depth is read at its pixels."""
+    """Returns what the bumper tier keeps; `camera` is the semantic one: depth is read at its pixels."""
     first, end = _rows(camera.height, BUMPER_ROWS)
     near, far = BUMPER_DEPTHS
     return Corridor(
@@ -62,7 +62,7 @@ def bumper_corridor(camera: CameraSpec, wanted: Labels = VEHICLES) -> Corridor:
 
 
 def roof_corridor(camera: CameraSpec, flat: bool = False, wanted: Labels = VEHICLES) -> Corridor:
-    """What the roof tier keeps; flat: 1.6 m at every depth (A-051)."""
+    """Returns what the roof tier keeps; flat: 1.6 m at every depth (A-051)."""
     first, end = _rows(camera.height, ROOF_ROWS)
     near, far = ROOF_DEPTHS
     widening = 0.0 if flat else ROOF_WIDENING
@@ -88,13 +88,16 @@ class CameraPair:
         self.scratch = np.empty(depth.width * (keep.row_end - keep.row_first), dtype=np.float32)
 
     def read(self, frame: SensorFrame, yaw_error: float, kappa: float) -> float | None:
-        """Distance of the 10th percentile in m; None: no target, or no image yet (A-037)."""
+        """Returns the distance of the 10th percentile in m; None: no target, or no image yet (A-037).
+
+        yaw_error: rad to the lane, left positive; kappa: half the lane's curvature.
+        """
         return self.read_between(self.keep.near, self.keep.far, frame, yaw_error, kappa)
 
     def read_between(
         self, near: float, far: float, frame: SensorFrame, yaw_error: float, kappa: float
     ) -> float | None:
-        """Reads as `read` does, between other depths in m."""
+        """Returns what `read` does, between other depths in m."""
         segments = frame.segments.get(self.depth_id)
         if segments is not None:
             if not len(segments.u):
@@ -129,7 +132,7 @@ class CameraPair:
 def camera_pair(
     specs: Sequence[SensorSpec], depth_id: str, semantic_id: str
 ) -> tuple[CameraSpec, CameraSpec]:
-    """The specs of a pair by sensor id."""
+    """Returns the specs of a depth and a semantic camera by sensor id; ConfigError without such a pair."""
     cameras = {spec.id: spec for spec in specs if isinstance(spec, CameraSpec)}
     for name, modality in ((depth_id, Modality.DEPTH), (semantic_id, Modality.SEMANTIC)):
         if name not in cameras or cameras[name].modality is not modality:
@@ -146,7 +149,7 @@ def fuse(
     bumper_alone: bool = True,
     guard: float | None = None,
 ) -> float | None:
-    """One distance from both tiers (eq. 9, A-055 to A-059).
+    """Returns one distance in m from both tiers, None: no target (eq. 9, A-055 to A-059).
 
     bumper_alone: below 30 m the bumper reading counts when the roof sees nothing (D-017).
     guard: where both see a target but differ by more than this, the nearer counts.
@@ -172,7 +175,7 @@ class MedianFilter:
         self.samples = deque([NOTHING] * MEDIAN_SAMPLES, maxlen=MEDIAN_SAMPLES)
 
     def update(self, distance: float | None) -> float | None:
-        """The filtered distance after one more sample."""
+        """Returns the filtered distance after one more sample; None, in and out: no target."""
         self.samples.append(NOTHING if distance is None else distance)
         middle = sorted(self.samples)[MEDIAN_SAMPLES // 2]
         return middle if middle < NOTHING else None
@@ -192,7 +195,7 @@ class RateFilter:
         self.history = deque([NOTHING] * self.length, maxlen=self.length)
 
     def update(self, distance: float | None) -> float | None:
-        """The filtered distance after one more sample."""
+        """Returns the filtered distance after one more sample; None, in and out: no target."""
         change = (NOTHING if distance is None else distance) - self.smoothed
         self.smoothed += min(max(change, -self.step), self.step)
         self.history.append(self.smoothed)
@@ -209,8 +212,10 @@ class Verification:
     def confirm(
         self, frame: SensorFrame, distance: float, yaw_error: float, kappa: float
     ) -> tuple[bool, str]:
-        """Whether, and which pair says so; the bumper is asked first, the roof without its
-        minimum depth (D-009)."""
+        """Returns whether the pixels confirm a target at `distance` m, and by which pair, else "none".
+
+        The bumper is asked first, the roof without its minimum depth (D-009).
+        """
         for name, pair in self.pairs:
             near = max(distance - VERIFY_TOLERANCE, BUMPER_DEPTHS[0])
             far = distance + VERIFY_TOLERANCE

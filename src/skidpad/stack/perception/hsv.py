@@ -35,7 +35,7 @@ _REDDISH, _ORANGE, _YELLOW = (np.int32(n) for n in (11, 19, 24))  # of 30, share
 
 
 def rows_needed(height: int) -> int:
-    """How many of the upper rows of an image are looked at (A-164)."""
+    """Returns how many of the upper rows of an image are looked at (A-164)."""
     return round(height * UPPER_ROWS)
 
 
@@ -47,12 +47,12 @@ class LampCamera:
         self.rows = (0, rows_needed(heights[0])) if heights else (0, 0)
 
     def look(self, images: Mapping[str, CameraImage]) -> LightState | None:
-        """RED, YELLOW, or None for neither, also without a camera."""
+        """Returns RED, YELLOW, or None for neither, also without a camera; green is not looked for."""
         return detect_lamp(image_rows(images, FRONT_CAMERA, self.rows))
 
 
 def detect_lamp(image: CameraImage | None) -> LightState | None:
-    """RED, YELLOW, or None for neither, from a colour image."""
+    """Returns RED, YELLOW, or None for neither, from a colour image; red before yellow."""
     if image is None or image.rgb is None:
         return None
     rows = rows_needed(image.rgb.shape[0])
@@ -75,7 +75,10 @@ def _has_lamp(
     shape: tuple[int, int],
     hues: tuple[tuple[int, int], ...],
 ) -> bool:
-    """Returns whether the pixels within the hues form a blob of a lamp's size and shape."""
+    """Returns whether the pixels within the hues form a patch of a lamp's size and shape.
+
+    hsv (1, n, 3): colours of the pixels with flat indices `places` (n,) in an image of this shape.
+    """
     chosen: Any = np.zeros(len(places), dtype=np.uint8)
     for low, high in hues:
         chosen |= cv2.inRange(hsv, (low, MIN_SATURATION, MIN_VALUE), (high, 255, 255))[0]
@@ -95,7 +98,7 @@ def _is_lamp(contour: Any) -> bool:
 
 @inner_kernel
 def _may_be_lamp(pixel: np.uint32) -> bool:
-    """Whether a packed pixel can be in one of the hue ranges."""
+    """Returns whether a packed pixel can be in one of the hue ranges."""
     word = np.int32(pixel & np.uint32(0xFFFFFF))
     r, g, b = word & 255, (word >> 8) & 255, word >> 16
     value = max(r, g, b)
@@ -109,7 +112,7 @@ def _may_be_lamp(pixel: np.uint32) -> bool:
 
 @kernel
 def _candidates(packed: NDArray[np.uint32], places: NDArray[np.int32]) -> int:
-    """Write the flat indices of all pixels that may belong to a lamp; says how many."""
+    """Writes the flat indices of all pixels that may belong to a lamp into `places`; returns how many."""
     height, width = packed.shape
     flags = np.empty(width, dtype=np.bool_)
     n = 0
@@ -130,7 +133,7 @@ def _candidates(packed: NDArray[np.uint32], places: NDArray[np.int32]) -> int:
 
 
 def colourful(packed: NDArray[np.uint32]) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
-    """Flat indices (n,) and colours (n, 3) of all pixels that may be in a hue range (A-165)."""
+    """Returns flat indices (n,) and colours (n, 3) of all pixels that may be in a hue range (A-165)."""
     places = np.empty(packed.size, dtype=np.int32)
     places = places[: _candidates(packed, places)]
     chosen = packed.ravel()[places]
@@ -139,9 +142,9 @@ def colourful(packed: NDArray[np.uint32]) -> tuple[NDArray[np.int32], NDArray[np
 
 @kernel
 def keep_large(places: NDArray[np.int32], mask: NDArray[np.uint8]) -> int:
-    """Set in the cleared `mask` (H, W) all 8-connected patches whose contour can have the least
-    area (A-166); says how many.
+    """Sets in the cleared `mask` all patches whose contour can have the least area; returns how many.
 
+    Patches of `places` (flat indices) are 8-connected and become 255 in the mask (H, W) (A-166).
     A contour runs through pixel centres, so its area is at most (w - 1)(h - 1) of its box. Patches
     that enclose others are larger than that, so no inner one becomes an outer one.
     """

@@ -22,7 +22,7 @@ class LaneView(NamedTuple):
 
     @property
     def kappa(self) -> float:
-        """Coefficient of the parabola kappa Z^2: half the curvature (D-063)."""
+        """Coefficient in 1/m of the parabola kappa Z^2: half the curvature (D-063)."""
         return 0.5 * self.curvature
 
 
@@ -30,13 +30,13 @@ class RouteRule(Protocol):
     """Which way to take (D-058)."""
 
     def reference(self, map: RoadMap, point: LanePoint, highway: frozenset[int]) -> LanePoint:
-        """The place to steer by when the ego is at `point`."""
+        """Returns the place to steer by when the ego is at `point`; highway: road ids."""
         ...
 
     def ahead(
         self, map: RoadMap, point: LanePoint, distance: float, heading: float
     ) -> LanePoint | None:
-        """The place `distance` m further; None where the road ends."""
+        """Returns the place `distance` m further; None where the road ends."""
         ...
 
 
@@ -44,7 +44,7 @@ class HighwayRoute:
     """Stay on the traced highway and take the straightest path."""
 
     def reference(self, map: RoadMap, point: LanePoint, highway: frozenset[int]) -> LanePoint:
-        """The nearest lane sideways whose road is on the highway; `point` if there is none."""
+        """Returns the nearest lane sideways whose road is on the highway; `point` if there is none."""
         left: LanePoint | None = point
         right: LanePoint | None = point
         for _ in range(MAX_SHIFTS):
@@ -58,7 +58,10 @@ class HighwayRoute:
     def ahead(
         self, map: RoadMap, point: LanePoint, distance: float, heading: float
     ) -> LanePoint | None:
-        """Goes ahead along the branch that turns least from `heading`."""
+        """Returns the place `distance` m further along the branch that turns least from `heading`.
+
+        None where the road ends.
+        """
         return map.ahead(point, distance, heading)
 
 
@@ -76,7 +79,7 @@ class FirstBranchRoute:
         distance: float,
         heading: float,  # noqa: ARG002
     ) -> LanePoint | None:
-        """Goes ahead along the first branch of the map."""
+        """Returns the place `distance` m further along the map's first branch; None where the road ends."""
         places = map.all_ahead(point, distance)
         return places[0] if places else None
 
@@ -89,7 +92,10 @@ class LaneTracker:
         self.highway: frozenset[int] | None = None
 
     def update(self, pose: Pose) -> LaneView:
-        """The view from `pose` (world frame, ego's origin)."""
+        """Returns the view from `pose` (world frame, ego's origin).
+
+        The first on a lane traces the highway.
+        """
         point = self.map.project(pose.x, pose.y, pose.z)
         if point is None:
             return LaneView(None, None, 0.0, 0.0, self.highway or frozenset())
@@ -106,7 +112,10 @@ class LaneTracker:
         )
 
     def ahead(self, view: LaneView, distance: float, heading: float) -> LanePoint | None:
-        """The place `distance` m further along the lane that is followed."""
+        """Returns the place `distance` m further along the lane that is followed.
+
+        None without a lane or where the road ends. heading: rad, which the route may choose a branch by.
+        """
         if view.reference is None:
             return None
         return self.route.ahead(self.map, view.reference, distance, heading)

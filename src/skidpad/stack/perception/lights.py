@@ -46,12 +46,15 @@ NO_WAYPOINT = LightReading(LightSource.NO_WAYPOINT)
 
 
 def scan_distance(v: float) -> float:
-    """How far ahead lights are looked for, m (eq. 16)."""
+    """Returns how far ahead lights are looked for in m, at v in m/s (eq. 16)."""
     return max(SCAN_MIN, SCAN_TIME * v)
 
 
 def stop_lines(map: RoadMap) -> dict[int, tuple[StopLine, ...]]:
-    """Stop lines of lights by lane, in driving order (cached once, A-162)."""
+    """Returns the stop lines of lights by lane index, in driving order (A-162).
+
+    Lanes without are left out.
+    """
     signals = map.signals
     lines: dict[int, list[StopLine]] = {}
     for i in range(len(signals.id)):
@@ -73,7 +76,10 @@ class LightScan:
     def look(
         self, pose: Pose, v: float, view: LaneView, states: Mapping[int, LightState]
     ) -> LightReading:
-        """The light that governs the ego at `pose` with speed v (m/s)."""
+        """Returns the light that governs the ego at `pose` with speed v (m/s).
+
+        NO_LIGHT for none, NO_WAYPOINT off every lane. states: by signal id, a missing one is UNKNOWN.
+        """
         if view.ego is None:
             return NO_WAYPOINT
         if not self.lines:
@@ -145,7 +151,10 @@ class StopLock:
         states: Mapping[int, LightState],
         hsv: LightState | None,
     ) -> StopRequest | None:
-        """The stop asked for in this tick; hsv: what the camera saw, None: not evaluated."""
+        """Returns the stop asked for in this tick, None for none; call it once per tick.
+
+        hsv: what the camera saw, None: nothing or not evaluated. v: m/s.
+        """
         if self.signal is not None:
             if states.get(self.signal) not in (LightState.RED, LightState.YELLOW):
                 self.reset()
@@ -158,7 +167,10 @@ class StopLock:
         return StopRequest(self.remaining) if self.signal is not None else None
 
     def _demands(self, light: LightReading, v: float, hsv: LightState | None) -> bool:
-        """Returns whether the light demands a stop at v in m/s: red, or yellow with room to brake."""
+        """Returns whether the light demands a stop at v in m/s: red, or yellow with room to brake.
+
+        Never where the camera has to agree and does not.
+        """
         if self.hsv_required and hsv is not light.state:
             return False
         if light.state is LightState.RED:

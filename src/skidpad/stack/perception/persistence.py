@@ -64,11 +64,14 @@ class Persistence:
 
     @property
     def confirmed(self) -> bool:
-        """Vision has seen the target for long enough (A-073, A-088)."""
+        """Whether vision has seen the target for long enough (A-073, A-088)."""
         return self.seen_ticks >= self.confirm_ticks
 
     def update(self, fused: float | None, bumper: float | None, radar: RadarReading) -> Detection:
-        """The detection of this tick. fused: after the median; bumper: the unfused tier (D-028)."""
+        """Returns the detection of this tick and remembers it; call it once per tick.
+
+        fused: after the median; bumper: the unfused tier (D-028); m, None: no target.
+        """
         detection = self._detect(fused, bumper, radar)
         if detection.distance is None and self._safety_holds():
             detection = Detection(DetectionStatus.SAFETY_PERSIST, self.last_distance)
@@ -77,7 +80,7 @@ class Persistence:
         return detection
 
     def conclude(self, detected: bool, acc_on: bool, stopping: bool) -> None:
-        """What the tick came to: the memory of the next one (A-097, A-098)."""
+        """Takes what the tick came to, for the memory of the next one (A-097, A-098)."""
         if detected and acc_on:
             self.was_following = True
         elif self.missed_ticks > self.forget_ticks:
@@ -85,7 +88,7 @@ class Persistence:
         self.was_stopping = stopping
 
     def _detect(self, fused: float | None, bumper: float | None, radar: RadarReading) -> Detection:
-        """Returns the detection of this tick: fused, held for some ticks, or by radar alone."""
+        """Returns the detection of this tick: fused, held for some ticks, or by radar alone; counts ticks."""
         if fused is not None and fused < self.gate:
             self.seen_ticks += 1
             self.missed_ticks = 0

@@ -29,7 +29,7 @@ LOOK_BEYOND = 10.0  # m (A-078)
 
 
 def velocity_limit(v_ego: float) -> float:
-    """Slowest range rate that is not a standing object, m/s, negative closing (A-071)."""
+    """Returns the slowest range rate in m/s that is not a standing object, negative closing (A-071)."""
     return max(VELOCITY_FLOOR, -v_ego + VELOCITY_MARGIN)
 
 
@@ -45,10 +45,10 @@ def retain(
     kappa: float,
     out: NDArray[np.int64],
 ) -> int:
-    """Indices of the points that may be the lead into `out`, nearest first; returns how many.
+    """Writes indices of the points that may be the lead into `out`, nearest first; returns how many.
 
-    half_width in m about the lane's path; keep_below: nearer points stay whatever their velocity;
-    yaw_error, kappa as for the cameras, left positive.
+    half_width in m about the lane's path; v_limit: m/s, slower ones count as standing; keep_below: m,
+    nearer points stay whatever their velocity; yaw_error, kappa as for the cameras, left positive.
     """
     n = 0
     for i in range(len(points.range)):
@@ -87,7 +87,10 @@ class InLane(Protocol):
     def __call__(
         self, points: RadarPoints, chosen: NDArray[np.int64], pose: Pose, view: LaneView, /
     ) -> int:
-        """The first of the chosen rows of `points` that lies in the lane of the ego at `pose`, or -1."""
+        """Returns the first of the chosen rows of `points` that lies in the ego's lane, or -1.
+
+        pose: of the ego.
+        """
         ...
 
 
@@ -101,7 +104,10 @@ class LaneMatch:
     def __call__(
         self, points: RadarPoints, chosen: NDArray[np.int64], pose: Pose, view: LaneView
     ) -> int:
-        """-1 where the ego is on no lane."""
+        """Returns the first chosen row in the ego's lane or where it leads, or -1.
+
+        -1 also where the ego is on no lane.
+        """
         if view.ego is None:
             return -1
         if view.highway is not self._traced:
@@ -125,7 +131,7 @@ def first_in_lane(
     mount: float,
     look_beyond: float,
 ) -> int:
-    """The first of the chosen rows of `points` that lies in the ego's lane or where it leads, or -1.
+    """Returns the first of the chosen rows of `points` in the ego's lane or where it leads, or -1.
 
     on_highway: by lane; ego: x, y, z and yaw; mount, look_beyond: m, `MOUNT` and `LOOK_BEYOND`. The
     look ahead reads one place per branch, the point's range + 10 m on, as A-078 is written: a target
@@ -149,7 +155,7 @@ def first_in_lane(
 def _onto_highway(
     a: LaneArrays, on_highway: NDArray[np.bool_], lane: int, s: float
 ) -> tuple[int, float]:
-    """Leftwards until the road is on the highway or there is no further lane (A-077)."""
+    """Returns lane and s moved left until the road is on the highway or there is no further lane (A-077)."""
     for _ in range(MAX_SHIFTS):
         left = a.left[lane]
         if on_highway[lane] or left < 0:
@@ -167,7 +173,7 @@ def _is_same(a: LaneArrays, one: int, other: int) -> bool:
 
 @inner_kernel
 def _leads_to(a: LaneArrays, lane: int, s: float, target: int) -> bool:
-    """Whether s, counted from the start of a lane, lies on the target's lane on some branch."""
+    """Returns whether s, counted from the start of a lane, lies on the target's lane on some branch."""
     lanes, places = [lane], [s]
     k = 0
     while k < len(lanes):
@@ -193,7 +199,7 @@ class AnyPoint:
     """The compatibility mode trusts its parabolic corridor alone (A-084)."""
 
     def __call__(self, points: RadarPoints, chosen: NDArray[np.int64], *_where: object) -> int:
-        """The first point that passed the corridor."""
+        """Returns the first point that passed the corridor."""
         del points
         return int(chosen[0])
 
@@ -213,7 +219,10 @@ class Radar:
     def update(
         self, points: RadarPoints, pose: Pose, v_ego: float, view: LaneView, tracking: bool
     ) -> RadarReading:
-        """The readings of one measurement; tracking: vision has confirmed a lead (A-073)."""
+        """Returns the readings of one measurement, NO_RADAR without a point that passes the pre-filter.
+
+        v_ego: m/s; tracking: vision has confirmed a lead (A-073).
+        """
         if len(points.range) > len(self.kept):
             self.kept = np.empty(len(points.range), dtype=np.int64)
         self.velocity_limit = velocity_limit(v_ego)

@@ -39,7 +39,7 @@ HALVINGS = 8  # of the range of speeds within which one can stop in sight
 
 
 def believed_friction(road: RoadLook, v: float) -> float:
-    """Friction coefficient that a driver expects of this road at speed v (m/s)."""
+    """Returns the friction coefficient that a driver expects of this road at speed v (m/s)."""
     low, middle, high = BELIEFS[road]
     slow, medium, fast = SPEEDS
     if v <= medium:
@@ -50,7 +50,7 @@ def believed_friction(road: RoadLook, v: float) -> float:
 
 
 def manner(person: Person, road: RoadLook, v: float) -> Manner:
-    """How the person follows at speed v on this road; the headway grows as friction falls."""
+    """Returns how the person follows at v m/s on this road; the headway grows as friction falls."""
     g = G * believed_friction(road, v)
     left = believed_friction(road, v) / BELIEFS[RoadLook.DRY][0]
     return Manner(
@@ -62,13 +62,13 @@ def manner(person: Person, road: RoadLook, v: float) -> Manner:
 
 
 def speed_factor(road: RoadLook, v: float) -> float:
-    """Desired speed over that on a dry road: SUMO's friction device, as in the background."""
+    """Returns the desired speed over that on a dry road: SUMO's friction device, as in the background."""
     left = min(believed_friction(road, v) / BELIEFS[RoadLook.DRY][0], 1.0)
     return min(-0.3491 * left * left + 0.8922 * left + 0.4493, 1.0)
 
 
 def bend_speed(road: RoadLook, curvature: float) -> float:
-    """Speed in m/s for a bend of `curvature` 1/m; inf on a straight."""
+    """Returns the m/s for a bend of `curvature` 1/m; inf on a straight."""
     bend = abs(curvature)
     if bend < STRAIGHT:
         return inf
@@ -79,15 +79,16 @@ def bend_speed(road: RoadLook, curvature: float) -> float:
 
 
 def too_fast(excess: float, road: RoadLook, v: float) -> float:
-    """Acceleration in m/s^2 that takes off what is driven too fast for a bend or limit."""
+    """Returns the acceleration in m/s^2 that takes off `excess` m/s over a bend's or a limit's speed."""
     firm = min(B_TOO_FAST, FIRM_SHARE * G * believed_friction(road, v))
     return max(-excess / TOO_FAST_TIME, -firm)
 
 
 def sight_speed(road: RoadLook, visibility: float, reaction: float, fastest: float) -> float:
-    """Speed in m/s, at most `fastest`, from which one stops for what stands at the end of sight.
+    """Returns the m/s, at most `fastest`, from which one stops for what stands at the end of sight.
 
-    What stands is recognised as standing when its image grows fast enough, however clear the air.
+    visibility: m; reaction: s. What stands is recognised as standing when its image grows fast enough,
+    however clear the air.
     """
     low, high = 0.0, fastest
     if _stops(road, visibility, reaction, high):

@@ -71,7 +71,7 @@ class ReferenceDriver:
         self.reset()
 
     def reset(self) -> None:
-        """The car stands elsewhere: nothing seen before counts."""
+        """Forgets what was seen before, as the car now stands elsewhere."""
         self.way.reset()
         self.controller.reset()
         self.lights: dict[int, tuple[int, LightState]] = {}
@@ -81,7 +81,10 @@ class ReferenceDriver:
         self.report = StackReport()
 
     def act(self, view: DriverView) -> VehicleCommand:
-        """Returns the driver's command for one view; moderate braking off every lane."""
+        """Returns the driver's command for one view.
+
+        Moderate braking off every lane. Call it once per tick.
+        """
         place = self.way.update(view.pose)
         if place is None:  # off every lane
             self.report = StackReport(tier=Tier.NONE)
@@ -112,7 +115,7 @@ class ReferenceDriver:
         return self.controller.update(points, place.at, pose, v, view.yaw_rate, a)
 
     def _desired_speed(self, view: DriverView, place: Place, v: float, m: Manner) -> float:
-        """m/s that limits, bends and sight allow, each reached by comfortable braking."""
+        """Returns the m/s that limits, bends and sight allow, each reached by comfortable braking."""
         points, road = self.way.path.points, view.road
         factor = speed_factor(road, v)
         end = place.at + int(v * v / (2.0 * m.b) + PREVIEW) + 1
@@ -127,7 +130,10 @@ class ReferenceDriver:
         return sight_speed(road, view.visibility, self.person.reaction, allowed)
 
     def _lead(self, view: DriverView, place: Place, v: float) -> tuple[float, float]:
-        """m to the nearest that is in the way, and its speed along it; inf: nobody."""
+        """Returns m to the nearest actor in the way and its m/s along it.
+
+        (inf, 0) for none. Notes the view.
+        """
         self.views.append((view.tick, view.actors))
         if not len(view.actors.x):
             return inf, 0.0
@@ -140,7 +146,10 @@ class ReferenceDriver:
         return float(gaps[nearest]), max(float(speeds[nearest]), 0.0)
 
     def _line(self, view: DriverView, place: Place, v: float, m: Manner) -> float:
-        """m to the nearest line at which it stops; inf: none."""
+        """Returns the m to the nearest line at which it stops, 0.1 at least, inf for none.
+
+        Notes the lights.
+        """
         for signal, state in view.lights.items():
             self.lights[signal] = (view.tick, state)
         for line in self.way.path.lines:
@@ -158,7 +167,10 @@ class ReferenceDriver:
     def _gives_way(
         self, line: Line, view: DriverView, place: Place, gap: float, v: float, m: Manner
     ) -> bool:
-        """Whether it stops at a stop or yield line: the sign says so, or somebody comes too soon."""
+        """Returns whether it stops at a stop or yield line: by its sign, or as another comes too soon.
+
+        gap: m from the front to LINE_MARGIN before the line. Notes that it stood at a stop sign.
+        """
         if line.kind is SignalKind.STOP and self.halted != line.signal:
             if gap > HALT or v > STANDING:
                 return True
@@ -171,7 +183,10 @@ class ReferenceDriver:
         )  # fmt: skip
 
     def _stops_for(self, signal: int, tick: int, gap: float, v: float, m: Manner) -> bool:
-        """Whether it stops at a light; one that was not seen lately may be red."""
+        """Returns whether it stops at a light; one not seen for REMEMBERED s may be red. Notes the decision.
+
+        gap: m to the line; a stop once decided lasts until green or dark.
+        """
         seen, state = self.lights.get(signal, (tick, LightState.UNKNOWN))
         if (tick - seen) * self.dt > REMEMBERED and state is not LightState.RED:
             state = LightState.UNKNOWN
@@ -217,7 +232,7 @@ class ReferenceStack:
 
     @property
     def mode(self) -> str:
-        """What the driver minded most in the last tick."""
+        """The tier that the driver minded most in the last tick, in lower case; "" before the first."""
         tier = self.report.tier
         return "" if tier is None else tier.name.lower()
 
@@ -226,7 +241,10 @@ class ReferenceStack:
         return (EyesSpec(EYES, self.person.reaction),)
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
-        """The driver's answer to what it sees."""
+        """Returns the driver's command for the view of its eyes; HELD while a supervisor drives.
+
+        The driver begins anew when the supervisor hands over.
+        """
         if frame.supervision is not Supervision.NONE:
             self.supervision = frame.supervision
             return HELD

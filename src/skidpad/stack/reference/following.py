@@ -24,20 +24,23 @@ class Manner(NamedTuple):
 
 
 def free_acceleration(v: float, v_desired: float, m: Manner) -> float:
-    """Acceleration in m/s^2 on an empty road; above the desired speed braking stays comfortable."""
+    """Returns the acceleration in m/s^2 on an empty road.
+
+    Above the desired speed braking stays comfortable.
+    """
     if v <= v_desired:
         return m.a_max * (1.0 - math.pow(v / max(v_desired, 0.1), EXPONENT))
     return -m.b * (1.0 - math.pow(v_desired / v, EXPONENT * m.a_max / m.b))
 
 
 def wanted_gap(v: float, v_lead: float, m: Manner) -> float:
-    """Gap in m that is kept, or aimed at while closing."""
+    """Returns the gap in m that is kept, or aimed at while closing; v, v_lead: m/s."""
     dynamic = v * m.headway + v * (v - v_lead) / (2.0 * sqrt(m.a_max * m.b))
     return GAP_MIN + max(0.0, dynamic)
 
 
 def acceleration(v: float, v_desired: float, gap: float, v_lead: float, m: Manner) -> float:
-    """Acceleration in m/s^2, in [m.a_min, m.a_max], behind a leader at `gap` m (inf: none)."""
+    """Returns m/s^2, in [m.a_min, m.a_max], behind a leader at `gap` m (inf: none)."""
     free = free_acceleration(v, v_desired, m)
     if gap == inf:
         return max(m.a_min, free)

@@ -23,7 +23,7 @@ ALONG = 0.7  # cosine between two ways that run together
 
 
 def travel_time(v: float, way: float, a: float, v_max: float = V_THROUGH) -> float:
-    """s for `way` m from speed v at acceleration a up to v_max."""
+    """Returns the s for `way` m from speed v at acceleration a up to v_max; faster ones count as v_max."""
     if v >= v_max:
         return way / v_max
     until = (v_max * v_max - v * v) / (2.0 * a)
@@ -42,9 +42,11 @@ class GivingWay:
         self, path: PathPoints, at: int, to_line: float, v: float, length: float, a: float,
         seen: SeenActors,
     ) -> bool:  # fmt: skip
-        """Whether somebody comes before the own car is through and MARGIN s away.
+        """Returns whether a moving actor off the own path gets there before the own car is through.
 
-        at: point of the own path; to_line: m from the front to the line; a: m/s^2 of the start.
+        MARGIN s are kept when crossing, JOIN_MARGIN s where its way joins; right of way is not asked.
+        at: point of the own path at the car's centre; to_line: m from the front to the line; v: m/s;
+        a: m/s^2 of the start.
         """
         first = at + round((to_line + 0.5 * length) / STEP)
         stretch = slice(first, min(first + round(THROUGH / STEP), len(path.x)))
@@ -65,7 +67,10 @@ class GivingWay:
     def _meeting(
         self, path: PathPoints, stretch: slice, seen: SeenActors, i: int
     ) -> tuple[float, float, bool] | None:
-        """m beyond the line and m ahead of actor i where its way meets the own; whether it joins."""
+        """Returns where actor i's way first meets the own: m beyond the line, m ahead of its front, joins.
+
+        None where they do not meet. stretch: points of the own path looked at.
+        """
         xs, ys, headings = path.x[stretch], path.y[stretch], path.heading[stretch]
         for x, y, heading, gone in self._way(seen, i):
             d = np.hypot(xs - x, ys - y)
@@ -77,7 +82,7 @@ class GivingWay:
         return None
 
     def _way(self, seen: SeenActors, i: int) -> list[tuple[float, float, float, float]]:
-        """(x, y, heading, m gone) along the lane of actor i, straight on where it is on none."""
+        """Returns (x, y, heading, m gone) along the lane of actor i, straight on where it is on none."""
         x, y, yaw = float(seen.x[i]), float(seen.y[i]), float(seen.yaw[i])
         lane: LanePoint | None = self.map.project(x, y, float(seen.z[i]))
         if lane is not None and (
@@ -97,7 +102,7 @@ class GivingWay:
 
 
 def _leads(path: PathPoints, at: int, seen: SeenActors, i: int) -> bool:
-    """Whether actor i drives along the own path, ahead or behind: it is followed, or follows."""
+    """Returns whether actor i drives along the own path, ahead or behind: it is followed, or follows."""
     near = slice(max(at - 40, 0), at + 80)
     d = np.hypot(path.x[near] - seen.x[i], path.y[near] - seen.y[i])
     k = int(np.argmin(d))

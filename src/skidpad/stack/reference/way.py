@@ -51,7 +51,7 @@ class Way:
         self.at: int | None = None
 
     def update(self, pose: Pose) -> Place | None:
-        """The place of a car at `pose`; None off every lane."""
+        """Returns the place of a car at `pose`, None off every lane; draws the way anew where need be."""
         if self.at is not None:
             place = self._place(pose, self.at)
             if abs(place.offset) < ASTRAY and self.path.length - place.s > AT_LEAST:
@@ -66,7 +66,7 @@ class Way:
         return self._place(pose, round(min(start.s, 10.0)))
 
     def _start(self, pose: Pose) -> LanePoint | None:
-        """The lane to go on from: the way's own where the car is still on it."""
+        """Returns the point to go on from, on the way itself where the car still is; None off every lane."""
         if self.at is not None:
             place = self._place(pose, self.at)
             if abs(place.offset) < ASTRAY:
@@ -89,7 +89,10 @@ class Way:
         return lanes
 
     def _place(self, pose: Pose, near: int) -> Place:
-        """Returns the ego's place on the path: row, distance along it in m and offset in m."""
+        """Returns the ego's place on the path: row, distance along it in m and offset in m; keeps `at`.
+
+        near: row around which it is looked for.
+        """
         p = self.path.points
         at, offset = locate(p, pose.x, pose.y, near, NEAR)
         self.at, h = int(at), float(p.heading[at])
@@ -107,10 +110,10 @@ class Body(NamedTuple):
 
 
 def anticipated(seen: SeenActors, before: SeenActors, span: float, age: float) -> SeenActors:
-    """The same actors where they are taken to be `age` s later.
+    """Returns the same actors where they are taken to be `age` s later.
 
-    Who shows brake lamps is taken to go on slowing down as between the view `span` s earlier and
-    this one; everybody else goes on as seen.
+    Those with brake lamps on are taken to go on slowing down as between the view `before`, `span` s
+    earlier, and this one; all others go on as seen.
     """
     slowing_x, slowing_y = np.zeros(len(seen.x)), np.zeros(len(seen.x))
     _, now, then = np.intersect1d(seen.actor, before.actor, assume_unique=True, return_indices=True)
@@ -134,9 +137,10 @@ def anticipated(seen: SeenActors, before: SeenActors, span: float, age: float) -
 
 @kernel
 def gaps_ahead(path: PathPoints, at: int, seen: SeenActors, body: Body) -> tuple[Floats, Floats]:
-    """(n,) m to who is in the way or about to be, inf for others; (n,) m/s along the way.
+    """Returns (n,) m from the bumper to actors in the way or about to be, inf for others; (n,) m/s along it.
 
-    Who crosses blocks the way while the own car would arrive within CROSSING_MARGIN.
+    at: point of the path at the car. An actor that crosses blocks the way, with 0 m/s, while the own car
+    would arrive within CROSSING_MARGIN.
     """
     n = seen.x.size
     gap, speed = np.full(n, np.inf), np.zeros(n)

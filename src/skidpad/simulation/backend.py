@@ -16,23 +16,26 @@ class Backend(Protocol):
     """A world that advances one fixed step at a time."""
 
     def reset(self, setup: Setup, seed: int) -> Frame:
-        """Begin a run. The same setup and seed give the same bytes, whatever ran before."""
+        """Begins a run and returns its first frame.
+
+        The same setup and seed give the same bytes, whatever ran before.
+        """
         ...
 
     def step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand] = ()) -> Frame:
-        """Apply the commands for one step; the frame is valid until the next call."""
+        """Applies the commands for one step and returns the frame, which is valid until the next call."""
         ...
 
     def truth(self) -> WorldTruth:
-        """Ground truth of the moment; valid until the next step."""
+        """Returns the ground truth of the moment, which is valid until the next step."""
         ...
 
     def relocate(self, pose: Pose, v: float) -> None:
-        """Put the ego at `pose` with speed `v` along it, no rotation."""
+        """Puts the ego at `pose` with speed `v` in m/s along it, without rotation."""
         ...
 
     def change(self, outside: Outside) -> None:
-        """Weather, grip and headlights are others from the next step on."""
+        """Sets weather, grip and headlights as they are from the next step on."""
         ...
 
     def close(self) -> None:

@@ -44,12 +44,12 @@ class ActorRow:
         return self.type.startswith("vehicle.")
 
     def origin(self, pose: Pose) -> Pose:
-        """CARLA's origin when the footprint's centre shall be at `pose`."""
+        """Returns the pose of CARLA's origin when the footprint's centre shall be at `pose`."""
         o = self.offset
         return pose.moved(forward=-o.x, left=-o.y, up=-o.z)
 
     def footprint(self, origin: Pose) -> Pose:
-        """Pose of the footprint's centre for a pose of CARLA's origin."""
+        """Returns the pose of the footprint's centre for a pose of CARLA's origin."""
         o = self.offset
         if o.x == o.y == 0.0:
             return replace(origin, z=origin.z + o.z)
@@ -59,7 +59,10 @@ class ActorRow:
 
 
 def place_of(map: RoadMap, place: Pose | LanePosition) -> Pose:
-    """A pose on the map; lane positions look along the lane."""
+    """Returns a pose on the map; a lane position becomes one along its lane, at its lateral offset.
+
+    ConfigError for a lane position that the map has not.
+    """
     if isinstance(place, Pose):
         return place
     point = map.place(place)
@@ -67,7 +70,10 @@ def place_of(map: RoadMap, place: Pose | LanePosition) -> Pose:
 
 
 def spawn_setup(carla: Any, world: Any, map: RoadMap, setup: ActorSetup) -> ActorRow:
-    """An actor of the set-up; BackendError when something stands in its place."""
+    """Spawns an actor of the set-up and returns its row; BackendError when something stands in its place.
+
+    ConfigError for an unknown type, or where a type without wheels is to drive by autopilot.
+    """
     blueprint = blueprints.find(world.get_blueprint_library(), setup.type)
     if blueprint.has_attribute("role_name"):
         blueprint.set_attribute("role_name", "hero" if setup.name == "ego" else setup.name)
@@ -88,7 +94,7 @@ def spawn_setup(carla: Any, world: Any, map: RoadMap, setup: ActorSetup) -> Acto
 
 
 def try_spawn(carla: Any, world: Any, blueprint: Any, pose: Pose) -> Any:
-    """The actor, or None when the place is taken."""
+    """Spawns an actor a little above `pose` and returns it; None when the place is taken."""
     lift = WALKER_LIFT if blueprint.id.startswith("walker.") else LIFT
     if blueprint.id.startswith("static."):
         lift = 0.0
@@ -96,7 +102,7 @@ def try_spawn(carla: Any, world: Any, blueprint: Any, pose: Pose) -> Any:
 
 
 def make_row(name: str, actor: Any) -> ActorRow:
-    """A row for a spawned actor: its size and origin from its bounding box (D-012)."""
+    """Returns a row for a spawned actor: its size and origin from its bounding box (D-012)."""
     box = actor.bounding_box
     centre, half = box.location, box.extent
     text = actor.attributes.get("color")
@@ -113,7 +119,7 @@ def make_row(name: str, actor: Any) -> ActorRow:
 
 
 def make_row_in_waiting(name: str, blueprint: Any) -> ActorRow:
-    """A row for a vehicle that enters later (A-209)."""
+    """Returns a row for a vehicle that enters later, of a guessed size (A-209)."""
     return ActorRow(name, blueprint.id, None, Pose(0.0, 0.0), GUESS, ActorKind.CAR, PAINT)
 
 

@@ -56,19 +56,26 @@ class ActorSet:
         player.actor.apply_control(control)
 
     def command_all(self, c: VehicleCommand) -> None:
-        """The same for every vehicle that is there."""
+        """Applies pedals and steer to every vehicle that is there."""
         for player in self.players:
             if player.actor is not None and player.is_vehicle:
                 self.command(player, c)
 
     def push(self, i: int, yaw: float, v: float) -> None:
-        """A speed in m/s along a heading: the wheel's target velocity acts in the coming tick."""
+        """Sets a speed in m/s along a heading in rad on the actor of row i; it acts in the coming tick.
+
+        Does nothing for one that is not there.
+        """
         actor = self.players[i].actor
         if actor is not None:
             actor.set_target_velocity(to_vector(self._carla, v * cos(yaw), v * sin(yaw)))
 
     def obey(self, word: ActorCommand, states: ActorStates) -> None:
-        """Follow a player's word. states: where everybody is now."""
+        """Applies a command of the scenario to its actor: presence first, then pedals, then place.
+
+        ConfigError for an unknown name. Pedals or a place take it out of the Traffic Manager's hands. states:
+        where all actors are now.
+        """
         i = self.index.get(word.actor)
         if i is None:
             raise ConfigError(f"there is no actor {word.actor!r} in this run")
@@ -85,7 +92,10 @@ class ActorSet:
             self._place(i, word.place, word.speed or 0.0)
 
     def relocate(self, pose: Pose, v: float) -> Pose:
-        """Put the ego elsewhere; it moves from there in the coming tick. Where it then stands."""
+        """Puts the ego elsewhere, from where it moves in the coming tick; returns where it then stands.
+
+        v: m/s along `pose`; the height is that of the map's road.
+        """
         place = self._on_road(pose)
         self.ego.set_transform(to_transform(self._carla, self.players[EGO].origin(place)))
         self.push(EGO, pose.yaw, v)
@@ -98,7 +108,7 @@ class ActorSet:
             self.traffic.release(player)
 
     def _place(self, i: int, pose: Pose, v: float) -> None:
-        """Stand at `pose` with speed v when the coming tick ends: begin it so much further back."""
+        """Puts row i so far back that it is at `pose` with speed v when the coming tick ends."""
         player = self.players[i]
         start = self._on_road(pose).moved(forward=-v * self._dt)
         player.actor.set_transform(to_transform(self._carla, player.origin(start)))
@@ -108,12 +118,15 @@ class ActorSet:
             player.actor.apply_control(self._carla.WalkerControl(direction, v, False))
 
     def _on_road(self, pose: Pose) -> Pose:
-        """The height of our map's road at this place."""
+        """Returns the pose GROUND_GAP above our map's road; unchanged off every lane."""
         point = self._map.project(pose.x, pose.y, pose.z, driving=False)
         return pose if point is None else replace(pose, z=point.z + GROUND_GAP)
 
     def _appear(self, player: ActorRow, present: bool, now: Pose) -> None:
-        """Enter the world where it was left, or leave it."""
+        """Lets an actor enter the world where it left it, or destroys it and notes its place.
+
+        One that has never left does not enter.
+        """
         if present and player.actor is None and player.rested is not None:
             blueprint = self._world.get_blueprint_library().find(player.type)
             pose = player.origin(player.rested).moved(up=GROUND_GAP)

@@ -23,10 +23,10 @@ def from_transform(transform: Any) -> Pose:
 
 
 def to_vector(carla: Any, x: float, y: float, z: float = 0.0) -> Any:
-    """carla.Vector3D of a velocity in our world axes."""
+    """Returns the carla.Vector3D of a velocity or place in our world axes."""
     return carla.Vector3D(*vector_from_carla(x, y, z))
 
 
 def from_vector(vector: Any) -> tuple[float, float, float]:
-    """A place or velocity in our world axes."""
+    """Returns a carla vector as a place or velocity in our world axes."""
     return vector_from_carla(vector.x, vector.y, vector.z)

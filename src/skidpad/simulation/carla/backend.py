@@ -31,13 +31,16 @@ class CarlaBackend:
 
     @property
     def session(self) -> Session:
-        """The run; BackendError before the first reset."""
+        """The run on the server; BackendError before the first reset and after `close`."""
         if self._session is None:
             raise BackendError("the CARLA backend was not reset, or was closed")
         return self._session
 
     def reset(self, setup: Setup, seed: int) -> Frame:
-        """Begin a run on a freshly loaded map."""
+        """Begins a run on a freshly loaded map and returns its first frame; ends the run before.
+
+        BackendError where the server fails or is none.
+        """
         self.close()
         connection = connect(self.options)
         self.watchdog.feed()
@@ -56,7 +59,10 @@ class CarlaBackend:
         return frame
 
     def step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand] = ()) -> Frame:
-        """Apply the commands for one tick, and wait for all sensors."""
+        """Applies the commands for one tick, waits for all sensors and returns the frame.
+
+        BackendError where the server fails. Sleeps as long as the pace asks for.
+        """
         session = self.session
         with speaking(self.options, f"driving tick {session.tick + 1}"):
             session.step(command, actor_commands)
@@ -71,19 +77,22 @@ class CarlaBackend:
         return self.session.truth()
 
     def relocate(self, pose: Pose, v: float) -> None:
-        """Put the ego at `pose` with speed v along it; its height follows from the road."""
+        """Puts the ego at `pose` with speed v along it; its height follows from the road."""
         with speaking(self.options, "relocating the ego"):
             self.session.relocate(pose, v)
 
     def change(self, outside: Outside) -> None:
-        """The server's weather and lights are others; grip and headlights stay as the run began."""
+        """Changes the server's weather and holds lights; grip and headlights stay as the run began."""
         session = self.session
         session.programme.hold(outside.lights)
         with speaking(self.options, "changing the weather"):
             set_weather(session.carla, session.world, outside.weather)
 
     def close(self) -> None:
-        """Sensors first, then actors, then the time mode; a dead server does not matter."""
+        """Ends the run: sensors first, then actors, then the time mode; a dead server does not matter.
+
+        Does nothing without a run.
+        """
         if self._pacer is not None:
             self._pacer.end()
             self._pacer = None

@@ -40,7 +40,7 @@ KINDS = {
 
 
 def find(library: Any, type: str) -> Any:
-    """The blueprint for one of our types, or for CARLA's own id; ConfigError when there is none."""
+    """Returns the blueprint for one of our types, or for CARLA's own id; ConfigError when there is none."""
     wanted = (type,) if "." in type else STANDS_FOR.get(type, ())
     for id in wanted:
         found = [b for b in library.filter(id) if b.id == id]
@@ -52,7 +52,7 @@ def find(library: Any, type: str) -> Any:
 
 
 def traffic_blueprints(library: Any) -> list[Any]:
-    """Four wheels, without the excluded ids, sorted by id (A-206)."""
+    """Returns the blueprints of four wheels, without the EXCLUDED ids, sorted by id (A-206)."""
     chosen = [
         b
         for b in library.filter("vehicle.*")
@@ -62,7 +62,7 @@ def traffic_blueprints(library: Any) -> list[Any]:
 
 
 def paint(blueprint: Any, index: int) -> None:
-    """The recommended colour whose turn it is (A-205)."""
+    """Sets the recommended colour whose turn it is (A-205); does nothing where there are none."""
     if blueprint.has_attribute("color"):
         colours = blueprint.get_attribute("color").recommended_values
         if colours:
@@ -70,7 +70,7 @@ def paint(blueprint: Any, index: int) -> None:
 
 
 def kind_of(actor: Any) -> ActorKind:
-    """What a spawned actor is, from its attributes."""
+    """Returns what a spawned actor is, from its attributes; PROP for what is neither walker nor vehicle."""
     if actor.type_id.startswith("walker."):
         return ActorKind.PEDESTRIAN
     if actor.type_id.startswith("vehicle."):

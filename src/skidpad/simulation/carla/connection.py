@@ -26,7 +26,7 @@ class Connection:
 
 
 def wheel() -> Any:
-    """The module `carla`; MissingExtra when it is not installed."""
+    """Returns the module `carla`; MissingExtra when it is not installed."""
     try:
         import carla
     except ModuleNotFoundError as error:
@@ -46,7 +46,10 @@ def require_server(options: CarlaOptions) -> None:
 
 
 def connect(options: CarlaOptions) -> Connection:
-    """A client of the server at that address; BackendError when there is none or another version."""
+    """Returns a connection to the server at that address; BackendError for none or another version.
+
+    MissingExtra where the client is not installed.
+    """
     carla = wheel()
     require_server(options)
     with speaking(options, "greeting it"):
@@ -62,7 +65,7 @@ def connect(options: CarlaOptions) -> Connection:
 
 
 def _client(carla: Any, options: CarlaOptions) -> Any:
-    """The client of this address that was used before, or a new one if that no longer works.
+    """Returns the client of this address that was used before, or a new one if that no longer works.
 
     None is ever given up: the wheel aborts the process when a client ends on one of its threads.
     """
@@ -80,14 +83,14 @@ def _client(carla: Any, options: CarlaOptions) -> Any:
 
 
 def release(version: str) -> str:
-    """Returns the release of a version text: `0.9.16` of `0.9.16-12-gabcdef`."""
+    """Returns the release of a version text: `0.9.16` of `0.9.16-12-gabcdef`; another text as it is."""
     found = re.match(r"\d+(\.\d+)*", version)
     return found[0] if found else version
 
 
 @contextmanager
 def speaking(options: CarlaOptions, doing: str) -> Iterator[None]:
-    """What the wheel raises becomes one BackendError that says what was being done."""
+    """Turns a RuntimeError of the wheel into one BackendError that says what was being done."""
     try:
         yield
     except RuntimeError as error:

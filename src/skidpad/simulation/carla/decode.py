@@ -20,8 +20,9 @@ SKY = int(SemanticClass.SKY)
 
 @kernel
 def instance_rows(bgra: Bytes, rows: NDArray[np.uint16], out: NDArray[np.uint16]) -> None:
-    """(H, W, 4) with actor ids in green (low byte) and blue to our rows + 1, 0 for the map.
+    """Writes the row + 1 of each pixel's actor into out (H, W), 0 for the map.
 
+    bgra (H, W, 4): actor ids in green (low byte) and blue.
     rows: (65536,) row + 1 by the lower 16 bits of an actor id.
     """
     for y in range(out.shape[0]):
@@ -30,7 +31,7 @@ def instance_rows(bgra: Bytes, rows: NDArray[np.uint16], out: NDArray[np.uint16]
 
 
 def packed_rgb(bgra: Bytes, out: NDArray[np.uint32]) -> None:
-    """(H, W, 4) blue, green, red, alpha to (H, W) packed red, green, blue, alpha."""
+    """Writes (H, W, 4) blue, green, red, alpha as (H, W) packed red, green, blue, alpha into `out`."""
     cv2.cvtColor(bgra, cv2.COLOR_BGRA2RGBA, dst=out.view(np.uint8).reshape(*out.shape, 4))
 
 
@@ -38,7 +39,10 @@ def packed_rgb(bgra: Bytes, out: NDArray[np.uint32]) -> None:
 def hide_beyond(
     sight: float, focal: float, cx: float, cy: float, inverse: Floats32, labels: Bytes, sky: int
 ) -> None:
-    """Turn the class of pixels whose ray is longer than `sight` to `sky`; inverse: (H, W) 1/m."""
+    """Changes the class of pixels whose ray is longer than `sight` m to `sky`, in `labels`.
+
+    inverse: (H, W) inverse depth in 1/m, of the same view.
+    """
     for y in range(labels.shape[0]):
         v = (y + 0.5 - cy) / focal
         for x in range(labels.shape[1]):
@@ -50,7 +54,7 @@ def hide_beyond(
 
 @kernel
 def cut_depth(sight: float, focal: float, cx: float, cy: float, inverse: Floats32) -> None:
-    """Removes depths along rays longer than `sight`, where nothing is measured."""
+    """Sets inverse depths along rays longer than `sight` m to 0, where nothing is measured."""
     for y in range(inverse.shape[0]):
         v = (y + 0.5 - cy) / focal
         for x in range(inverse.shape[1]):
@@ -61,17 +65,20 @@ def cut_depth(sight: float, focal: float, cx: float, cy: float, inverse: Floats3
 
 
 def limit_labels(camera: CameraSpec, sight: float, inverse: Floats32, labels: Bytes) -> None:
-    """Hide what the weather hides from a camera that classifies (decision M-1)."""
+    """Hides what the weather hides from a camera that classifies, in `labels` (decision M-1)."""
     hide_beyond(sight, camera.focal, camera.cx, camera.cy, inverse, labels, SKY)
 
 
 def limit_depth(camera: CameraSpec, sight: float, inverse: Floats32) -> None:
-    """The same for a camera that measures depth."""
+    """Hides what the weather hides from a camera that measures depth, in `inverse`."""
     cut_depth(sight, camera.focal, camera.cx, camera.cy, inverse)
 
 
 def radar_points(raw: bytes | memoryview, limit: float = inf) -> RadarPoints:
-    """Returns of velocity, azimuth, altitude, depth (float32 each) within `limit` m."""
+    """Returns the radar's points within `limit` m, in our axes.
+
+    raw: velocity, azimuth, altitude, depth of each (float32).
+    """
     points = np.frombuffer(raw, dtype="<f4").reshape(-1, 4)
     points = points[points[:, 3] <= limit].astype(np.float32)
     azimuth = angles_to_carla(points[:, 1]).astype(np.float32)
@@ -86,7 +93,7 @@ SEMANTIC_POINT = np.dtype(
 def lidar_points(
     raw: bytes | memoryview, rows: NDArray[np.uint16], extinction: float
 ) -> LidarPoints:
-    """Returns of a semantic lidar; its class and actor come instead of an intensity.
+    """Returns the points of a semantic lidar; its class and actor come instead of an intensity.
 
     rows: row + 1 by the lower bits of an actor id. extinction: of light in the air, 1/m.
     """

@@ -49,12 +49,18 @@ class EgoEvents:
         self._quiet_until = tick + QUIET
 
     def remember(self, frame: int, states: ActorStates) -> None:
-        """Velocities of a frame; an event that comes late is about an earlier one."""
+        """Notes the velocities of a frame, as an event that comes late is about an earlier one.
+
+        frame: the server's number; PAST frames are kept.
+        """
         self._past[frame] = (states.vx.copy(), states.vy.copy())
         self._past.pop(frame - PAST, None)
 
     def contacts(self, tick: int, frame: int) -> tuple[ContactEvent, ...]:
-        """Contacts that began; frame: the server's number of this tick."""
+        """Returns the contacts that began since the last call, the hardest of each pair; () for none.
+
+        Touching again within HOLD s begins no contact. frame: the server's number of this tick.
+        """
         rows = {p.actor.id: i for i, p in enumerate(self._players) if p.actor is not None}
         found: dict[int | str, ContactEvent] = {}
         touched: dict[int | str, int] = {}
@@ -84,7 +90,10 @@ class EgoEvents:
         return closing(vx, vy, row, push)
 
     def invasions(self, tick: int, states: ActorStates) -> tuple[LaneInvasion, ...]:
-        """Markings that the ego's outline began to cross."""
+        """Returns markings that the ego's outline began to cross since the last call; () for none.
+
+        One told again within CROSSING s is the same crossing.
+        """
         events = drain(self._invasions)
         if not events or tick <= self._quiet_until:
             return ()
@@ -99,7 +108,7 @@ class EgoEvents:
 
 
 def marking_name(kind: Any) -> str:
-    """`solid_broken` of carla.LaneMarkingType.SolidBroken, `other` for what our maps do not know."""
+    """Returns `solid_broken` of carla.LaneMarkingType.SolidBroken, `other` for one our maps do not know."""
     words = re.findall("[A-Z][a-z]*", str(kind).rsplit(".", 1)[-1])
     name = "_".join(words).upper()
     return name.lower() if name in Marking.__members__ else "other"
@@ -111,7 +120,7 @@ def drain(queue: deque[Any]) -> list[Any]:
 
 
 def thing(other: Any) -> str:
-    """`guardrail` of `static.guardrail`; what has no name is "static"."""
+    """Returns `guardrail` of `static.guardrail`; "static" for None and what has no name."""
     name = "" if other is None else str(other.type_id).rsplit(".", 1)[-1]
     return name or "static"
 
@@ -122,9 +131,10 @@ def _components(v: Any) -> tuple[float, float, float]:
 
 
 def closing(vx: Floats, vy: Floats, row: int, push: tuple[float, float, float]) -> float:
-    """Speed along the impulse with which the ego and the other came together, m/s, >= 0.
+    """Returns the speed along the impulse with which the ego and the other came together, m/s, >= 0.
 
-    vx, vy: (n,) before the contact. row: of the other, -1: it stands still.
+    vx, vy: (n,) before the contact. row: of the other, -1: it stands still. push: impulse; without one the
+    whole speed counts.
     """
     size = hypot(push[0], push[1])
     x, y = vx[EGO], vy[EGO]

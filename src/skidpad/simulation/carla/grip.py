@@ -30,8 +30,9 @@ class Grip:
     notices: list[str] = field(default_factory=list)
 
     def apply(self, vehicle: Any) -> None:
-        """Scale the wheels of a vehicle; a second call finds f0 kept and multiplies it once.
+        """Scales the wheels of a vehicle by the ratio, and adds a notice; a second call finds f0 kept.
 
+        Does nothing where the server lets weather act, or grip is off.
         Every other property of every wheel is copied from the spawned vehicle (B-063, B-064).
         """
         if self.served or self.setup.grip is GripModel.NONE:
@@ -50,7 +51,10 @@ class Grip:
         )
 
     def mu(self, speed: float) -> float:
-        """Nominal friction at a tyre of tire_friction 3.5: what our model says, not a measurement."""
+        """Returns the nominal friction at a tyre of tire_friction 3.5, at a speed in m/s.
+
+        It is what our model says, not a measurement.
+        """
         if self.served or self.setup.grip is GripModel.NONE:
             return mu_at(self.params, speed)
         return self.setup.mu_ref * self.ratio
@@ -62,8 +66,7 @@ class Grip:
 
 
 def in_force(blueprint: Any, setup: Setup) -> tuple[GripModel, float]:
-    """Model and mu_ref that the server says it uses; a server that does not say so is believed to
-    use ours."""
+    """Returns the model and mu_ref that the server says it uses; ours where it does not say."""
     if not (blueprint.has_attribute("weather_grip") and blueprint.has_attribute("mu_ref")):
         return setup.grip, setup.mu_ref
     model = GripModel(blueprint.get_attribute("weather_grip").as_str())

@@ -31,7 +31,10 @@ class ServerKeeper:
         self._process: subprocess.Popen[bytes] | None = None
 
     def before_run(self) -> None:
-        """A server is there, and it is not too old; BackendError when it does not come up."""
+        """Starts a server where none is there or it is too old, and counts the run.
+
+        BackendError when it does not come up.
+        """
         alive = self._process is not None and self._process.poll() is None
         if alive and not (self.every and self._runs >= self.every):
             self._runs += 1
@@ -41,7 +44,10 @@ class ServerKeeper:
         self._runs = 1
 
     def _start(self) -> None:
-        """Starts the server process and waits until it answers; raises BackendError where it does not."""
+        """Starts the server process and waits up to PATIENCE s until it answers.
+
+        Else stops it: BackendError.
+        """
         try:
             self._process = subprocess.Popen(
                 self.command,
@@ -69,7 +75,7 @@ class ServerKeeper:
         )
 
     def stop(self) -> None:
-        """End it with all its children; safe to call twice."""
+        """Ends the server with all its children; safe to call twice."""
         process, self._process = self._process, None
         if process is None:
             return
@@ -83,7 +89,7 @@ class ServerKeeper:
 
 
 def answers(host: str, port: int) -> bool:
-    """Tells whether a server accepts connections at this address."""
+    """Returns whether a server accepts connections at this address."""
     try:
         socket.create_connection((host, port), GLANCE).close()
     except OSError:
@@ -92,5 +98,5 @@ def answers(host: str, port: int) -> bool:
 
 
 def _die_with_parent() -> None:
-    """A worker that is killed cannot stop its server."""
+    """Asks the kernel to end this process with its parent: a worker that is killed cannot stop its server."""
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)

@@ -24,7 +24,7 @@ class TrafficLights:
 
 
 def find_lights(world: Any) -> list[tuple[int, Any]]:
-    """Lights with their signal ids, in order."""
+    """Returns lights with their OpenDRIVE signal ids, sorted by id; those without a number are left out."""
     found = []
     for light in world.get_actors().filter("traffic.traffic_light*"):
         text = light.get_opendrive_id()
@@ -48,11 +48,11 @@ class Programme:
         self.show(0)
 
     def hold(self, held: Iterable[tuple[int, LightState]]) -> None:
-        """Holds lights in states that a client has set."""
+        """Holds lights in states that a client has set, by signal id, from the next `show` on."""
         self._cycle.hold(held)
 
     def show(self, tick: int) -> None:
-        """Let the lights show what belongs to this tick; the server shows it in the coming one."""
+        """Sets the lights as belongs to this tick; the server shows it in the coming one."""
         while self._tick < tick:
             self._cycle.advance(self._dt)
             self._tick += 1

@@ -12,7 +12,10 @@ from skidpad.simulation.carla.scene import served_name
 
 
 def fetch_map(options: CarlaOptions, name: str, folder: Path) -> Path:
-    """Write the server's map of that name into `folder`; BackendError when it has none."""
+    """Writes the OpenDRIVE text of the server's map of that name into `folder` and returns the file.
+
+    Loads the map on the server. BackendError when it has none of that name.
+    """
     connection = connect(options)
     with speaking(options, f"fetching map {name}"):
         client = connection.client

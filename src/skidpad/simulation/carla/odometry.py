@@ -21,7 +21,7 @@ class Odometry:
         self._sigma, self._half_track = sigma, TRACK * width / 2.0
 
     def read(self, s: ActorStates, gear: int) -> EgoEstimate:
-        """The estimate of this tick; once per tick, for the noise is drawn anew."""
+        """Returns the estimate of this tick; call it once per tick, for the noise is drawn anew."""
         pose = s.pose(EGO)
         if self._sigma > 0.0:
             dx, dy = self._rng.normal(0.0, self._sigma, 2).tolist()

@@ -52,7 +52,10 @@ class Pictures:
         self._newest: TickImages | None = None
 
     def of(self, tick: int, messages: Mapping[str, Any]) -> TickImages:
-        """The images of a tick; display feeds are degraded in the background when pooled."""
+        """Returns the images of a tick; display feeds are degraded in the background when pooled.
+
+        Waits for those of the tick before, whose buffers are used again.
+        """
         self.finish()
         self.tick = tick
         self._newest = images = TickImages(self, tick, messages)
@@ -63,7 +66,7 @@ class Pictures:
         return images
 
     def decode(self, camera: CameraSpec, messages: Mapping[str, Any]) -> CameraImage:
-        """Returns an image from its message."""
+        """Returns a camera's image from its message, as the weather leaves it, in the camera's buffer."""
         out = self._buffers[camera.id]
         bgra = _bytes(messages[camera.id], camera)
         if camera.modality is Modality.DEPTH:
@@ -88,7 +91,7 @@ class Pictures:
         return CameraImage(rgb=out.view(np.uint8).reshape(*out.shape, 4)[..., :3])
 
     def finish(self) -> None:
-        """Wait for what is still being decoded, before buffers and messages are used again."""
+        """Waits for what is still being decoded, before buffers and messages are used again."""
         if self._newest is not None:
             self._newest.settle()
 
@@ -116,11 +119,15 @@ class TickImages(Mapping[str, CameraImage]):
         self._coming: dict[str, Future[CameraImage]] = {}
 
     def ahead(self, id: str, pool: ThreadPoolExecutor) -> None:
-        """Begins to decode an image that a driver will read."""
+        """Begins to decode an image in a thread of the pool; reading it waits for that."""
         p = self._pictures
         self._coming[id] = pool.submit(p.decode, p.cameras[id], self._messages)
 
     def __getitem__(self, id: str) -> CameraImage:
+        """Returns an image, decoded when first read; KeyError for a camera that there is not.
+
+        BackendError for one that sends nothing, or when first read after the next tick.
+        """
         if id in self._ready:
             return self._ready[id]
         if id in self._pictures.silent:
@@ -141,7 +148,7 @@ class TickImages(Mapping[str, CameraImage]):
         return self._ready[id]
 
     def settle(self) -> None:
-        """Wait for what is still being decoded."""
+        """Waits for what is still being decoded."""
         for id in list(self._coming):
             self._ready[id] = self._coming.pop(id).result()
 
@@ -156,7 +163,7 @@ class TickImages(Mapping[str, CameraImage]):
 
 
 def _bytes(message: Any, camera: CameraSpec) -> NDArray[np.uint8]:
-    """(H, W, 4) of a message; BackendError when the server sent another size."""
+    """Returns (H, W, 4) of a message, not copied; BackendError when the server sent another size."""
     if (message.height, message.width) != (camera.height, camera.width):
         raise BackendError(
             f"CARLA sent {message.width}x{message.height} px for camera {camera.id}, asked for "
@@ -166,6 +173,6 @@ def _bytes(message: Any, camera: CameraSpec) -> NDArray[np.uint8]:
 
 
 def _depth_twins(cameras: Any) -> dict[str, CameraSpec]:
-    """Finds for each camera that classifies the depth camera with the same view, if there is one."""
+    """Returns for each camera the depth camera with the same view; those without one are left out."""
     depth = {c.view: c for c in cameras if c.modality is Modality.DEPTH}
     return {c.id: depth[c.view] for c in cameras if c.view in depth}

@@ -44,7 +44,7 @@ class Reader:
             self._radar_limit = radar_range(setup.weather, radar.range)
 
     def know(self, players: Sequence[ActorRow]) -> None:
-        """Which actors' ids in the messages are which rows."""
+        """Notes which row the ids of actors in messages stand for."""
         rows = self.pictures.rows
         for i, player in enumerate(players):
             if player.actor is not None:
@@ -58,7 +58,10 @@ class Reader:
         commands: Floats,
         lights: dict[int, LightState],
     ) -> tuple[CameraRadarReadings, Mapping[str, Any]]:
-        """The common sensors' readings, and those that the stack asked for besides."""
+        """Returns the common sensors' readings, and those that the stack asked for besides, by sensor id.
+
+        messages: by sensor id; commands (n, 5); to be called in every tick.
+        """
         self._messages, braking = messages, commands[:, 1] > 0.0
         if self._objects is not None:
             seen = self._objects.read(tick, states, lights, braking)
@@ -74,7 +77,7 @@ class Reader:
         return seen, asked.read(tick, states, seen.images, lights, braking)
 
     def _lidar(self, spec: LidarSpec) -> LidarPoints:
-        """The server's; GNSS, IMU and speedometer are read off the body, as in our own world."""
+        """Returns the points of the server's lidar of this tick."""
         assert self._asked is not None
         raw = self._messages[spec.id].raw_data
         return decode.lidar_points(raw, self.pictures.rows, self._asked.air)

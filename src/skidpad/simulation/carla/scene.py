@@ -23,10 +23,10 @@ GENERATION = {
 
 
 def load_scene(connection: Connection, setup: Setup) -> Any:
-    """Returns the carla.World of the set-up's map, fresh and without actors.
+    """Loads the set-up's map and returns its carla.World, fresh and without actors.
 
     The server's own map is taken when it has one of that name and content, else it makes one from
-    our OpenDRIVE text.
+    our OpenDRIVE text. BackendError where there is neither.
     """
     client, path = connection.client, map_file(setup.map)
     text = opendrive_text(path)
@@ -45,19 +45,19 @@ def load_scene(connection: Connection, setup: Setup) -> Any:
 
 
 def served_name(client: Any, name: str) -> str | None:
-    """The server's name of a map, without folders; None when it has none."""
+    """Returns the server's full name of a map named without folders; None when it has none."""
     return next((m for m in client.get_available_maps() if m.rsplit("/", 1)[-1] == name), None)
 
 
 def opendrive_text(path: Path) -> str | None:
-    """The map's text; None for a baked file."""
+    """Returns the OpenDRIVE text of a map's file; None for a baked one."""
     if path.suffix == ".npz":
         return None
     return path.read_text(encoding="utf-8", errors="replace")
 
 
 def same_roads(a: str, b: str) -> bool:
-    """Whether two texts are one map; line ends and the space around do not matter."""
+    """Returns whether two texts are one map; line ends and the space around do not matter."""
     return a.split() == b.split()
 
 
@@ -72,7 +72,7 @@ def synchronise(world: Any, setup: Setup) -> None:
 
 
 def release(world: Any) -> None:
-    """Asynchronous again, so that the next client finds a server that ticks by itself."""
+    """Makes the server asynchronous again, so that the next client finds one that ticks by itself."""
     world.freeze_all_traffic_lights(False)
     world.reset_all_traffic_lights()
     settings = world.get_settings()

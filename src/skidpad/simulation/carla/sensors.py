@@ -46,7 +46,10 @@ class Mailbox:
         self._arrived.put(data)
 
     def of(self, frame: int, timeout: float) -> Any:
-        """The message of this frame, older ones are dropped; None when it does not come."""
+        """Returns the message of this frame or a later one, older ones are dropped.
+
+        None when none comes within `timeout` s of the last.
+        """
         while True:
             try:
                 data = self._arrived.get(timeout=timeout)
@@ -109,9 +112,9 @@ class Sensors:
         return actor
 
     def collect(self, frame: int, timeout: float | None = None) -> dict[str, Any] | None:
-        """The messages of a frame by sensor id; None when one is missing and `timeout` was given.
+        """Returns the messages of a frame by sensor id; None when one is missing and `timeout` was given.
 
-        BackendError when one is missing after the connection's patience.
+        BackendError when one is missing after the connection's patience, or is of another frame.
         """
         patience = self._connection.options.timeout if timeout is None else timeout
         found = {}
@@ -129,7 +132,7 @@ class Sensors:
         return found
 
     def close(self) -> None:
-        """Stop listening first: a sensor that still sends when the client ends aborts it."""
+        """Stops listening, then destroys the sensors: one that still sends when the client ends aborts it."""
         for actor in self.listening:
             actor.stop()
         self.listening.clear()
@@ -139,7 +142,7 @@ class Sensors:
 
 
 def display_cameras(specs: Sequence[SensorSpec]) -> set[str]:
-    """The RGB cameras that only a display shows: all but the first."""
+    """Returns the ids of RGB cameras that only a display shows: all but the first."""
     rgb = [s.id for s in specs if isinstance(s, CameraSpec) and s.modality is Modality.RGB]
     return set(rgb[1:])
 
@@ -147,7 +150,7 @@ def display_cameras(specs: Sequence[SensorSpec]) -> set[str]:
 def describe_sensor(
     spec: CameraSpec | RadarSpec | LidarSpec,
 ) -> tuple[str, SensorSpec, dict[str, str]]:
-    """Returns blueprint id, spec and attributes of a sensor (A-018 to A-028)."""
+    """Returns CARLA's blueprint id, the spec and the attributes of a sensor (A-018 to A-028)."""
     if isinstance(spec, LidarSpec):
         return (
             "sensor.lidar.ray_cast_semantic",

@@ -64,7 +64,10 @@ class Session:
     # --- beginning
 
     def begin(self) -> None:
-        """Actors, sensors, grip; then let everything come to rest and start the clock."""
+        """Spawns actors, sensors and grip, lets everything come to rest, and starts the clock.
+
+        Ticks the server. BackendError and ConfigError as from these.
+        """
         setup, players = self.setup, self.players
         self._spawn()
         n = len(players)
@@ -115,7 +118,10 @@ class Session:
         return None if point is None else replace(point, offset=0.0)
 
     def _settle(self, sensors: Sensors) -> None:
-        """Always the same number of ticks where the server is quick, so that runs repeat."""
+        """Ticks until the ego stands and its sensors send; BackendError after SETTLE_MAX ticks.
+
+        Always SETTLE ticks where the server is quick, so that runs repeat.
+        """
         self.actor_set.command_all(HOLD)
         for k in range(SETTLE_MAX):
             frame = self._advance()
@@ -133,7 +139,7 @@ class Session:
         )
 
     def _engage(self) -> None:
-        """Start: initial speeds, drivers on their seats."""
+        """Releases the brakes, notes initial speeds and hands drivers on autopilot to the Traffic Manager."""
         setups = (self.setup.ego, *self.setup.actors)
         self._starting = {i: s.speed for i, s in enumerate(setups) if s.speed != 0.0}
         self.actor_set.command_all(VehicleCommand())
@@ -149,7 +155,10 @@ class Session:
     # --- driving
 
     def step(self, command: VehicleCommand, actor_commands: Iterable[ActorCommand]) -> None:
-        """Applies the commands and advances the server by one tick."""
+        """Applies the commands, advances the server by one tick and reads what came.
+
+        BackendError where a sensor's message does not come.
+        """
         self.command = command
         self._push(EGO)
         self.actor_set.command(self.players[EGO], command)
@@ -177,7 +186,7 @@ class Session:
             self.actor_set.push(i, float(self.states.yaw[i]), v)
 
     def _advance(self) -> int:
-        """Tick the world; its frame number. The images of the last tick are no longer needed."""
+        """Ticks the world and returns its frame number; images of the last tick may no longer be read."""
         if self.pictures is not None:
             self.pictures.finish()
         self.server_frame = int(self.world.tick(self.options.timeout))
@@ -193,7 +202,7 @@ class Session:
             self.notices.append(f"{player.name} entered")
 
     def relocate(self, pose: Pose, v: float) -> None:
-        """Put the ego elsewhere; it moves from there in the coming tick."""
+        """Puts the ego elsewhere, v in m/s along `pose`; it moves from there in the coming tick."""
         place = self.actor_set.relocate(pose, v)
         self.events.forget(self.tick)
         truth.move_row(self.states, EGO, place, v)
@@ -201,7 +210,7 @@ class Session:
     # --- reading
 
     def _read(self) -> None:
-        """States, commands, lights and events of this tick."""
+        """Reads states, commands, friction, lights and events of this tick."""
         local = self.options.uses(Optimisation.LOCAL_TRUTH)
         source = self.world.get_snapshot() if local else self.world.get_actors()
         truth.read_states(self.players, source, self.states)
@@ -229,7 +238,10 @@ class Session:
         )
 
     def frame(self) -> SensorFrame:
-        """Returns the frame of the ego's sensors at the present tick."""
+        """Returns the frame of the ego's sensors at the present tick.
+
+        Call it once per tick, as noise is drawn.
+        """
         seen, asked = self.reader.read(
             self.tick, self.messages, self.states, self.commands, self.light_states
         )

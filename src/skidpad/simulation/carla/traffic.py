@@ -34,20 +34,20 @@ class Traffic:
         self.notices: list[str] = []
 
     def drive(self, player: ActorRow) -> None:
-        """Hand a vehicle over: desired speed and lamps (A-207)."""
+        """Hands a vehicle to the Traffic Manager, with its desired speed and lamps (A-207)."""
         player.actor.set_autopilot(True, self.port)
         percent = 100.0 * (1.0 - player.factor)  # positive is slower
         self.manager.vehicle_percentage_speed_difference(player.actor, percent)
         self.manager.update_vehicle_lights(player.actor, True)
 
     def release(self, player: ActorRow) -> None:
-        """Takes a vehicle back from the Traffic Manager."""
+        """Takes a vehicle back from the Traffic Manager, for good."""
         if player.autopilot and player.actor is not None:
             player.actor.set_autopilot(False, self.port)
         player.autopilot = False
 
     def wait_for(self, players: list[ActorRow]) -> None:
-        """These enter when there is room, and random drivers choose their ways (A-209)."""
+        """Notes vehicles that enter when there is room; random drivers choose their ways (A-209)."""
         self._waiting = list(players)
         self.manager.set_respawn_dormant_vehicles(True)
         self.manager.set_boundaries_respawn_dormant_vehicles(NEAR, FAR)
@@ -83,7 +83,10 @@ class Traffic:
 def spawn_fixed(
     carla: Any, world: Any, map: RoadMap, ego: LanePoint, setup: TrafficSetup, seed: int
 ) -> tuple[list[ActorRow], list[str]]:
-    """Vehicles at the published positions, and what could not be placed (A-202 to A-208)."""
+    """Spawns vehicles at the published positions; returns them and what could not be placed, in words.
+
+    ConfigError where one is refused and fewer are not allowed (A-202 to A-208).
+    """
     kinds = blueprints.traffic_blueprints(world.get_blueprint_library())
     players, refused = [], []
     for i, spawn in enumerate(fixed_spawns(map, ego, setup, seed)):
@@ -108,7 +111,7 @@ def spawn_fixed(
 def spawn_random(
     carla: Any, world: Any, ego: Pose, setup: TrafficSetup, seed: int
 ) -> list[ActorRow]:
-    """Spawns up to 80 vehicles on recommended points around the ego; some may have to wait."""
+    """Spawns vehicles on recommended points around the ego; returns rows for all, some still waiting."""
     kinds = blueprints.traffic_blueprints(world.get_blueprint_library())
     points = places_around(world, ego, stream(seed, "traffic", "places"))
     players = []
@@ -124,14 +127,17 @@ def spawn_random(
 
 
 def places_around(world: Any, ego: Pose, random: Any) -> list[Pose]:
-    """Recommended spawn points near the ego in a drawn order."""
+    """Returns the recommended spawn points between NEAR and FAR m from the ego in a drawn order."""
     poses = [from_transform(t) for t in world.get_map().get_spawn_points()]
     near = [p for p in poses if NEAR < ((p.x - ego.x) ** 2 + (p.y - ego.y) ** 2) ** 0.5 < FAR]
     return [near[i] for i in random.permutation(len(near))]
 
 
 def _first_free(carla: Any, world: Any, blueprint: Any, points: list[Pose]) -> Any:
-    """Spawn at the first point that is free; a point is tried once."""
+    """Spawns at the first point that is free and returns the actor; None where none is.
+
+    Points that were tried are removed from `points`, from its end.
+    """
     while points:
         actor = try_spawn(carla, world, blueprint, points.pop())
         if actor is not None:

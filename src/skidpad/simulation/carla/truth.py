@@ -20,7 +20,10 @@ EGO = 0
 
 
 def read_states(players: Sequence[ActorRow], source: Any, out: ActorStates) -> None:
-    """Fill `out` from a carla.WorldSnapshot, or from a carla.ActorList asked of the server."""
+    """Fills `out` from a carla.WorldSnapshot, or from a carla.ActorList asked of the server.
+
+    Rows of actors that are not there are set not present and keep their numbers.
+    """
     ask = source.find
     for i, player in enumerate(players):
         seen = None if player.actor is None else ask(player.actor.id)
@@ -30,7 +33,7 @@ def read_states(players: Sequence[ActorRow], source: Any, out: ActorStates) -> N
 
 
 def put_row(out: ActorStates, i: int, player: ActorRow, seen: Any) -> None:
-    """Writes one actor; the motion of its footprint's centre is taken to be that of its origin."""
+    """Writes row i; the motion of the footprint's centre is taken to be that of CARLA's origin."""
     pose = player.footprint(from_transform(seen.get_transform()))
     yaw = wrap_angle(pose.yaw)
     out.x[i], out.y[i], out.z[i], out.yaw[i] = pose.x, pose.y, pose.z, yaw
@@ -44,14 +47,17 @@ def put_row(out: ActorStates, i: int, player: ActorRow, seen: Any) -> None:
 
 
 def move_row(out: ActorStates, i: int, pose: Pose, v: float) -> None:
-    """What row i shall be after a relocation that the server has not stepped yet."""
+    """Writes row i as it shall be after a relocation that the server has not stepped yet; v: m/s."""
     out.x[i], out.y[i], out.z[i], out.yaw[i] = pose.x, pose.y, pose.z, wrap_angle(pose.yaw)
     out.pitch[i] = out.roll[i] = out.yaw_rate[i] = out.ax[i] = out.ay[i] = 0.0
     out.vx[i], out.vy[i] = v * cos(pose.yaw), v * sin(pose.yaw)
 
 
 def read_commands(players: Sequence[ActorRow], ego: VehicleCommand, out: Floats) -> None:
-    """(n, 5) throttle, brake, steer, handbrake, reverse as the snapshot tells them."""
+    """Writes (n, 5) throttle, brake, steer, handbrake, reverse of the vehicles; rows of others stay.
+
+    ego: the command that the ego was given.
+    """
     for i, player in enumerate(players):
         if i == EGO or player.actor is None or not player.is_vehicle:
             continue
@@ -61,7 +67,7 @@ def read_commands(players: Sequence[ActorRow], ego: VehicleCommand, out: Floats)
 
 
 def read_mu(players: Sequence[ActorRow], grip: Grip, states: ActorStates, out: Floats) -> None:
-    """(n, 4) nominal friction at the tyres; NaN where there is none."""
+    """Writes the nominal friction at the tyres into out (n, 4); NaN where there is none."""
     out.fill(np.nan)
     for i, player in enumerate(players):
         if states.present[i] and player.is_vehicle:
@@ -70,5 +76,5 @@ def read_mu(players: Sequence[ActorRow], grip: Grip, states: ActorStates, out: F
 
 
 def along(states: ActorStates, i: int) -> float:
-    """Speed along the body, m/s, negative backwards."""
+    """Returns the speed of row i along its body in m/s, negative backwards."""
     return float(states.vx[i] * cos(states.yaw[i]) + states.vy[i] * sin(states.yaw[i]))

@@ -22,7 +22,7 @@ class Watchdog:
         self._timer: threading.Timer | None = None
 
     def feed(self) -> None:
-        """Something moved; wait for the next sign of life."""
+        """Starts the wait for the next sign of life anew; does nothing without a patience."""
         self.stop()
         if self.patience is not None:
             self._timer = threading.Timer(self.patience, self._bite)
@@ -43,5 +43,5 @@ class Watchdog:
 
 
 def rest(seconds: float) -> None:
-    """Let the wheel's threads work for a moment."""
+    """Sleeps for so many seconds, in which the wheel's threads work."""
     time.sleep(seconds)

@@ -22,7 +22,7 @@ SAME_NAME = (
 
 
 def weather_parameters(weather: Weather) -> dict[str, float]:
-    """Keyword arguments of carla.WeatherParameters; ice, snow and temperatures have none."""
+    """Returns keyword arguments of carla.WeatherParameters; ice, snow and temperatures have none."""
     values = {name: float(getattr(weather, name)) for name in SAME_NAME}
     return values | {
         "sun_azimuth_angle": weather.sun_azimuth_deg,

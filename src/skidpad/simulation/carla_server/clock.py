@@ -30,7 +30,7 @@ class EpisodeSettings:
 
     @property
     def step(self) -> float:
-        """s by which one tick advances; without a fixed one the house's step."""
+        """Seconds by which one tick advances; without a fixed step, DT."""
         return DT if self.fixed_step is None else self.fixed_step
 
     def pack(self) -> list[Any]:
@@ -51,7 +51,7 @@ class EpisodeSettings:
 
 
 def parse_settings(value: Any) -> EpisodeSettings:
-    """Parses and checks the `EpisodeSettings` of a call."""
+    """Returns the checked `EpisodeSettings` of a call; WireError names what is wrong. A step of 0 is none."""
     v = wire.items(value, "settings", 11)
     step = wire.optional(v[2], "settings.fixed_delta_seconds")
     if step is not None:
@@ -98,7 +98,10 @@ class Clock:
         self.elapsed += self.step
 
     def renew(self, reset_settings: bool) -> None:
-        """Another map, or the same one anew."""
+        """Begins another episode: its number rises and its seconds begin at 0; frames go on.
+
+        reset_settings: settings are the defaults again, but for rendering.
+        """
         self.episode += 1
         self.elapsed = 0.0
         if reset_settings:

@@ -28,7 +28,10 @@ class DebugShapes:
         self.shapes: list[Shape] = []
 
     def draw(self, value: Any) -> None:
-        """Adds one debug shape from a call, for its life time in s or for ever."""
+        """Adds one debug shape from a call, for its life time in s or for ever; the oldest beyond MOST go.
+
+        For ever: a negative time, or 0 and persistent. WireError for another shape.
+        """
         primitive, colour, life, persistent = wire.items(value, "debug shape", 4)
         index, body = wire.items(primitive, "debug shape.primitive", 2)
         kind = KINDS[wire.integer(index, "debug shape.primitive", 0, len(KINDS) - 1)]
@@ -47,7 +50,7 @@ class DebugShapes:
         self.shapes = [s for s in self.shapes if s.left is None or s.left > 0.0]
 
     def clear(self, texts: bool | None = None) -> None:
-        """All, only the texts, or all but the texts."""
+        """Removes all shapes; only the texts (True), or all but the texts (False)."""
         if texts is None:
             self.shapes = []
         else:

@@ -29,7 +29,7 @@ BY_COLUMNS = (Family.VEHICLE, Family.TRAFFIC_LIGHT, Family.TRAFFIC_SIGN)
 
 
 def fill_actor(rows: Rows, actors: ActorTable, actor: Actor) -> None:
-    """Writes where an actor is that is no vehicle."""
+    """Writes the pose of an actor that is no vehicle into its row."""
     (x, y, z), (pitch, yaw, roll) = wire.transform(actors.pose(actor))
     rows.vehicles["pose"][actor.row] = (x, y, z, pitch, yaw, roll)
 
@@ -37,7 +37,7 @@ def fill_actor(rows: Rows, actors: ActorTable, actor: Actor) -> None:
 def fill_walker(
     rows: Rows, actors: ActorTable, actor: Actor, control: WalkerControl, dt: float
 ) -> None:
-    """How a walker moves, and how it was told to walk."""
+    """Writes how a walker moves, and how it was told to walk, into its rows; dt: s since the last time."""
     row, walker = rows.vehicles[actor.row], rows.walkers[actor.row]
     now = np.array(vector_from_carla(*actors.velocity(actor)))
     row["acceleration"] = (now - row["velocity"]) / dt
@@ -48,7 +48,7 @@ def fill_walker(
 
 
 def fill_sign(rows: Rows, actor: Actor, sign: str, pole: int) -> None:
-    """Place and name of a light or sign, once."""
+    """Writes place and name of a light or sign into its row; once, as they stay."""
     row = rows.lights[actor.row]
     (x, y, z), (pitch, yaw, roll) = wire.transform(actor.pose)
     row["pose"] = (x, y, z, pitch, yaw, roll)
@@ -59,7 +59,10 @@ def fill_sign(rows: Rows, actor: Actor, sign: str, pole: int) -> None:
 def fill_vehicles(
     rows: Rows, actors: ActorTable, vehicles: Vehicles, posts: Posts, red: Flags
 ) -> None:
-    """Motion, drivers and what the road tells them, by columns. red: (n,) whom a sign holds."""
+    """Writes motion, drivers and what the road tells them, by columns; passes on speed limits.
+
+    red: (n,) whether a sign holds the vehicle, which is shown as a red light.
+    """
     n, moving = len(vehicles), vehicles.moving
     if n == 0:
         return
@@ -96,7 +99,10 @@ def _fill_controls(rows: Rows, at: NDArray[np.int64], vehicles: Vehicles) -> Non
 
 
 def _fill_governed(rows: Rows, at: NDArray[np.int64], signals: Signals, posts: Posts) -> None:
-    """The traffic light that each vehicle must obey."""
+    """Writes the traffic light that each vehicle must obey into the snapshot rows `at`.
+
+    signals (n,): rows of the signal table, as `moving.signs` gives them.
+    """
     states, has, ids = [], [], []
     for signal in signals.tolist():
         light = posts.lights.of_row.get(signal)

@@ -130,9 +130,9 @@ class ReferenceDriver:
         return sight_speed(road, view.visibility, self.person.reaction, allowed)
 
     def _lead(self, view: DriverView, place: Place, v: float) -> tuple[float, float]:
-        """Returns m to the nearest actor in the way and its m/s along it.
+        """Notes the view and returns m to the nearest actor in the way, and its m/s along the way.
 
-        (inf, 0) for none. Notes the view.
+        (inf, 0) where there is none.
         """
         self.views.append((view.tick, view.actors))
         if not len(view.actors.x):
@@ -146,9 +146,9 @@ class ReferenceDriver:
         return float(gaps[nearest]), max(float(speeds[nearest]), 0.0)
 
     def _line(self, view: DriverView, place: Place, v: float, m: Manner) -> float:
-        """Returns the m to the nearest line at which it stops, 0.1 at least, inf for none.
+        """Notes the lights and returns the m to the nearest line at which it stops.
 
-        Notes the lights.
+        0.1 at least; inf where it stops at none.
         """
         for signal, state in view.lights.items():
             self.lights[signal] = (view.tick, state)

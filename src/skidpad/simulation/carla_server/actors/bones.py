@@ -41,7 +41,10 @@ Place = tuple[float, float, float]
 
 
 def _skeleton() -> Iterator[tuple[str, str, Place]]:
-    """Name, parent and place of every bone below the root, parents first."""
+    """Yields name, parent and place of every bone below the root, parents first.
+
+    Places from the parent, in shares of the walker's height: forward, left, up.
+    """
     for name, (parent, *place) in TRUNK.items():
         yield name, parent, (place[0], place[1], place[2])
     for side, sign in (("__L", 1.0), ("__R", -1.0)):
@@ -60,7 +63,7 @@ def _skeleton() -> Iterator[tuple[str, str, Place]]:
 
 
 def _bone_name(name: str, side: str) -> str:
-    """The left shoulder has a name of its own in CARLA."""
+    """Returns the bone's name on a side; the left shoulder has a name of its own in CARLA."""
     return (name + side).replace("crl_shoulder__L", "ctrl_shoulder__L")
 
 
@@ -80,7 +83,7 @@ class Skeleton:
         self.pose |= {name: pose for name, pose in bones.items() if name in NAMES}
 
     def take(self) -> None:
-        """The animation's pose is the client's from now on."""
+        """Drops the bones that clients have set, so that all rest at the animation's pose again."""
         self.pose = {}
 
     def list_transforms(self, actor: Pose, height: float) -> list[list[Any]]:
@@ -119,7 +122,10 @@ def _row(name: str, world: Pose, component: Pose, relative: Pose) -> list[Any]:
 
 
 def parse_bones(value: Any) -> dict[str, Pose]:
-    """WalkerBoneControlIn: names and transforms seen from the parent bones."""
+    """Returns poses by bone name of a call's WalkerBoneControlIn, seen from the parent bones.
+
+    WireError for another shape.
+    """
     found = {}
     for bone in wire.items(wire.items(value, "bones", 1)[0], "bone_transforms"):
         name, place = wire.items(bone, "bone", 2)

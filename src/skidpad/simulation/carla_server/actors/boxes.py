@@ -35,8 +35,10 @@ class Boxes:
         )
 
     def spans(self, start: Vector, way: Vector) -> tuple[Floats, Floats]:
-        """(n,) where start + t way enters and leaves each box, as t (slab test); it misses those that
-        it would leave before it enters."""
+        """Returns (n,) where start + t way enters each box and (n,) where it leaves it, as t (slab test).
+
+        It misses those that it would leave before it enters; t may be negative.
+        """
         c, s = np.cos(self.pose[:, 3]), np.sin(self.pose[:, 3])
 
         def turned(v: Floats) -> Floats:

@@ -72,7 +72,7 @@ class Blueprint:
     label: SemanticClass = SemanticClass.NONE
 
     def pack(self, uid: int) -> list[Any]:
-        """Returns the blueprint as `ActorDefinition`."""
+        """Returns the blueprint as `ActorDefinition` with this number."""
         tags = ",".join(self.id.split("."))
         return [uid, self.id, tags, [a.pack() for a in self.attributes.values()]]
 
@@ -193,7 +193,7 @@ def _grip(actor: dict[str, Attribute]) -> Blueprint:
 
 
 def grip_in_force(blueprint: Blueprint, model: GripModel, mu_ref: float) -> Blueprint:
-    """Our own: its presence says that weather acts on grip here, and it says how (K-2).
+    """Returns the grip blueprint with attributes that tell clients how weather acts on grip here (K-2).
 
     Attributes: `ice_thickness` sets ice in percent of 20 mm; `weather_grip` and `mu_ref` are those
     of the server's command line, for clients to read.
@@ -233,7 +233,10 @@ def load_catalogue() -> dict[str, Blueprint]:
 
 
 def make_catalogue(grip: GripModel, mu_ref: float) -> dict[str, Blueprint]:
-    """Returns the catalogue; the blueprint `skidpad.weather.grip` says how weather acts on grip (K-2)."""
+    """Returns the blueprints by id that a server offers.
+
+    `skidpad.weather.grip` tells how weather acts on grip (K-2); it is missing under GripModel.NONE.
+    """
     everything = load_catalogue()
     if grip is GripModel.NONE:
         return {id: b for id, b in everything.items() if b.family is not Family.GRIP}
@@ -242,7 +245,11 @@ def make_catalogue(grip: GripModel, mu_ref: float) -> dict[str, Blueprint]:
 
 
 def choose_attributes(blueprint: Blueprint, given: Mapping[str, str]) -> dict[str, str]:
-    """Returns the attributes of a new actor: the client's where it gave some, else the defaults."""
+    """Returns the attributes of a new actor as texts: the client's where it gave some, else the defaults.
+
+    Those that are unknown or not to be modified are ignored; WireError for a value of a wrong type or
+    outside a restricted list.
+    """
     values = {a.id: a.recommended[0] for a in blueprint.attributes.values()}
     for name, value in given.items():
         attribute = blueprint.attributes.get(name)
@@ -257,7 +264,10 @@ def choose_attributes(blueprint: Blueprint, given: Mapping[str, str]) -> dict[st
 
 
 def _check_value(id: str, attribute: Attribute, value: str) -> str:
-    """Returns a value's text as its type is read from it: `64.0` is an int to clients, `5.9f` a float."""
+    """Returns a value's text as its type is read: `64.0` as an int is `64`, `5.9f` as a float `5.9`.
+
+    WireError where it cannot be read so, or is out of range.
+    """
     try:
         if attribute.type is AttributeType.FLOAT:
             text = value.strip().removesuffix("f")

@@ -35,7 +35,10 @@ def load_acting() -> Acting:
 
 
 def acting(blueprint: Blueprint) -> set[str]:
-    """Ids of the attributes that change something."""
+    """Returns the ids of a blueprint's attributes that change something.
+
+    Those that clients cannot modify are among them; of a sensor that sends nothing, `role_name` alone.
+    """
     if blueprint.family is Family.SENSOR and not is_produced(blueprint.id):
         return {"role_name"}
     table = load_acting()
@@ -45,7 +48,7 @@ def acting(blueprint: Blueprint) -> set[str]:
 
 
 def is_produced(sensor: str) -> bool:
-    """Tells whether a sensor of this kind sends anything."""
+    """Returns whether a sensor with this blueprint id sends anything, from here or in the client."""
     table = load_acting()
     return sensor in table.sensors or sensor in table.in_the_client
 
@@ -57,7 +60,10 @@ class Remarks:
         self.made: set[tuple[str, str]] = set()
 
     def remark(self, blueprint: Blueprint, given: Mapping[str, str]) -> None:
-        """given: what a client sent; defaults say nothing."""
+        """Logs each attribute of `given` that acts on nothing, once for each blueprint.
+
+        given: what a client sent; default values are not logged.
+        """
         known = acting(blueprint)
         for name, value in given.items():
             attribute = blueprint.attributes.get(name)

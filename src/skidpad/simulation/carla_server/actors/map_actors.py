@@ -26,13 +26,13 @@ LIGHT = Blueprint(
 
 
 def spectator(id: int, start: Pose) -> Actor:
-    """The free camera that every world has, above the first spawn point."""
+    """Returns the free camera that every world has, behind and above `start`."""
     blueprint = Blueprint("spectator", Family.SPECTATOR, {})
     return Actor(id, blueprint, {"role_name": "spectator"}, start.moved(forward=-8.0, up=4.0))
 
 
 def light_actor(id: int, post: Post) -> Actor:
-    """Makes the actor of a traffic light."""
+    """Returns the actor of a traffic light, whose box is its trigger volume."""
     actor = Actor(id, LIGHT, {"role_name": "default"}, post.pose)
     actor.half = (post.half_width, BOX_DEPTH, BOX_HEIGHT)
     return actor
@@ -48,7 +48,7 @@ class Sign:
 
 
 def signs_of(roads: RoadMap) -> Iterator[Sign]:
-    """All signs that clients know, each once."""
+    """Yields all signs that clients know (SIGNS), each once; limits with their km/h in the name."""
     signals = roads.signals
     seen = set()
     for row in range(len(signals.id)):
@@ -64,7 +64,7 @@ def signs_of(roads: RoadMap) -> Iterator[Sign]:
 
 
 def sign_actor(id: int, sign: Sign) -> Actor:
-    """Makes the actor of a traffic sign."""
+    """Returns the actor of a traffic sign."""
     blueprint = Blueprint(sign.name, Family.TRAFFIC_SIGN, {}, label=SemanticClass.TRAFFIC_SIGN)
     actor = Actor(id, blueprint, {"role_name": "default"}, sign.pose)
     actor.half = (BOX_DEPTH, BOX_DEPTH, BOX_HEIGHT)

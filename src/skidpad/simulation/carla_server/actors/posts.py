@@ -35,12 +35,12 @@ class Posts:
         return iter(self._by_actor.items())
 
     def add(self, actor: int, post: Post) -> None:
-        """The actor that stands for a light."""
+        """Notes which actor stands for a light."""
         self._by_actor[actor] = post
         self._actors[post.light.signal] = actor
 
     def light(self, actor: int) -> Light:
-        """Returns the light of an actor id."""
+        """Returns the light of an actor id; KeyError where it is none's."""
         return self._by_actor[actor].light
 
     def actor(self, light: Light) -> int:
@@ -49,7 +49,7 @@ class Posts:
 
 
 def posts_of(roads: RoadMap, lights: Lights) -> list[Post]:
-    """Posts of all lights, in the order of the map's signals."""
+    """Returns the posts of all lights, in the order of the map's signals."""
     found = []
     for group in lights.groups.values():
         for pole, light in enumerate(group.lights()):
@@ -58,7 +58,7 @@ def posts_of(roads: RoadMap, lights: Lights) -> list[Post]:
 
 
 def _stop_line(roads: RoadMap, light: Light) -> tuple[Pose, float]:
-    """Pose along the line across the lanes that a light governs, and half the line's length."""
+    """Returns the pose along the line across the lanes that a light governs, and half its length in m."""
     signals = roads.signals
     places = [roads.at(int(signals.lane[row]), float(signals.s[row])) for row in light.rows]
     middle = places[len(places) // 2].pose

@@ -64,11 +64,11 @@ class Actor:
 
     @property
     def lift(self) -> float:
-        """m of its origin above its feet: a walker's is the middle of its body, as in CARLA."""
+        """Height in m of its origin above its feet: a walker's is the middle of its body, as in CARLA."""
         return self.half[2] if self.family is Family.WALKER else 0.0
 
     def box(self) -> list[list[float]]:
-        """Returns its BoundingBox as it travels."""
+        """Returns its BoundingBox, seen from the actor, as it travels on the wire."""
         return wire.box(wire.iso_to_wire(self.centre), self.half)
 
     def description(self) -> list[Any]:
@@ -104,13 +104,13 @@ class ActorTable:
         return len(self.alive)
 
     def new_id(self) -> int:
-        """The next free id; CallError when there are too many."""
+        """Returns the next free id; CallError when there are MAX_ACTORS already."""
         if len(self.alive) >= MAX_ACTORS:
             raise CallError(f"the world is full: at most {MAX_ACTORS} actors")
         return next(self._ids)
 
     def add(self, actor: Actor) -> None:
-        """Adds a new actor to the table and to its parent's children."""
+        """Adds a new actor to the table and to its parent's children; CallError for an unknown parent."""
         self.alive[actor.id] = actor
         if actor.body is not None:
             self._by_body[actor.body] = actor
@@ -118,7 +118,10 @@ class ActorTable:
             self.get(actor.parent).children.append(actor.id)
 
     def remove(self, id: int) -> Actor:
-        """Take it out and keep its tombstone."""
+        """Takes an actor out, keeps its tombstone with its last pose, and returns it.
+
+        KeyError for one that does not live. Its children stay.
+        """
         actor = self.alive[id]
         actor.pose = self.pose(actor)
         del self.alive[id]
@@ -133,7 +136,10 @@ class ActorTable:
         return actor
 
     def get(self, id: Any, family: Family | None = None) -> Actor:
-        """The living actor with this id; CallError when there is none of that family."""
+        """Returns the living actor with this id; CallError when there is none, or of another family.
+
+        WireError for what is no integer.
+        """
         wire.integer(id, "actor id")
         actor = self.alive.get(id)
         if actor is None:
@@ -143,7 +149,7 @@ class ActorTable:
         return actor
 
     def find(self, id: Any) -> Actor | None:
-        """Returns the actor with this id, alive or dead; None if unknown, CallError if no integer."""
+        """Returns the actor with this id, alive or dead; None if unknown, WireError if no integer."""
         wire.integer(id, "actor id")
         return self.alive.get(id) or self.dead.get(id)
 
@@ -152,7 +158,7 @@ class ActorTable:
         return [a for a in self.alive.values() if a.family is family]
 
     def in_row(self, i: int) -> Actor:
-        """The actor whose body stands in row i of the moving world."""
+        """Returns the actor whose body stands in row i of the moving world."""
         return self._by_body[self._moving.members[i].id]
 
     def pose(self, actor: Actor) -> Pose:
@@ -163,7 +169,7 @@ class ActorTable:
         return replace(feet, z=feet.z + actor.lift) if actor.lift else feet
 
     def velocity(self, actor: Actor) -> Vector:
-        """m/s; what has no body stands still."""
+        """Returns the velocity of an actor in m/s, in the world; zeros for what has no body."""
         if actor.body is None:
             return STILL
         s, i = self._moving.states, self._moving.row(actor.body)
@@ -175,5 +181,5 @@ class ActorTable:
         return Box(self.pose(actor).moved(forward=x, left=y, up=z), actor.half)
 
     def carrier(self, actor: Actor) -> Actor | None:
-        """Whom it is attached to, while that lives."""
+        """Returns the actor that it is attached to; None for none, or one that lives no more."""
         return self.alive.get(actor.parent)

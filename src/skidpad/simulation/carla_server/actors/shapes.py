@@ -18,7 +18,10 @@ CENTIMETRE = 0.01  # m, unit of a trigger's extent
 
 
 def give_box(actor: Actor) -> None:
-    """Vehicles and props stand on their origin, walkers have it in their middle."""
+    """Sets centre and half extents of a new actor's box, by blueprint or, of a trigger, attributes.
+
+    Vehicles and props stand on their origin, others have it in their middle.
+    """
     length, width, height = actor.blueprint.size
     actor.half = (length / 2.0, width / 2.0, height / 2.0)
     if actor.family in (Family.VEHICLE, Family.PROP):
@@ -29,7 +32,7 @@ def give_box(actor: Actor) -> None:
 
 
 def body_of(actor: Actor) -> Newcomer:
-    """A walker or prop for the moving world, which nothing pushes."""
+    """Returns the body of a walker or prop for the moving world, which nothing pushes."""
     length, width, height = (2.0 * v for v in actor.half)
     shape = Shape(actor.blueprint.kind, length, width, height, float("inf"))
     return Newcomer(shape, type=actor.blueprint.id)
@@ -41,7 +44,10 @@ def is_flat(actor: Actor) -> bool:
 
 
 def is_taken(moving: World, feet: Pose, half: Vector) -> bool:
-    """Whether a body of the moving world stands where a box of that size shall stand."""
+    """Returns whether a body stands where a box of half extents `half` shall stand, feet at `feet`.
+
+    Overlaps of less than TOLERANCE do not count.
+    """
     s, b = moving.states, moving.bodies
     own = [max(0.0, v - TOLERANCE) for v in half[:2]]
     boxes = Boxes(

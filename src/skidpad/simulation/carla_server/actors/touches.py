@@ -21,7 +21,7 @@ class Touch:
 
 
 def touches(moving: World, actors: ActorTable) -> list[Touch]:
-    """All contacts of the last step, those between actors seen from both sides."""
+    """Returns all contacts of the last step, those between actors twice, seen from both sides."""
     c, found = moving.touching, []
     for k in range(moving.touches):
         x, y = float(c.impulse[k] * c.nx[k]), float(c.impulse[k] * c.ny[k])

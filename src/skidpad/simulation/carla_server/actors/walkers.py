@@ -20,7 +20,7 @@ class WalkerControl:
     jump: bool = False
 
     def velocity(self) -> tuple[float, float]:
-        """Returns the walker's velocity in the plane, m/s."""
+        """Returns the walker's velocity in the plane in m/s, V_MAX at most; zeros without a direction."""
         x, y, _ = self.direction
         length = hypot(x, y)
         if length < 1e-6:

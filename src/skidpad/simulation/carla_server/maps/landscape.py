@@ -75,7 +75,7 @@ class EnvironmentObject:
 
 @lru_cache(maxsize=4)
 def objects(roads: RoadMap) -> tuple[EnvironmentObject, ...]:
-    """Returns all objects of a map, with ids in a fixed order."""
+    """Returns all objects of a map, with ids in a fixed order; cached for four maps."""
     side = roads.roadside
     found = [*_boxes(side), *_heads(side), *_barriers(side)]
     return tuple(
@@ -127,7 +127,7 @@ def _barriers(side: Roadside) -> Iterator[Found]:
 
 
 def pieces(points: NDArray[np.float64]) -> Iterator[tuple[int, int]]:
-    """First and last point of each about straight piece of a line; neighbours share a point."""
+    """Yields first and last point of each about straight piece of a line; neighbours share a point."""
     first = 0
     while first < len(points) - 1:
         last = first + 1
@@ -138,7 +138,7 @@ def pieces(points: NDArray[np.float64]) -> Iterator[tuple[int, int]]:
 
 
 def _is_straight(part: NDArray[np.float64]) -> bool:
-    """Returns whether points (n, 2) in m deviate little from their chord and the chord is not too long."""
+    """Returns whether points (n, 2) lie within BULGE m of their chord, of LONGEST_PIECE m at most."""
     along = part[-1] - part[0]
     length = float(np.hypot(*along))
     if not 0.0 < length <= LONGEST_PIECE:
@@ -164,11 +164,11 @@ class Landscape:
             self.hidden.update(ids)
 
     def load(self, layers: int, on: bool) -> None:
-        """Bring layers back, or take them away."""
+        """Brings layers (bits) back, or takes them away; without layered maps it has no effect."""
         self.layers = self.layers | layers if on else self.layers & ~layers
 
     def missing(self) -> frozenset[int]:
-        """Ids of all that is not there at present."""
+        """Returns the ids of all objects that are not there at present: hidden, or of a layer taken away."""
         away = {label for label, bit in LAYERS.items() if self.layered and not self.layers & bit}
         if not away and not self.hidden:
             return frozenset()
@@ -177,13 +177,13 @@ class Landscape:
         )
 
     def present(self) -> tuple[EnvironmentObject, ...]:
-        """Returns the objects of the map that are not switched off."""
+        """Returns the objects of the map that are there at present."""
         missing = self.missing()
         return tuple(o for o in objects(self.whole) if o.id not in missing)
 
     @property
     def roads(self) -> RoadMap:
-        """Returns the map without the objects that are switched off."""
+        """The map without the objects that are not there; the same object until these change."""
         missing = self.missing()
         if missing != self._shown[0]:
             self._shown = missing, without(self.whole, missing) if missing else self.whole
@@ -191,7 +191,10 @@ class Landscape:
 
 
 def without(roads: RoadMap, missing: frozenset[int]) -> RoadMap:
-    """The same map with less beside the road."""
+    """Returns the same map with less beside the road, and another content hash.
+
+    missing: ids of objects.
+    """
     gone = [o.source for o in objects(roads) if o.id in missing]
     rows = {(s.kind, s.row) for s in gone if s.kind != "barriers"}
     cut: dict[int, list[Source]] = {}

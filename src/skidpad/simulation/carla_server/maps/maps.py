@@ -58,7 +58,7 @@ class ServedMap:
         return self.name.endswith(LAYERED)
 
     def prepare(self) -> None:
-        """Make the navigation mesh now: a client's first call does not wait for seconds."""
+        """Makes the navigation mesh now, so that a client's first call does not wait for seconds."""
         _ = self.navigation
 
     @property
@@ -95,7 +95,7 @@ class MapStore:
         self._text: str | None = None  # from copy_opendrive_to_file
 
     def names(self) -> list[str]:
-        """All that can be loaded, bundled ones first; each also under its layered name."""
+        """Returns all names that can be loaded, bundled ones first, then each also with layers (LAYERED)."""
         plain = self._plain_names()
         return [*plain, *(n + LAYERED for n in plain if n + LAYERED not in plain)]
 
@@ -105,13 +105,19 @@ class MapStore:
         return [*bundled_maps(), *(n for n in own if n not in bundled_maps())]
 
     def keep_text(self, xodr: str) -> None:
-        """OpenDRIVE text that a client wants to drive on."""
+        """Keeps OpenDRIVE text that a client wants to drive on, unread, as map OPENDRIVE_MAP.
+
+        CallError for more than MAX_XODR characters.
+        """
         if len(xodr) > MAX_XODR:
             raise CallError(f"OpenDRIVE text must be shorter than {MAX_XODR} characters")
         self._text = xodr
 
     def load(self, name: str) -> ServedMap:
-        """The map of that name; CallError `map not found` as CARLA says it."""
+        """Returns the map of that name with its scenery; CallError `map not found` as CARLA says it.
+
+        Folders before the name do not matter. CallError, too, for a client's text that is missing or faulty.
+        """
         short = name.rsplit("/", 1)[-1]
         if short == OPENDRIVE_MAP:
             if self._text is None:
@@ -137,7 +143,7 @@ class MapStore:
 
 
 def roads_from_text(xodr: str, name: str) -> RoadMap:
-    """Bake OpenDRIVE text; CallError when it is none."""
+    """Returns the baked map of OpenDRIVE text; CallError when it is none."""
     from skidpad.roads.opendrive.bake import bake
 
     try:
@@ -155,7 +161,7 @@ def _make_served_map(name: str, roads: RoadMap, xodr: str) -> ServedMap:
 
 
 def spawn_points(roads: RoadMap) -> list[Pose]:
-    """Poses on driving lanes outside junctions, every 25 m, a little above the road."""
+    """Returns poses on driving lanes outside junctions, SPACING m apart, LIFT m above the road."""
     found = []
     table = roads.lanes
     for lane in range(len(table.road)):

@@ -42,7 +42,7 @@ LINK_SIZE = 12
 
 
 def file_name(map_name: str, content: bytes) -> str:
-    """Named after its content, because clients keep files by name for ever."""
+    """Returns a file name by map and content, because clients keep files by name for ever."""
     return f"{map_name}-{hashlib.sha256(content).hexdigest()[:16]}.nav"
 
 
@@ -91,7 +91,7 @@ def _polygons(mesh: WalkMesh) -> NDArray[np.void]:
 
 
 def _details(sizes: list[int]) -> tuple[NDArray[np.void], NDArray[np.uint8]]:
-    """Triangulates each polygon for heights: a fan around its first corner.
+    """Returns details and triangles that triangulate each polygon: a fan around its first corner.
 
     A triangle's last byte says which of its edges lie on the polygon's outline, two bits for each.
     """
@@ -109,7 +109,10 @@ def _details(sizes: list[int]) -> tuple[NDArray[np.void], NDArray[np.uint8]]:
 def _tree(
     mesh: WalkMesh, points: NDArray[np.float32], low: NDArray[np.float32], cell: float
 ) -> NDArray[np.void]:
-    """Bounding boxes in depth-first order; a negative index skips that many nodes."""
+    """Returns bounding boxes in depth-first order; a negative index skips that many nodes.
+
+    low: corner of the mesh; cell: m of the raster.
+    """
     boxes = np.array(
         [
             np.concatenate((points[list(r)].min(axis=0), points[list(r)].max(axis=0)))
@@ -127,7 +130,10 @@ def _tree(
 
 
 def _grow(boxes: Boxes, members: NDArray[np.int64], nodes: list[tuple[Boxes, int]]) -> None:
-    """Appends a tree of boxes: an index is a polygon at leaves, minus the node's count elsewhere."""
+    """Appends a tree of boxes: an index is a polygon at leaves, minus the node's count elsewhere.
+
+    members: polygons below the node that is appended first.
+    """
     mine = boxes[members]
     around = np.concatenate((mine[:, :3].min(axis=0), mine[:, 3:].max(axis=0)))
     if len(members) == 1:

@@ -29,7 +29,10 @@ class Hit:
 def trace_ray(
     landscape: Landscape, actors: ActorTable, start: Vector, way: Vector, reach: float
 ) -> list[Hit]:
-    """Returns everything on a ray, near to far: actors, the map's objects, the road."""
+    """Returns everything on a ray, near to far: actors, the map's objects, the road; [] for no direction.
+
+    way: direction, of any length; reach: m, LONGEST_RAY at most.
+    """
     length = sum(v * v for v in way) ** 0.5
     if length == 0.0:
         return []
@@ -54,7 +57,7 @@ def _hit(start: Vector, unit: Vector, distance: float, label: int) -> Hit:
 
 
 def _onto_road(roads: RoadMap, start: Vector, unit: Vector, reach: float) -> float | None:
-    """Distance at which a ray goes through a road from above; None when it does not."""
+    """Returns the m at which a ray goes through a road from above; None when it does not."""
 
     def above(distance: float) -> float | None:
         x, y, z = (s + distance * u for s, u in zip(start, unit, strict=True))

@@ -21,7 +21,7 @@ def pack_actor(served: Served, actor: Actor) -> list[Any]:
 
 
 def parse_description(value: Any) -> Wanted:
-    """Returns blueprint id and attributes of a call's ActorDescription."""
+    """Returns blueprint id and attributes of a call's ActorDescription; WireError for another shape."""
     _, id, given = wire.items(value, "description", 3)
     values = {}
     for entry in wire.items(given, "description.attributes"):
@@ -44,14 +44,14 @@ def get_spectator(served: Served) -> list[Any]:
 
 @TABLE.method("get_actors_by_id")
 def get_actors_by_id(served: Served, ids: Any) -> list[Any]:
-    """Those that live, or are remembered, of these ids."""
+    """Returns those of these ids that live or are remembered; unknown ids are left out."""
     found = (served.episode.actors.find(id) for id in wire.items(ids, "ids"))
     return [pack_actor(served, actor) for actor in found if actor is not None]
 
 
 @TABLE.method("spawn_actor")
 def spawn_actor(served: Served, description: Any, transform: Any) -> list[Any]:
-    """Spawns an actor and returns it."""
+    """Spawns an actor and returns it as the wire sends it; CallError when something stands there."""
     pose = wire.pose(transform, "transform")
     return pack_actor(served, served.episode.spawn(parse_description(description), pose))
 
@@ -60,7 +60,7 @@ def spawn_actor(served: Served, description: Any, transform: Any) -> list[Any]:
 def spawn_actor_with_parent(
     served: Served, description: Any, transform: Any, parent: Any, kind: Any, socket: Any = ""
 ) -> list[Any]:
-    """A new actor that follows another."""
+    """Spawns an actor that follows another and returns it; the socket has no effect."""
     wire.text(socket, "socket")  # not modelled (listed)
     mount = wire.pose(transform, "transform")
     attachment = Attachment(wire.integer(kind, "attachment type", 0, max(Attachment)))
@@ -70,7 +70,10 @@ def spawn_actor_with_parent(
 
 @TABLE.method("destroy_actor")
 def destroy_actor(served: Served, id: Any) -> bool:
-    """False when there is no such actor; the client wants a truth value, not an error."""
+    """Destroys an actor; returns False when there is none or it cannot be destroyed.
+
+    The client wants a truth value, not an error.
+    """
     try:
         served.episode.destroy(wire.integer(id, "actor id"))
     except CallError:
@@ -80,14 +83,17 @@ def destroy_actor(served: Served, id: Any) -> bool:
 
 @TABLE.method("get_actor_bounding_box")
 def get_actor_bounding_box(served: Served, id: Any) -> list[Any]:
-    """Returns boxes of living and dead actors: an error would abort a client's Traffic Manager."""
+    """Returns the box of a living or dead actor; one of no size for an unknown id.
+
+    An error would abort a client's Traffic Manager.
+    """
     actor = served.episode.actors.find(id)
     return wire.box((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)) if actor is None else actor.box()
 
 
 @TABLE.method("get_traffic_sign_trigger_volume")
 def get_traffic_sign_trigger_volume(served: Served, id: Any) -> list[Any]:
-    """The box in front of a light or sign."""
+    """Returns the box in front of a light or sign, as of any actor."""
     return get_actor_bounding_box(served, id)
 
 

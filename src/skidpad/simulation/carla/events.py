@@ -45,7 +45,7 @@ class EgoEvents:
         self._invasions.append(event)
 
     def forget(self, tick: int) -> None:
-        """The ego was put somewhere else: the way there crossed nothing."""
+        """Ignores lane invasions for QUIET ticks: the ego was put elsewhere and crossed nothing."""
         self._quiet_until = tick + QUIET
 
     def remember(self, frame: int, states: ActorStates) -> None:

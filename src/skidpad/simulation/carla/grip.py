@@ -74,7 +74,10 @@ def in_force(blueprint: Any, setup: Setup) -> tuple[GripModel, float]:
 
 
 def prepare_grip(carla: Any, world: Any, setup: Setup) -> Grip:
-    """Look for the server's own model, and give it the ice; else compute the ratio once."""
+    """Returns how weather reaches the tyres: by the server's own model, or by a ratio that we set.
+
+    The server's model is told the ice, by an actor that stays in its world; notices say which holds.
+    """
     params = grip_params(setup.weather, setup.grip, setup.mu_ref)
     library = world.get_blueprint_library()
     emitter = next((b for name in BLUEPRINTS for b in library if b.id == name), None)

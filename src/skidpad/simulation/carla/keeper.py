@@ -44,9 +44,9 @@ class ServerKeeper:
         self._runs = 1
 
     def _start(self) -> None:
-        """Starts the server process and waits up to PATIENCE s until it answers.
+        """Starts the server process and waits until it answers.
 
-        Else stops it: BackendError.
+        After PATIENCE s without an answer it is stopped; BackendError.
         """
         try:
             self._process = subprocess.Popen(

@@ -240,7 +240,7 @@ class Session:
     def frame(self) -> SensorFrame:
         """Returns the frame of the ego's sensors at the present tick.
 
-        Call it once per tick, as noise is drawn.
+        Call it once per tick, as it draws noise.
         """
         seen, asked = self.reader.read(
             self.tick, self.messages, self.states, self.commands, self.light_states

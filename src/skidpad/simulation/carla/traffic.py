@@ -53,7 +53,7 @@ class Traffic:
         self.manager.set_boundaries_respawn_dormant_vehicles(NEAR, FAR)
 
     def top_up(self, world: Any, tick: int, ego: Pose) -> list[ActorRow]:
-        """Spawns vehicles that wait and returns those that entered now."""
+        """Spawns vehicles that wait, every TOP_UP_EVERY ticks, and returns those that entered now."""
         if not self._waiting or tick % TOP_UP_EVERY:
             return []
         points = places_around(world, ego, stream(self._seed, "traffic", "top up", tick))

@@ -31,7 +31,10 @@ class ServerPacer:
         return time.monotonic() - self._begin
 
     async def run(self, idle_exit: float | None = None) -> None:
-        """Ticks until cancelled, or until no client was connected for `idle_exit` s."""
+        """Ticks in real time until cancelled, or until no client was connected for `idle_exit` s.
+
+        While clients tick it only looks every IDLE s. A delay of more than BEHIND s is not caught up.
+        """
         due = time.monotonic()
         seen = due
         while True:

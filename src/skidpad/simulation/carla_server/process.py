@@ -45,7 +45,7 @@ class ServerProcess:
         raise BackendError(f"skidpad carla-server did not start: {''.join(said)[-2000:]}")
 
     def _drain(self) -> None:
-        """Read on, so that the server never blocks on a full pipe."""
+        """Reads on to the end of the output, so that the server never blocks on a full pipe."""
         assert self._process.stdout is not None
         for _ in self._process.stdout:
             pass

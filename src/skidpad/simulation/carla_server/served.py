@@ -49,11 +49,17 @@ class Served:
         self._publish_snapshot()
 
     def _latest(self, stream: int) -> bytes | None:
-        """A second client in synchronous mode gets the newest snapshot at once."""
+        """Returns the newest snapshot for its stream, None for others.
+
+        So a second client in synchronous mode gets it at once.
+        """
         return self.last_snapshot if stream == EPISODE_STREAM else None
 
     def load(self, name: str, reset_settings: bool, layers: int = ALL_LAYERS) -> None:
-        """Another map, or with "" the same one anew; a map that cannot be served changes nothing."""
+        """Loads another map, or with "" the same one anew; a map that cannot be served changes nothing.
+
+        CallError for that.
+        """
         map = self.episode.map if name == "" else self.maps.load(name)
         episode = Episode(map, self.stock, self.clock, layers)
         self.hub.hold(EPISODE_STREAM)
@@ -71,7 +77,7 @@ class Served:
         self.episode.moving.set_step(settings.step)
 
     def tick(self) -> int:
-        """Advance by one step; the frame that is now the newest."""
+        """Advances by one step, publishes snapshot and sensors, and returns the new frame's number."""
         clock, episode = self.clock, self.episode
         clock.advance()
         episode.move(clock.step)
@@ -88,7 +94,7 @@ class Served:
         return clock.frame
 
     def _publish_snapshot(self) -> None:
-        """Makes the snapshot of the tick and publishes it where the episode stream has listeners."""
+        """Makes the snapshot of the tick, keeps it, and publishes it where it has listeners."""
         lights = self.episode.moving.lights.by_id
         bits = snapshot.MAP_CHANGED if self._map_changed else 0
         if lights != self._lights_told:

@@ -35,7 +35,7 @@ class ResumeProtocol:
 
     @property
     def active(self) -> bool:
-        """Returns whether the speed cap after a stop holds (A-174, A-176)."""
+        """Whether the cap after a stop holds, for a time or until the first curve ends (A-174, A-176)."""
         if self.ticks is None:
             return False
         if self.ticks < self.duration:

@@ -44,7 +44,7 @@ class ServedMap:
     spawn_points: tuple[Pose, ...]
 
     def geolocation(self, x: float, y: float) -> tuple[float, float]:
-        """(latitude, longitude) in deg of a place in m, as clients of 0.9.16 convert it themselves."""
+        """Returns (latitude, longitude) in deg of a place in m, as clients of 0.9.16 compute it."""
         return client_geolocation(x, y, *(map_origin(self.roads.geo_reference) or CLIENT_ORIGIN))
 
     @property

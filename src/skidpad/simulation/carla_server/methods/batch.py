@@ -23,7 +23,7 @@ def _destroy(served: Served, id: Any) -> None:
 
 
 def _nothing(_: Served, *__: Any) -> None:
-    """Accepted without effect: the Traffic Manager lives in the client, nothing is drawn."""
+    """Does nothing: the Traffic Manager lives in the client, and nothing is drawn."""
 
 
 # Variant index of the command, and what it does with the command's members; 0, spawning, is apart.
@@ -55,7 +55,10 @@ SPAWN = 0
 
 @TABLE.method("apply_batch", Shape.PLAIN)
 def apply_batch(served: Served, commands: Any, do_tick: Any) -> list[Any]:
-    """Applies the commands; each gives its actor's id or its error."""
+    """Applies the commands in order; returns for each its actor's id or its error, as on the wire.
+
+    do_tick: ticks once afterwards, in synchronous mode only.
+    """
     outcomes = [_outcome(served, c) for c in wire.items(commands, "commands")]
     if wire.flag(do_tick, "do_tick") and served.clock.settings.synchronous:
         served.tick()
@@ -72,7 +75,10 @@ def _outcome(served: Served, command: Any) -> list[Any]:
 
 
 def run(served: Served, variant: Any, depth: int = 0) -> int:
-    """One command; the actor id that it is about, 0 when there is none."""
+    """Runs one command and returns the actor id that it is about, 0 when there is none.
+
+    WireError or CallError where it cannot be done. depth: of spawn commands around it.
+    """
     index, body = wire.items(variant, "command", 2)
     number = wire.integer(index, "command", 0, max(COMMANDS))
     members = wire.items(body, "command body")
@@ -87,12 +93,18 @@ def run(served: Served, variant: Any, depth: int = 0) -> int:
 
 
 def _attachment(kind: Any) -> Attachment:
-    """The client's spawn command leaves this member unset unless told, so chance values arrive."""
+    """Returns the attachment, RIGID for any other value.
+
+    The client's spawn command leaves this member unset unless told, so chance values arrive.
+    """
     return Attachment(kind) if kind in tuple(Attachment) else Attachment.RIGID
 
 
 def _spawn(served: Served, members: list[Any], depth: int) -> int:
-    """Spawns an actor, runs the commands that follow for it (one that fails is skipped), returns its id."""
+    """Spawns an actor, runs the commands that follow for it, and returns its id.
+
+    One of those that cannot be done (CallError) is skipped. WireError beyond MAX_DEPTH.
+    """
     if len(members) != 6 or depth > MAX_DEPTH:
         raise wire.WireError("a spawn command has six members and is nested at most four deep")
     description, transform, parent, kind, socket, after = members

@@ -23,19 +23,22 @@ TABLE = Table("episode")
 
 @TABLE.method("version")
 def version(_: Served) -> str:
-    """The version whose protocol is spoken."""
+    """Returns the version whose protocol is spoken."""
     return VERSION
 
 
 @TABLE.method("get_episode_info")
 def get_episode_info(served: Served) -> list[Any]:
-    """Episode id and the token of the snapshots."""
+    """Returns the episode's id and a token of the snapshots."""
     return [served.clock.episode, [served.hub.episode_token()]]
 
 
 @TABLE.method("get_sensor_token")
 def get_sensor_token(served: Served, stream: Any) -> list[bytes]:
-    """The token of a stream, asked for before every subscription."""
+    """Returns the token of a stream, asked for before every subscription; ticks wait for that.
+
+    CallError for an unknown stream.
+    """
     number = wire.integer(stream, "stream id", 0, 2**32 - 1)
     if not served.hub.exists(number):
         raise CallError(f"stream {number} not found")
@@ -54,7 +57,7 @@ def _colour_camera(served: Served, id: Any) -> Sensor:
 
 @TABLE.method("get_gbuffer_token")
 def get_gbuffer_token(served: Served, id: Any, texture: Any) -> bytes:
-    """The token of a texture's stream, asked for before each subscription and each end of one."""
+    """Returns the token of a texture's stream, asked for before each subscription and each end of one."""
     sensor = _colour_camera(served, id)
     number = wire.integer(texture, "G-buffer", 0, max(Texture))
     stream = stream_of(sensor, number, served.hub)
@@ -77,7 +80,7 @@ def are_gbuffers_enabled(served: Served, id: Any) -> bool:
 
 @TABLE.method("console_command", without_effect="there is no console")
 def console_command(_: Served, *__: Any) -> bool:
-    """Accepts any command and does nothing, as there is no console."""
+    """Returns True for any command and does nothing, as there is no console."""
     return True
 
 
@@ -89,14 +92,17 @@ def get_episode_settings(served: Served) -> list[Any]:
 
 @TABLE.method("set_episode_settings")
 def set_episode_settings(served: Served, settings: Any) -> int:
-    """Sets what holds from the next tick on; returns the number of the current frame."""
+    """Sets what holds from the next tick on; returns the number of the current frame.
+
+    WireError for settings out of range.
+    """
     served.apply(parse_settings(settings))
     return served.clock.frame
 
 
 @TABLE.method("tick_cue")
 def tick_cue(served: Served) -> int:
-    """Ticks once in synchronous mode; in asynchronous mode the pacer ticks. Returns the new frame.
+    """Ticks once in synchronous mode, and returns the new frame; in asynchronous mode the pacer ticks.
 
     Right after a batch that destroyed sensors which were stopped just before, it returns the frame
     before the tick. The 0.9.16 client holds Python's lock in `apply_batch_sync(commands, True)` while
@@ -126,7 +132,10 @@ def is_sensor_enabled_for_ros(_: Served, __: Any) -> bool:
 
 @TABLE.method("send", Shape.VOID)
 def send(served: Served, id: Any, message: Any) -> None:
-    """Radio a text in the next tick, from a sensor of clients' own messages."""
+    """Queues a text that a sensor of clients' own messages radios in the next tick.
+
+    CallError for any other actor.
+    """
     actor = served.episode.actors.get(id, Family.SENSOR)
     sensor = served.episode.sensors.of(actor.id)
     if sensor is None or not isinstance(sensor.equipment, Station):

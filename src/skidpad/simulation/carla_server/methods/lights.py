@@ -16,7 +16,7 @@ LONGEST = 1.0e6  # s
 
 
 def light_of(served: Served, id: Any) -> Light:
-    """Returns the traffic light with this actor id."""
+    """Returns the traffic light with this actor id; CallError where there is none."""
     episode = served.episode
     return episode.posts.light(episode.actors.get(id, Family.TRAFFIC_LIGHT).id)
 
@@ -32,7 +32,7 @@ def _group(served: Served, id: Any) -> Group:
 
 
 def parse_state(value: Any) -> LightState:
-    """Parses the state of a traffic light."""
+    """Returns the state of a traffic light from its number on the wire, 0 to 4; else WireError."""
     return LightState(wire.integer(value, "traffic light state", 0, 4))
 
 
@@ -43,27 +43,27 @@ def _seconds(value: Any) -> float:
 
 @TABLE.method("set_traffic_light_state", Shape.VOID)
 def set_traffic_light_state(served: Served, id: Any, state: Any) -> None:
-    """Now; its timer starts anew."""
+    """Sets a light's state at once; its timer starts anew."""
     _lights(served).set_state(light_of(served, id), parse_state(state))
 
 
 @TABLE.method("set_traffic_light_green_time", Shape.VOID)
 def set_traffic_light_green_time(served: Served, id: Any, seconds: Any) -> None:
-    """s, of all lights that change together with it."""
+    """Sets the green time in s of all lights that change together with this one."""
     for light in _lights(served).phase_of(light_of(served, id)):
         light.green = _seconds(seconds)
 
 
 @TABLE.method("set_traffic_light_yellow_time", Shape.VOID)
 def set_traffic_light_yellow_time(served: Served, id: Any, seconds: Any) -> None:
-    """s, of all lights that change together with it."""
+    """Sets the yellow time in s of all lights that change together with this one."""
     for light in _lights(served).phase_of(light_of(served, id)):
         light.yellow = _seconds(seconds)
 
 
 @TABLE.method("set_traffic_light_red_time", Shape.VOID)
 def set_traffic_light_red_time(served: Served, id: Any, seconds: Any) -> None:
-    """s, of all lights that change together with it."""
+    """Sets the red time in s of all lights that change together with this one."""
     for light in _lights(served).phase_of(light_of(served, id)):
         light.red = _seconds(seconds)
 
@@ -94,13 +94,13 @@ def reset_all_traffic_lights(served: Served) -> None:
 
 @TABLE.method("get_group_traffic_lights")
 def get_group_traffic_lights(served: Served, id: Any) -> list[int]:
-    """Ids of the lights of its junction."""
+    """Returns the actor ids of the lights of its junction, its own included."""
     return [served.episode.posts.actor(light) for light in _group(served, id).lights()]
 
 
 @TABLE.method("get_light_boxes")
 def get_light_boxes(served: Served, id: Any) -> list[Any]:
-    """Boxes of its heads in the world."""
+    """Returns the boxes of its heads in the world; [] where the map draws none."""
     light = light_of(served, id)
     boxes = []
     for head in served.episode.map.roads.roadside.heads:

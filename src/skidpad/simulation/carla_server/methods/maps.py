@@ -18,13 +18,13 @@ NAVIGATION = "Nav"  # folder
 
 @TABLE.method("get_available_maps")
 def get_available_maps(served: Served) -> list[str]:
-    """All maps, as CARLA's content paths."""
+    """Returns all maps, as CARLA's content paths."""
     return [f"/Game/{PREFIX}{name}" for name in served.maps.names()]
 
 
 @TABLE.method("get_map_info")
 def get_map_info(served: Served) -> list[Any]:
-    """Name and recommended spawn points."""
+    """Returns name and recommended spawn points of the map."""
     return [
         served.episode.map.full_name,
         [wire.transform(p) for p in served.episode.map.spawn_points],
@@ -39,7 +39,7 @@ def get_map_data(served: Served) -> str:
 
 @TABLE.method("load_new_episode", Shape.VOID)
 def load_new_episode(served: Served, name: Any, reset: Any, layers: Any = ALL_LAYERS) -> None:
-    """Another map; "" loads the current one anew."""
+    """Loads another map, or with "" the current one anew; CallError for an unknown one."""
     served.load(
         wire.text(name, "map name"),
         wire.flag(reset, "reset_settings"),
@@ -49,14 +49,17 @@ def load_new_episode(served: Served, name: Any, reset: Any, layers: Any = ALL_LA
 
 @TABLE.method("copy_opendrive_to_file", Shape.VOID)
 def copy_opendrive_to_file(served: Served, xodr: Any, parameters: Any) -> None:
-    """OpenDRIVE text that the next load shall use; mesh parameters have no effect."""
+    """Keeps OpenDRIVE text that the next load shall use; mesh parameters have no effect."""
     wire.items(parameters, "opendrive parameters")
     served.maps.keep_text(wire.text(xodr, "OpenDRIVE", MAX_XODR))
 
 
 @TABLE.method("get_required_files")
 def get_required_files(served: Served, folder: Any) -> list[str]:
-    """The navigation mesh, in its folder; clients build their other caches themselves."""
+    """Returns the name of the navigation mesh, for its folder alone.
+
+    Clients build other caches themselves.
+    """
     navigation = (
         served.episode.map.navigation if wire.text(folder, "folder") == NAVIGATION else None
     )
@@ -65,7 +68,10 @@ def get_required_files(served: Served, folder: Any) -> list[str]:
 
 @TABLE.method("request_file")
 def request_file(served: Served, name: Any) -> bytes:
-    """The navigation mesh, or a file of the data folder (decision K-8)."""
+    """Returns the content of the navigation mesh, or of a file of the data folder (decision K-8).
+
+    CallError for one that there is not, or of more than MAX_FILE bytes.
+    """
     asked = wire.text(name, "file name")
     navigation = served.episode.map.navigation
     if navigation is not None and navigation[0] == asked:
@@ -85,13 +91,13 @@ def get_navigation_mesh(served: Served) -> bytes:
 
 @TABLE.method("load_map_layer", Shape.VOID)
 def load_map_layer(served: Served, layers: Any) -> None:
-    """Objects of these layers come back, on maps with a layered name."""
+    """Brings the objects of these layers back, on maps with a layered name."""
     _layer(served, layers, on=True)
 
 
 @TABLE.method("unload_map_layer", Shape.VOID)
 def unload_map_layer(served: Served, layers: Any) -> None:
-    """Removes the objects of these layers for all clients."""
+    """Removes the objects of these layers for all clients, on maps with a layered name."""
     _layer(served, layers, on=False)
 
 

@@ -19,14 +19,14 @@ BELONGS_TO_MAP = (Family.TRAFFIC_LIGHT, Family.TRAFFIC_SIGN)
 
 
 def place_actor(served: Served, actor: Actor, pose: Pose) -> None:
-    """Places an actor; actors of the map cannot be placed."""
+    """Places an actor; CallError for one of the map."""
     if actor.family in BELONGS_TO_MAP:
         raise CallError(f"actor {actor.id} belongs to the map and stays where it is")
     served.episode.place(actor, pose)
 
 
 def _vehicle(served: Served, id: Any) -> Vehicle | None:
-    """The vehicle to push; None when it is of another family or gone, which CARLA ignores."""
+    """Returns the vehicle to push; None when it is of another family or gone, which CARLA ignores."""
     vehicles = served.episode.vehicles
     wire.integer(id, "actor id")
     return vehicles.of(id) if id in vehicles else None
@@ -40,7 +40,7 @@ def set_actor_transform(served: Served, id: Any, transform: Any) -> None:
 
 @TABLE.method("set_actor_location", Shape.VOID)
 def set_actor_location(served: Served, id: Any, location: Any) -> None:
-    """Put it there with the attitude that it has."""
+    """Puts an actor at a location with the attitude that it has."""
     actor = served.episode.actors.get(id)
     x, y, z = wire.iso_vector(location, "location")
     base = actor.mount if actor.parent else served.episode.actors.pose(actor)
@@ -49,7 +49,7 @@ def set_actor_location(served: Served, id: Any, location: Any) -> None:
 
 @TABLE.method("set_walker_state", Shape.VOID)
 def set_walker_state(served: Served, id: Any, transform: Any, speed: Any) -> None:
-    """Place of its feet, and speed, in one, as the client's pedestrian navigation tells them."""
+    """Sets place of its feet and speed of a walker, as the client's pedestrian navigation sends them."""
     actor = served.episode.actors.get(id, Family.WALKER)
     pose, v = wire.pose(transform, "transform"), wire.number(speed, "speed")
     place_actor(served, actor, pose.moved(up=actor.lift))
@@ -59,7 +59,7 @@ def set_walker_state(served: Served, id: Any, transform: Any, speed: Any) -> Non
 
 @TABLE.method("set_actor_target_velocity", Shape.VOID)
 def set_actor_target_velocity(served: Served, id: Any, velocity: Any) -> None:
-    """Sets an actor's velocity, in axes of the world."""
+    """Sets a vehicle's velocity, in axes of the world; other actors are left alone."""
     v = wire.iso_vector(velocity, "velocity")
     vehicle = _vehicle(served, id)
     if vehicle is not None:
@@ -71,7 +71,7 @@ def set_actor_target_velocity(served: Served, id: Any, velocity: Any) -> None:
 
 @TABLE.method("set_actor_target_angular_velocity", Shape.VOID)
 def set_actor_target_angular_velocity(served: Served, id: Any, turn: Any) -> None:
-    """deg/s; only the part about the vertical acts."""
+    """Sets a vehicle's turn, given in deg/s; only the part about the vertical acts."""
     rate = wire.iso_turn(turn, "angular velocity")
     vehicle, moving = _vehicle(served, id), served.episode.moving
     if vehicle is not None:
@@ -80,7 +80,7 @@ def set_actor_target_angular_velocity(served: Served, id: Any, turn: Any) -> Non
 
 @TABLE.method("enable_actor_constant_velocity", Shape.VOID)
 def enable_actor_constant_velocity(served: Served, id: Any, velocity: Any) -> None:
-    """Body axes; kept against all forces."""
+    """Holds a vehicle's velocity, given in axes of its body, against all forces."""
     v = wire.iso_vector(velocity, "velocity")
     vehicle = _vehicle(served, id)
     if vehicle is not None:
@@ -89,7 +89,7 @@ def enable_actor_constant_velocity(served: Served, id: Any, velocity: Any) -> No
 
 @TABLE.method("disable_actor_constant_velocity", Shape.VOID)
 def disable_actor_constant_velocity(served: Served, id: Any) -> None:
-    """Hands the actor's velocity back to physics."""
+    """Hands a vehicle's velocity back to physics."""
     vehicle = _vehicle(served, id)
     if vehicle is not None:
         served.episode.moving.hold_velocity(vehicle.body, None)
@@ -97,31 +97,31 @@ def disable_actor_constant_velocity(served: Served, id: Any) -> None:
 
 @TABLE.method("add_actor_impulse", Shape.VOID)
 def add_actor_impulse(served: Served, id: Any, impulse: Any) -> None:
-    """N s at the centre of gravity."""
+    """Applies an impulse in N s at a vehicle's centre of gravity."""
     push(served, id, impulse, None, 1.0)
 
 
 @TABLE.method("add_actor_impulse_at_location", Shape.VOID)
 def add_actor_impulse_at_location(served: Served, id: Any, impulse: Any, location: Any) -> None:
-    """N s at a point of the world."""
+    """Applies an impulse in N s at a point of the world."""
     push(served, id, impulse, location, 1.0)
 
 
 @TABLE.method("add_actor_force", Shape.VOID)
 def add_actor_force(served: Served, id: Any, force: Any) -> None:
-    """Applies a force in N for one tick."""
+    """Applies a force in N for one tick at a vehicle's centre of gravity."""
     push(served, id, force, None, served.clock.step)
 
 
 @TABLE.method("add_actor_force_at_location", Shape.VOID)
 def add_actor_force_at_location(served: Served, id: Any, force: Any, location: Any) -> None:
-    """N for one tick at a point of the world."""
+    """Applies a force in N for one tick at a point of the world."""
     push(served, id, force, location, served.clock.step)
 
 
 @TABLE.method("add_actor_angular_impulse", Shape.VOID)
 def add_actor_angular_impulse(served: Served, id: Any, impulse: Any) -> None:
-    """kg m^2 deg/s as CARLA has it; only the part about the vertical acts."""
+    """Applies kg m^2 deg/s as CARLA has it; only the part about the vertical acts."""
     twist(served, id, impulse, 1.0)
 
 
@@ -132,7 +132,10 @@ def add_actor_torque(served: Served, id: Any, torque: Any) -> None:
 
 
 def push(served: Served, id: Any, amount: Any, location: Any | None, seconds: float) -> None:
-    """An impulse of `amount` times `seconds` on a vehicle."""
+    """Applies an impulse of `amount` times `seconds` to a vehicle; does nothing to other actors.
+
+    location: point of the world, None: the centre of gravity.
+    """
     x, y, z = wire.iso_vector(amount, "impulse or force")
     point = None if location is None else wire.iso_vector(location, "location")
     vehicle = _vehicle(served, id)
@@ -143,7 +146,7 @@ def push(served: Served, id: Any, amount: Any, location: Any | None, seconds: fl
 
 
 def twist(served: Served, id: Any, amount: Any, seconds: float) -> None:
-    """An angular impulse of `amount` times `seconds` on a vehicle."""
+    """Applies an angular impulse of `amount` times `seconds` to a vehicle; nothing to other actors."""
     moment = wire.iso_turn(amount, "torque")
     vehicle = _vehicle(served, id)
     if vehicle is not None:
@@ -159,7 +162,7 @@ def set_actor_simulate_physics(served: Served, id: Any, enabled: Any) -> None:
 
 @TABLE.method("set_actor_collisions", Shape.VOID)
 def set_actor_collisions(served: Served, id: Any, enabled: Any) -> None:
-    """Switches contacts; off, it passes through everything, as clients do with the walkers they guide."""
+    """Switches a vehicle's contacts; off, it passes through everything. Nothing changes for others."""
     on = wire.flag(enabled, "enabled")
     vehicle = _vehicle(served, served.episode.actors.get(id).id)
     if vehicle is not None:

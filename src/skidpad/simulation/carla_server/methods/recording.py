@@ -15,7 +15,10 @@ KIND_LETTERS = ("o", "v", "w", "t", "h", "a")  # other, vehicle, walker, traffic
 
 @TABLE.method("start_recorder")
 def start_recorder(served: Served, name: Any, additional: Any = False) -> str:
-    """Starts a recording; the server needs --data-dir for it."""
+    """Starts a recording and returns CARLA's words for it; CallError without --data-dir.
+
+    FileError where the file cannot be written.
+    """
     wire.flag(additional, "additional_data")
     return served.recorder.start(
         wire.text(name, "file name"), served.episode.map.name, served.clock
@@ -24,7 +27,7 @@ def start_recorder(served: Served, name: Any, additional: Any = False) -> str:
 
 @TABLE.method("stop_recorder", Shape.VOID)
 def stop_recorder(served: Served) -> None:
-    """Stops the recording that runs."""
+    """Stops the recording that runs, if any."""
     served.recorder.stop()
 
 
@@ -43,7 +46,7 @@ def show_recorder_collisions(served: Served, name: Any, first: Any, second: Any)
 
 
 def _actor_kind(value: Any) -> str:
-    """Returns the letter of a kind; the client sends it as a character's number."""
+    """Returns the letter of a kind; the client sends it as a character's number. CallError for others."""
     letter = chr(value) if isinstance(value, int) and 0 < value < 128 else value
     if letter not in KIND_LETTERS:
         raise CallError(f"a kind of actor is one of {', '.join(KIND_LETTERS)}, got {value!r:.20}")
@@ -61,7 +64,11 @@ def show_recorder_actors_blocked(served: Served, name: Any, seconds: Any, distan
 def replay_file(
     served: Served, name: Any, start: Any, duration: Any, follow: Any = 0, *without_effect: Any
 ) -> str:
-    """Begin; neither recorded sensors nor an offset of the followed view are served."""
+    """Starts a replay, loading its map if need be, and returns CARLA's words for it.
+
+    start, duration: s. Neither recorded sensors nor an offset of the followed view are served.
+    CallError where the file is no recording.
+    """
     del without_effect
     asked = wire.text(name, "file name")
     begin, length = wire.number(start, "time_start"), wire.number(duration, "duration")
@@ -79,13 +86,13 @@ def replay_file(
 
 @TABLE.method("stop_replayer", Shape.VOID)
 def stop_replayer(served: Served, keep_actors: Any) -> None:
-    """End; actors that the recording lets vanish do so unless they are kept."""
+    """Ends the replay; actors that the recording lets vanish do so unless they are kept."""
     served.replayer.stop(wire.flag(keep_actors, "keep_actors"))
 
 
 @TABLE.method("set_replayer_time_factor", Shape.VOID)
 def set_replayer_time_factor(served: Served, factor: Any) -> None:
-    """Sets how much faster than recorded a replay runs."""
+    """Sets how much faster than recorded a replay runs; CallError outside of (0, MAX_FACTOR]."""
     wanted = wire.number(factor, "time_factor")
     if not 0.0 < wanted <= MAX_FACTOR:
         raise CallError(f"time_factor must be in (0, {MAX_FACTOR:g}], got {wanted:g}")
@@ -100,5 +107,5 @@ def set_replayer_ignore_hero(served: Served, ignore: Any) -> None:
 
 @TABLE.method("set_replayer_ignore_spectator", Shape.VOID)
 def set_replayer_ignore_spectator(served: Served, ignore: Any) -> None:
-    """Leave the spectator where it is."""
+    """Sets whether a replay leaves the spectator where it is."""
     served.replayer.ignore_spectator = wire.flag(ignore, "ignore_spectator")

@@ -18,7 +18,7 @@ NO_PAINT = "the map's surfaces cannot be painted"
 
 @TABLE.method("draw_debug_shape", Shape.VOID)
 def draw_debug_shape(served: Served, shape: Any) -> None:
-    """Kept for its life time."""
+    """Keeps a debug shape for its life time; nothing is drawn."""
     served.episode.debug.draw(shape)
 
 
@@ -42,13 +42,13 @@ def _objects_with_tag(served: Served, tag: Any) -> list[EnvironmentObject]:
 
 @TABLE.method("get_all_level_BBs")
 def get_all_level_bbs(served: Served, tag: Any) -> list[Any]:
-    """Boxes of what belongs to the map, by tag."""
+    """Returns the boxes of what belongs to the map and has a tag, hidden objects too."""
     return [o.box() for o in _objects_with_tag(served, tag)]
 
 
 @TABLE.method("get_environment_objects")
 def get_environment_objects(served: Served, tag: Any) -> list[Any]:
-    """What belongs to the map, by tag."""
+    """Returns what belongs to the map and has a tag, hidden objects too."""
     return [o.pack() for o in _objects_with_tag(served, tag)]
 
 
@@ -62,7 +62,7 @@ def enable_environment_objects(served: Served, ids: Any, enable: Any) -> None:
 
 @TABLE.method("get_names_of_all_objects")
 def get_names_of_all_objects(served: Served) -> list[str]:
-    """Names of what belongs to the map."""
+    """Returns the names of what belongs to the map."""
     return [o.name for o in objects(served.episode.map.roads)]
 
 
@@ -73,7 +73,7 @@ def _trace_ray(served: Served, start: Vector, way: Vector, reach: float) -> list
 
 @TABLE.method("project_point")
 def project_point(served: Served, location: Any, direction: Any, distance: Any) -> list[Any]:
-    """[hit, [location, label]] of the first thing on a ray."""
+    """Returns [hit, [location, label]] of the first thing on a ray; False and zeros for none."""
     start = wire.iso_vector(location, "location")
     way = wire.iso_vector(direction, "direction")
     hits = _trace_ray(served, start, way, wire.number(distance, "distance"))
@@ -84,7 +84,7 @@ def project_point(served: Served, location: Any, direction: Any, distance: Any) 
 
 @TABLE.method("cast_ray")
 def cast_ray(served: Served, start: Any, end: Any) -> list[Any]:
-    """All things between two points, near to far."""
+    """Returns [location, label] of all things between two points, near to far."""
     a, b = wire.iso_vector(start, "start"), wire.iso_vector(end, "end")
     way = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
     length = sum(v * v for v in way) ** 0.5

@@ -13,20 +13,20 @@ MOST = 1000
 
 @TABLE.method("is_traffic_manager_running")
 def is_traffic_manager_running(served: Served, port: Any) -> bool:
-    """Whether one registered with this port."""
+    """Returns whether a Traffic Manager has registered with this port."""
     return port in served.managers.by_port if isinstance(port, int) else False
 
 
 @TABLE.method("get_traffic_manager_running")
 def get_traffic_manager_running(served: Served, port: Any) -> list[Any]:
-    """Returns address and port of a Traffic Manager that runs."""
+    """Returns address and port of a Traffic Manager that runs; ["", 0] where there is none."""
     known = served.managers.by_port.get(port) if isinstance(port, int) else None
     return ["", 0] if known is None else [known, port]
 
 
 @TABLE.method("add_traffic_manager_running")
 def add_traffic_manager_running(served: Served, address: Any) -> bool:
-    """Register one; False when the port is taken."""
+    """Registers a Traffic Manager; returns False when the port is taken, or MOST are there."""
     if not (isinstance(address, list) and len(address) == 2 and isinstance(address[1], int)):
         return False
     known = served.managers.by_port
@@ -38,5 +38,5 @@ def add_traffic_manager_running(served: Served, address: Any) -> bool:
 
 @TABLE.method("destroy_traffic_manager")
 def destroy_traffic_manager(served: Served, port: Any) -> bool:
-    """Forgets the Traffic Manager of this port."""
+    """Forgets the Traffic Manager of this port; returns whether there was one."""
     return isinstance(port, int) and served.managers.by_port.pop(port, None) is not None

@@ -27,12 +27,12 @@ TABLE = Table("vehicles")
 
 
 def vehicle_of(served: Served, id: Any) -> Vehicle:
-    """Returns the living vehicle with this actor id."""
+    """Returns the living vehicle with this actor id; CallError where there is none."""
     return served.episode.vehicles.of(served.episode.actors.get(id, Family.VEHICLE).id)
 
 
 def parse_control(value: Any) -> Control:
-    """VehicleControl with ISO steer, clamped to its ranges."""
+    """Returns a call's VehicleControl with ISO steer, clamped to its ranges; WireError for another shape."""
     v = wire.items(value, "control", 7)
     throttle, steer, brake = wire.numbers(v[:3], "control", 3)
     return Control(
@@ -48,7 +48,7 @@ def parse_control(value: Any) -> Control:
 
 @TABLE.method("apply_control_to_vehicle", Shape.VOID)
 def apply_control_to_vehicle(served: Served, id: Any, control: Any) -> None:
-    """Held until the next one."""
+    """Sets a vehicle's control, held until the next one; ends Ackermann control."""
     vehicle = vehicle_of(served, id)
     vehicle.control = parse_control(control)
     vehicle.driver = None
@@ -56,7 +56,7 @@ def apply_control_to_vehicle(served: Served, id: Any, control: Any) -> None:
 
 @TABLE.method("apply_ackermann_control_to_vehicle", Shape.VOID)
 def apply_ackermann_control_to_vehicle(served: Served, id: Any, control: Any) -> None:
-    """Two controllers drive it from now on."""
+    """Sets the target of two controllers, which drive the vehicle from now on."""
     vehicle = vehicle_of(served, id)
     target = parse_target(control)
     if vehicle.driver is None:
@@ -94,7 +94,7 @@ def get_physics_control(served: Served, id: Any) -> list[Any]:
 
 
 def wheel_centres(vehicle: Vehicle) -> list[tuple[float, float]]:
-    """x forward and y left of FL, FR, RL, RR from the footprint's centre, m."""
+    """Returns x forward and y left of FL, FR, RL, RR from the footprint's centre, m."""
     t = vehicle.type
     half = t.track / 2.0
     return [
@@ -107,7 +107,10 @@ def wheel_centres(vehicle: Vehicle) -> list[tuple[float, float]]:
 
 @TABLE.method("apply_physics_control", Shape.VOID)
 def apply_physics_control(served: Served, id: Any, control: Any) -> None:
-    """What acts: mass, drag, engine and gears, wheels' friction, radius, brakes and steering angle."""
+    """Replaces a vehicle's physics and its type.
+
+    What acts: mass, drag, engine and gears, wheels' friction, radius, brakes and steering angle.
+    """
     vehicle = vehicle_of(served, id)
     new = with_engine(parse_physics(control), vehicle.physics)
     model = apply_control(vehicle.type, vehicle.physics, new)
@@ -122,20 +125,20 @@ def get_vehicle_light_state(served: Served, id: Any) -> list[int]:
 
 @TABLE.method("get_vehicle_light_states")
 def get_vehicle_light_states(served: Served) -> list[list[int]]:
-    """Lamp flags of all vehicles."""
+    """Returns actor id and lamp flags of all vehicles."""
     return [[v.actor, v.lights] for v in served.episode.vehicles]
 
 
 @TABLE.method("set_vehicle_light_state", Shape.VOID)
 def set_vehicle_light_state(served: Served, id: Any, state: Any) -> None:
-    """Lamp flags; the lamps are kept, not drawn."""
+    """Sets a vehicle's lamp flags; the lamps are kept, not drawn."""
     flags = state[0] if isinstance(state, list) and len(state) == 1 else state
     vehicle_of(served, id).lights = wire.integer(flags, "light state", 0, 2**32 - 1)
 
 
 @TABLE.method("get_telemetry_data")
 def get_telemetry_data(served: Served, id: Any) -> list[Any]:
-    """Speed, pedals, revolutions and per wheel: friction, spin, load."""
+    """Returns speed, pedals, revolutions and gear, and per wheel friction, spin and load, as on the wire."""
     vehicle = vehicle_of(served, id)
     i = served.episode.vehicles.row(vehicle.actor)
     fleet, c = served.episode.moving.fleet, vehicle.control
@@ -156,7 +159,7 @@ def get_telemetry_data(served: Served, id: Any) -> list[Any]:
 
 @TABLE.method("get_wheel_steer_angle")
 def get_wheel_steer_angle(served: Served, id: Any, wheel: Any) -> float:
-    """deg; rear wheels do not steer."""
+    """Returns a wheel's angle in deg, right positive; rear wheels do not steer."""
     vehicle = vehicle_of(served, id)
     if wire.integer(wheel, "wheel", 0, 8) > 1:
         return 0.0

@@ -16,7 +16,7 @@ TABLE = Table("walkers")
 
 
 def parse_control(value: Any) -> WalkerControl:
-    """Parses and checks a `WalkerControl`."""
+    """Returns a call's checked `WalkerControl`, in ISO axes."""
     direction, speed, jump = wire.items(value, "walker control", 3)
     return WalkerControl(
         wire.iso_vector(direction, "walker control.direction"),
@@ -27,7 +27,7 @@ def parse_control(value: Any) -> WalkerControl:
 
 @TABLE.method("apply_control_to_walker", Shape.VOID)
 def apply_control_to_walker(served: Served, id: Any, control: Any) -> None:
-    """Held until the next one; jumping has no effect."""
+    """Sets a walker's control, held until the next one; jumping has no effect."""
     actor = served.episode.actors.get(id, Family.WALKER)
     new = parse_control(control)
     served.episode.walkers[actor.id] = new
@@ -69,7 +69,7 @@ def get_actor_bone_relative_transforms(served: Served, id: Any) -> list[Any]:
 
 @TABLE.method("get_bones_transform")
 def get_bones_transform(served: Served, id: Any) -> list[Any]:
-    """All bones of a walker."""
+    """Returns name and transforms of all bones of a walker."""
     return [_bone_rows(served, id)]
 
 
@@ -81,11 +81,11 @@ def set_bones_transform(served: Served, id: Any, bones: Any) -> None:
 
 @TABLE.method("blend_pose", Shape.VOID)
 def blend_pose(served: Served, id: Any, blend: Any) -> None:
-    """How much of the client's pose shows, 0 to 1."""
+    """Sets how much of the client's pose shows, cut to 0 to 1."""
     _skeleton(served, id)[1].blend = min(max(wire.number(blend, "blend"), 0.0), 1.0)
 
 
 @TABLE.method("get_pose_from_animation", Shape.VOID)
 def get_pose_from_animation(served: Served, id: Any) -> None:
-    """The client's pose is the animation's."""
+    """Drops the bones that a client has set: its pose is the animation's."""
     _skeleton(served, id)[1].take()

@@ -20,7 +20,7 @@ def get_weather_parameters(served: Served) -> list[float]:
 
 @TABLE.method("set_weather_parameters", Shape.VOID)
 def set_weather_parameters(served: Served, weather: Any) -> None:
-    """Acts on grip and sensors from the next tick on."""
+    """Sets the weather, which acts on grip and sensors from the next tick on."""
     served.episode.sky.apply(weather)
 
 

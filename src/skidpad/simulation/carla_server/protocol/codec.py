@@ -66,7 +66,10 @@ class Decoder:
         self._begin = 0  # of it, among all bytes of the connection
 
     def feed(self, data: bytes) -> Iterator[Request]:
-        """The requests that `data` completes; ProtocolError ends the connection."""
+        """Yields the requests that `data` completes, and keeps the rest for the next call.
+
+        ProtocolError for what is no request; it ends the connection.
+        """
         try:
             self._scanner.feed(data)
             self._held += data
@@ -91,12 +94,15 @@ class Decoder:
 
 
 def _begins(data: bytes) -> bool:
-    """Whether these first bytes are of an array of three or four."""
+    """Returns whether these first bytes are of an array of three or four."""
     return any(head.startswith(data) or data.startswith(head) for head in HEADS)
 
 
 def parse_request(message: Any) -> Request:
-    """A decoded message as a request; ProtocolError when it is none."""
+    """Returns a decoded message as a request; ProtocolError when it is none.
+
+    A message of three is a notification, which waits for no answer.
+    """
     if not isinstance(message, list) or len(message) not in (3, 4):
         raise ProtocolError("a request is an array of four")
     if len(message) == 3:
@@ -118,7 +124,7 @@ def parse_request(message: Any) -> Request:
 
 
 def pack(value: Any) -> bytes:
-    """msgpack bytes of an answer or a stream message."""
+    """Returns the msgpack bytes of an answer or a stream message."""
     packed: bytes = msgpack.packb(value, use_bin_type=True)
     return packed
 
@@ -129,5 +135,5 @@ def answer(msgid: int, result: Any) -> bytes:
 
 
 def failure(msgid: int, message: str) -> bytes:
-    """The bytes of an answer that the client raises as rpc_error."""
+    """Returns the bytes of an answer that the client raises as rpc_error."""
     return pack([ANSWER, msgid, message, None])

@@ -50,7 +50,10 @@ class Table:
     def method(
         self, name: str, shape: Shape = Shape.VALUE, without_effect: str = ""
     ) -> Callable[[H], H]:
-        """Register a handler under the protocol's name."""
+        """Returns a decorator that registers a handler under the protocol's name and returns it unchanged.
+
+        without_effect: why nothing is done, logged at the first call; "" when it acts.
+        """
 
         def register(handler: H) -> H:
             given = list(signature(handler).parameters.values())[1:]
@@ -81,7 +84,7 @@ class Dispatcher:
         self.ineffective: set[str] = set()
 
     def answer(self, request: Request) -> bytes:
-        """The answer to one request; broad on purpose: a failure is that client's answer."""
+        """Returns the bytes that answer one request, whatever happens: a failure is that client's answer."""
         method = self.methods.get(request.method)
         if method is None:
             return self._answer_unknown(request)

@@ -68,7 +68,7 @@ class StreamHub:
         return self.token(self._aliases)
 
     def token(self, stream: int) -> bytes:
-        """The 24 bytes with which a client finds a stream."""
+        """Returns the 24 bytes with which a client finds a stream."""
         return TOKEN.pack(stream, self.port, TCP, ADDRESS_NOT_SET, b"")
 
     def exists(self, stream: int) -> bool:
@@ -76,14 +76,20 @@ class StreamHub:
         return canonical(stream) in self._open
 
     def announce(self, stream: int) -> None:
-        """A client is about to connect."""
+        """Notes that a client is about to connect.
+
+        `complete` is False until it has, or PATIENCE s are over.
+        """
         stream = canonical(stream)
         if stream not in self._announced:
             self._announced.add(stream)
             asyncio.get_running_loop().call_later(PATIENCE, self._on_arrival, stream)
 
     def _on_arrival(self, stream: int) -> None:
-        """It has connected, or is no longer waited for."""
+        """Notes that a stream has connected, or is no longer waited for.
+
+        Calls what waits for the last one.
+        """
         self._announced.discard(stream)
         if not self._announced:
             eager, self._eager = self._eager, []
@@ -92,11 +98,14 @@ class StreamHub:
 
     @property
     def complete(self) -> bool:
-        """Whether every stream that was announced is connected."""
+        """Whether no announced stream is still waited for."""
         return not self._announced
 
     def when_complete(self, callback: Callable[[], None]) -> None:
-        """Call once when every stream that was announced is connected."""
+        """Keeps a callback for one call, when the last announced stream has arrived or is given up.
+
+        Where none is announced, that is at the next arrival.
+        """
         self._eager.append(callback)
 
     def has_listeners(self, stream: int) -> bool:
@@ -104,7 +113,10 @@ class StreamHub:
         return bool(self._listeners.get(stream))
 
     def publish(self, stream: int, *parts: bytes | memoryview) -> None:
-        """Sends one message to all listeners of a stream."""
+        """Sends one message, of these parts, to all listeners of a stream; does nothing without any.
+
+        A client with more than MAX_PENDING bytes not fetched does not get it.
+        """
         listeners = self._listeners.get(stream)
         if not listeners:
             return
@@ -139,7 +151,7 @@ class StreamHub:
                 transport.write(message)
 
     def close(self, stream: int) -> None:
-        """Forget a stream; its listeners have GRACE to hang up themselves."""
+        """Forgets a stream; its listeners have GRACE s to hang up themselves."""
         self._open.discard(stream)
         listeners = self._listeners.pop(stream, [])
         if listeners or stream in self._left:
@@ -170,7 +182,7 @@ class StreamHub:
         return StreamConnection(self)
 
     def admit(self) -> bool:
-        """Count a new connection; False when there are too many."""
+        """Counts a new connection and returns whether it may stay: False beyond MAX_CONNECTIONS."""
         self._connections += 1
         return self._connections <= MAX_CONNECTIONS
 
@@ -185,9 +197,10 @@ class StreamHub:
             listeners.remove(transport)
 
     def subscribe(self, stream: int, transport: asyncio.Transport) -> None:
-        """Attach a listener; the newest message of a steady stream is sent at once.
+        """Adds a listener to a stream; what `on_subscribe` gives, the newest snapshot, is sent at once.
 
-        A client that asks for a stream that has ended is kept waiting: cut off, it would try for ever.
+        A client that asks for a stream that has ended is kept waiting: cut off, it would try for ever. One
+        that asks for a stream that there never was is cut off.
         """
         if not self.exists(stream):
             if stream >= self._next:
@@ -218,7 +231,7 @@ class StreamConnection(asyncio.Protocol):
             transport.close()
 
     def data_received(self, data: bytes) -> None:
-        """The four bytes of the stream id; anything after them is ignored."""
+        """Reads the four bytes of the stream id and subscribes; anything after them is ignored."""
         assert self._transport is not None
         if self._stream is not None:
             return

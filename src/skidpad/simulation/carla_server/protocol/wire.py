@@ -28,7 +28,7 @@ class WireError(BackendError):
 
 
 def number(value: Any, field: str) -> float:
-    """Checks that a value is a finite number and returns it."""
+    """Returns the value as a float, a finite number up to FLOAT_MAX; WireError for any other."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise WireError(f"{field} must be a number")
     if not isfinite(value) or abs(value) > FLOAT_MAX:
@@ -37,14 +37,17 @@ def number(value: Any, field: str) -> float:
 
 
 def integer(value: Any, field: str, low: int = 0, high: int = 2**64 - 1) -> int:
-    """Returns the value, an integer in [low, high]; raises WireError for any other."""
+    """Returns the value, an integer in [low, high] (64 bits without sign by default).
+
+    WireError for others.
+    """
     if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
         raise WireError(f"{field} must be an integer between {low} and {high}")
     return value
 
 
 def flag(value: Any, field: str) -> bool:
-    """A truth value; 0 and 1 are accepted."""
+    """Returns a truth value; 0 and 1 are accepted, WireError for any other."""
     if value not in (0, 1):
         raise WireError(f"{field} must be true or false")
     return bool(value)
@@ -58,36 +61,36 @@ def text(value: Any, field: str, longest: int = 4096) -> str:
 
 
 def items(value: Any, field: str, size: int | None = None) -> list[Any]:
-    """An array, of `size` members when given."""
+    """Returns the value, an array, of `size` members when given; WireError for any other."""
     if not isinstance(value, list) or (size is not None and len(value) != size):
         raise WireError(f"{field} must be an array" + (f" of {size}" if size is not None else ""))
     return value
 
 
 def numbers(value: Any, field: str, size: int | None = None) -> list[float]:
-    """Checks that a value is an array of finite numbers and returns it."""
+    """Returns the value, an array of finite numbers, as floats; WireError for any other."""
     return [number(v, field) for v in items(value, field, size)]
 
 
 def vector(value: Any, field: str) -> Vector:
-    """A Vec3 as it came: CARLA's axes, the client's unit."""
+    """Returns a Vec3 as it came: CARLA's axes, the client's unit."""
     x, y, z = numbers(value, field, 3)
     return (x, y, z)
 
 
 def iso_vector(value: Any, field: str) -> Vector:
-    """A Vec3 of positions, velocities or forces, in ISO axes."""
+    """Returns a Vec3 of positions, velocities or forces, in ISO axes."""
     return vector_from_carla(*vector(value, field))
 
 
 def iso_turn(value: Any, field: str) -> Vector:
-    """An angular velocity in deg/s, or any axial vector in degrees, as ISO rad."""
+    """Returns an angular velocity in deg/s, or any axial vector in degrees, as ISO rad."""
     x, y, z = turn_from_carla(*vector(value, field))
     return (radians(x), radians(y), radians(z))
 
 
 def iso_steer(steer: float) -> float:
-    """A steer command or angle, right positive, as ISO; and back."""
+    """Returns a steer command or angle, right positive, as ISO; and back."""
     return mirror_value(steer)
 
 
@@ -97,12 +100,12 @@ def iso_to_wire(v: Vector) -> Vector:
 
 
 def yaw_to_wire(yaw: float) -> float:
-    """A yaw in rad as CARLA's degrees."""
+    """Returns a yaw in rad as CARLA's degrees, right positive."""
     return mirror_value(degrees(yaw))
 
 
 def pose(value: Any, field: str) -> Pose:
-    """Returns the ISO 8855 pose of a Transform on the wire."""
+    """Returns the ISO 8855 pose of a Transform on the wire; WireError for another shape."""
     location, rotation = items(value, field, 2)
     x, y, z = numbers(location, f"{field}.location", 3)
     pitch, yaw, roll = numbers(rotation, f"{field}.rotation", 3)
@@ -116,7 +119,7 @@ def transform(place: Pose) -> list[list[float]]:
 
 
 def optional(value: Any, field: str) -> Any | None:
-    """The content of an optional, None when empty."""
+    """Returns the content of an optional as it is, None when empty; WireError for another shape."""
     if isinstance(value, list) and len(value) == 1 and value[0] is False:
         return None
     if isinstance(value, list) and len(value) == 2 and value[0] is True:
@@ -130,5 +133,5 @@ def some(value: Any | None) -> list[Any]:
 
 
 def box(centre: Vector, half: Vector, yaw_deg: float = 0.0) -> list[list[float]]:
-    """A BoundingBox in CARLA's axes: centre, half extents, rotation."""
+    """Returns a BoundingBox as on the wire: centre, half extents in m, rotation; all in CARLA's axes."""
     return [list(centre), list(half), [0.0, yaw_deg, 0.0]]

@@ -38,7 +38,10 @@ MAX_READ = 256 * 1024**2  # a longer recording is kept, but neither summed up no
 
 
 def safe_path(folder: Path | None, name: str) -> Path:
-    """A client's file name inside the data folder; only its base name counts (decision K-8)."""
+    """Returns the path of a client's file name inside the data folder; only its base name counts (K-8).
+
+    CallError without a folder, and for what is no file name.
+    """
     if folder is None:
         raise CallError("this server has no --data-dir, so it neither writes nor reads files")
     base = name.replace("\\", "/").rsplit("/", 1)[-1]
@@ -57,7 +60,10 @@ class Recorder:
         self._born: set[int] = set()  # actors that the recording describes
 
     def start(self, name: str, map: str, clock: Clock) -> str:
-        """Begin a recording; the text that the client prints."""
+        """Starts a recording, ending one that runs, and returns the text that the client prints.
+
+        CallError or FileError where the file cannot be written.
+        """
         path = safe_path(self.folder, name)
         self.stop()
         try:
@@ -82,7 +88,10 @@ class Recorder:
             self._file = None
 
     def tick(self, clock: Clock, actors: ActorTable, moving: World, vehicles: Vehicles) -> None:
-        """Writes a line: frame, time, poses of what moves, contacts, new actors, controls of vehicles."""
+        """Writes a line: frame, time, poses of what moves, contacts, new actors, controls of vehicles.
+
+        Does nothing without a recording; one of MAX_BYTES is ended.
+        """
         if self._file is None:
             return
         poses, born = [], []
@@ -110,7 +119,7 @@ class Recorder:
         self._file.write(line + "\n")
 
     def summary(self, name: str, show_all: bool = False) -> str:
-        """Returns the text that `show_recorder_file_info` prints."""
+        """Returns the text that `show_recorder_file_info` prints; CallError for what is no recording."""
         with _explain_failure(name):
             return describe_recording(*self._read_with_start(name), show_all)
 
@@ -120,12 +129,15 @@ class Recorder:
             return list_collisions(*self._read_with_start(name), first, second)
 
     def describe_blocked(self, name: str, seconds: float, cm: float) -> str:
-        """Returns the text that `show_recorder_actors_blocked` prints."""
+        """Returns the text that `show_recorder_actors_blocked` prints.
+
+        seconds: shortest time; cm: least way from its place that counts as moving.
+        """
         with _explain_failure(name):
             return list_blocked(*self._read_with_start(name), seconds, cm)
 
     def recording(self, name: str) -> CarlaRecording:
-        """What can be replayed of a file."""
+        """Returns what can be replayed of a file; CallError for what is no recording."""
         with _explain_failure(name):
             return recording(name, *self._read(name))
 
@@ -153,7 +165,7 @@ class Recorder:
 
 @contextmanager
 def _explain_failure(name: str) -> Iterator[None]:
-    """What is no recording is said in one sentence, whatever is wrong with it."""
+    """Turns whatever is wrong with a recording into a CallError of one sentence."""
     try:
         yield
     except CallError:
@@ -165,7 +177,7 @@ def _explain_failure(name: str) -> Iterator[None]:
 
 
 def _start(head: dict[str, Any], ticks: list[list[Any]]) -> float:
-    """s of the episode when a recording began; recordings of before told only their first tick."""
+    """Returns the s of the episode when a recording began; without it in the head, of the first tick."""
     return float(head.get("start", ticks[0][1]))
 
 

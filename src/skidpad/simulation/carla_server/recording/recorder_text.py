@@ -96,7 +96,10 @@ def _tail(ticks: list[Tick], start: float) -> str:
 
 
 def _event_lines(tick: Tick, known: dict[int, dict[str, Any]]) -> Iterator[str]:
-    """Actors that come and go, and contacts. `known` holds the attributes of those that are there."""
+    """Yields lines of actors that come and go, and of contacts.
+
+    known: attributes by id of the actors that are there, kept up to date here.
+    """
     there = {id: xyz for id, xyz, _ in tick[2]}
     for id, blueprint, attributes in tick[4]:
         known[id] = attributes

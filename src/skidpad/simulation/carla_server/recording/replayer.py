@@ -41,7 +41,7 @@ class CarlaRecording:
         return self.times[-1]
 
     def at(self, t: float) -> dict[int, tuple[Pose, Vector]]:
-        """Poses and velocities in m/s between the ticks around t."""
+        """Returns poses and velocities in m/s by recorded id, interpolated at t in s."""
         k = min(max(bisect_right(self.times, t) - 1, 0), len(self.times) - 1)
         if k + 1 == len(self.times):  # velocities at the end are those that led there
             k, t = max(k - 1, 0), self.total
@@ -70,7 +70,10 @@ def _between(a: Pose, b: Pose, share: float, span: float) -> tuple[Pose, Vector]
 
 
 def recording(name: str, head: dict[str, Any], ticks: list[list[Any]]) -> CarlaRecording:
-    """What a file's lines say; CallError when it is of another format or broken."""
+    """Returns what a file's lines say; CallError when it is of another format or its times do not grow.
+
+    Other errors, WireError and LookupError among them, for broken lines.
+    """
     if head.get("format") != FORMAT or not ticks:
         raise CallError(f"{name} holds no ticks that can be replayed")
     kinds: dict[int, tuple[str, dict[str, str]]] = {}
@@ -99,9 +102,10 @@ class Replayer:
     def start(
         self, episode: Episode, source: CarlaRecording, begin: float, duration: float, follow: int
     ) -> tuple[float, float]:
-        """Begin; the times in s from and to which it replays. A negative begin counts from the end.
+        """Starts a replay, ending another, and returns the times in s from and to which it goes.
 
-        episode: on the recording's map. follow: recorded id of whom the spectator follows.
+        begin: s, a negative one counts from the end; duration: s, 0 or less: to the end.
+        episode: on the recording's map. follow: recorded id of the actor that the spectator follows.
         """
         self.release()
         begin = max(source.total + begin, 0.0) if begin < 0.0 else min(begin, source.total)
@@ -111,7 +115,10 @@ class Replayer:
         return begin, end
 
     def tick(self, dt: float) -> None:
-        """Move everybody on; at the end physics takes over."""
+        """Moves the replay on by dt s times the factor.
+
+        At its end physics takes over. Nothing without one.
+        """
         run = self._run
         if run is None:
             return
@@ -121,7 +128,7 @@ class Replayer:
             self.release()
 
     def stop(self, keep_actors: bool) -> None:
-        """End now; unless actors are kept, as the recording ends."""
+        """Ends the replay now; unless actors are kept, they are set as at the recording's end."""
         if self._run is not None and not keep_actors:
             self._run.now = self._run.source.total
             self._place(self._run)
@@ -158,7 +165,7 @@ class _Run:
     refused: set[int] = field(default_factory=set)
 
     def drop(self, keep: Container[int]) -> None:
-        """Destroys the actors that are no longer in the recording."""
+        """Destroys the replay's actors that are no longer in the recording."""
         for recorded in [r for r in self.actors if r not in keep]:
             id = self.actors.pop(recorded)
             if id in self.episode.actors.alive:
@@ -172,14 +179,14 @@ class _Run:
                 self.episode.simulate(actor, True)
 
     def watch(self) -> None:
-        """The spectator goes behind whom it follows."""
+        """Puts the spectator behind the actor that it follows, if that lives."""
         actors = self.episode.actors
         followed = actors.alive.get(self.actors.get(self.follow, 0))
         if followed is not None:
             self.episode.spectator.pose = actors.pose(followed).moved(forward=-BEHIND, up=ABOVE)
 
     def actor(self, recorded: int, pose: Pose, ignore_hero: bool) -> Actor | None:
-        """The actor that plays a recorded one; None for those left out."""
+        """Returns the actor that plays a recorded one, found or spawned at first; None for those left out."""
         if recorded in self.refused:
             return None
         if recorded not in self.actors:
@@ -192,7 +199,7 @@ class _Run:
         return self.episode.actors.alive.get(self.actors[recorded])
 
     def _cast(self, id: int, pose: Pose, ignore_hero: bool) -> Actor | None:
-        """The living actor of that id and blueprint, or a new one."""
+        """Returns the living actor of that id and blueprint, or a new one; None where neither is possible."""
         blueprint, attributes = self.source.kinds.get(id, ("", {}))
         offered = self.episode.stock.catalogue.get(blueprint)
         if offered is None or offered.family not in PLAYED:

@@ -124,7 +124,10 @@ class Rhythm:
     speed: float = 0.0
 
     def due(self, time: float, pose: Pose, speed: float | None) -> bool:
-        """Whether a message goes out now; if so, counts from it. speed: None for one at rest."""
+        """Returns whether a message goes out now; if so, counts from it.
+
+        time: s; speed: m/s, None for a station that does not drive, which sends every ROAD_SIDE s.
+        """
         waited = self.longest if self.last is None else time - self.last + EARLY
         if speed is None:
             going = self.last is None or waited >= ROAD_SIDE
@@ -148,7 +151,7 @@ class Rhythm:
         return bool(turned > TURN_DEG or gone > DISTANCE or abs(speed - self.speed) > CHANGE)
 
     def tells_lamps(self, time: float) -> bool:
-        """Whether this message has the part of low frequency; if so, counts from it."""
+        """Returns whether this message has the part of low frequency; if so, counts from it."""
         told = self.last_low is None or time - self.last_low + EARLY >= LIGHTS_EVERY
         if told:
             self.last_low = time
@@ -158,7 +161,10 @@ class Rhythm:
 def awareness(
     station: int, type: int, time: float, motion: Motion, lamps: bool
 ) -> NDArray[np.void]:
-    """One message of a station, s after the episode began."""
+    """Returns one message of a station, `time` s after the episode began.
+
+    type: ETSI's station type; lamps: with the part of low frequency.
+    """
     message = np.zeros((), dtype=AWARENESS)
     message["header"] = (VERSION, CAM, station)
     body = message["body"]
@@ -204,7 +210,7 @@ def _tell(part: NDArray[np.void], motion: Motion) -> None:
 
 
 def custom(station: int, text: bytes) -> NDArray[np.void]:
-    """A client's own message; what is too long is cut."""
+    """Returns a client's own message; what is longer than TEXT_BYTES is cut."""
     message = np.zeros((), dtype=TEXT)
     message["header"] = (VERSION, CUSTOM, station)
     message["text"] = text[: TEXT_BYTES - 1]

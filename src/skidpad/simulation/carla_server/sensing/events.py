@@ -24,7 +24,7 @@ MAP_THINGS = {
 
 
 def collision(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
-    """One message per contact of the carrier in this tick."""
+    """Returns one message per contact of the carrier in this tick; [] for none."""
     carrier = around.actors.carrier(sensor.actor)
     messages: list[Message] = []
     for touch in touches(around.moving, around.actors):
@@ -42,7 +42,10 @@ def _of_map(label: SemanticClass) -> Actor:
 
 
 def obstacle(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
-    """The nearest solid actor within `distance` ahead of the sensor, by a swept sphere."""
+    """Returns a message of the nearest solid actor within `distance` ahead, by a swept sphere.
+
+    [] for none.
+    """
     carrier, actors = around.actors.carrier(sensor.actor), around.actors
     if carrier is None:
         return []

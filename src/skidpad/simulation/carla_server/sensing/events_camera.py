@@ -43,7 +43,7 @@ class Retina:
     time_ns: int = 0
 
     def threshold(self, rising: bool, rng: np.random.Generator, n: int) -> Floats:
-        """(n,) of pixels that become brighter or darker."""
+        """Returns (n,) thresholds of pixels that become brighter or darker, LEAST_CONTRAST at least."""
         mean = self.positive if rising else self.negative
         sigma = self.sigma_positive if rising else self.sigma_negative
         drawn = mean + sigma * rng.standard_normal(n) if sigma > 0.0 else np.full(n, mean)
@@ -52,7 +52,7 @@ class Retina:
 
 
 def make_retina(actor: Actor, seed: int) -> Retina:
-    """Makes an event camera from an actor's attributes."""
+    """Returns an event camera made from an actor's attributes; errors as of `make_camera`."""
     a = actor.attributes
     return Retina(
         make_camera(actor, seed),
@@ -82,7 +82,10 @@ def dynamic_vision(around: Surroundings, clock: Clock, sensor: Sensor) -> list[M
 def crossings(
     retina: Retina, light: Floats, time_ns: int, rng: np.random.Generator
 ) -> NDArray[np.void]:
-    """What happens at all pixels until `time_ns`, when they see this light."""
+    """Returns the events (EVENT) at all pixels until `time_ns`, when they see `light`, ordered by time.
+
+    None at the first call. Moves the retina's state on.
+    """
     before, since = retina.light, retina.time_ns
     retina.light, retina.time_ns = light, time_ns
     if before is None or retina.level is None or retina.last_ns is None:

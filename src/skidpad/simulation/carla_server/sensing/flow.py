@@ -32,7 +32,7 @@ class Memory:
     bodies: dict[int, tuple[Floats, Floats]] = field(default_factory=dict)  # by actor
 
     def since(self, scene: Pictured, view: View, drawn: Pass) -> NDArray[np.float32]:
-        """(H, W, 2) flow since then, which is forgotten; without a last reading, no motion."""
+        """Returns (H, W, 2) flow since the last call, zeros at the first, and keeps the present instead."""
         out = np.zeros((*drawn.inverse.shape, 2), dtype=np.float32)
         if self.view is not None:
             out[:] = compute_flow(view, self.view, np.eye(3), np.zeros(3), drawn.inverse)
@@ -56,12 +56,12 @@ class FlowCamera:
 
 
 def make_flow_camera(actor: Actor, seed: int) -> FlowCamera:
-    """Makes an optical-flow camera from an actor's attributes."""
+    """Returns an optical-flow camera made from an actor's attributes; errors as of `make_camera`."""
     return FlowCamera(make_camera(actor, seed))
 
 
 def optical_flow(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
-    """One picture; the first one shows no motion."""
+    """Returns one picture of flow as a message; the first one shows no motion."""
     made: FlowCamera = sensor.equipment
     camera = made.camera
     scene, view = camera.look(around, clock, sensor.actor)

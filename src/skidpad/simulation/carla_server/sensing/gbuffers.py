@@ -69,7 +69,7 @@ class ColourCamera:
 
 
 def make_colour_camera(actor: Actor, seed: int) -> ColourCamera:
-    """Makes a colour camera from an actor's attributes."""
+    """Returns a colour camera made from an actor's attributes; errors as of `make_camera`."""
     return ColourCamera(make_camera(actor, seed))
 
 
@@ -88,7 +88,7 @@ def colour_image(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Mes
 def textures(
     around: Surroundings, clock: Clock, sensor: Sensor, wanted: list[int]
 ) -> list[Message]:
-    """One picture for each; none while they are not enabled."""
+    """Returns a message with one picture for each wanted texture; [] while they are not enabled."""
     made: ColourCamera = sensor.equipment
     if not made.gbuffers:
         return []
@@ -111,7 +111,7 @@ def textures(
 
 
 def _depth(_: Pictured, __: View, camera: Camera, out: Bytes) -> None:
-    """Grey: planar, linear, and then as sRGB encodes light."""
+    """Writes depth as grey: planar, linear to FARTHEST m, and then as sRGB encodes light."""
     inverse = camera.drawn.inverse
     share = np.minimum(1.0 / np.maximum(inverse * FARTHEST, 1e-9), 1.0)
     out[..., :3] = np.rint(WHITE * srgb(share))[..., None]
@@ -150,7 +150,7 @@ def _base_colour(scene: Pictured, _: View, camera: Camera, out: Bytes) -> None:
 
 
 def _velocity(flow: Floats32, camera: Camera, out: Bytes) -> None:
-    """Red: to the right, green: up, in half pictures per reading, -2 to 2; of actors alone."""
+    """Writes the motion of actors: red to the right, green up, in half pictures per reading, -2 to 2."""
     encoded = np.rint(WHITE * np.clip(STILL + PER_SCREEN * flow, 0.0, 1.0))
     out[..., 2:0:-1] = encoded * (camera.drawn.instances > 0)[..., None]
 
@@ -164,7 +164,7 @@ def _occlusion(_: Pictured, view: View, camera: Camera, out: Bytes) -> None:
 
 
 def _labels(_: Pictured, __: View, camera: Camera, out: Bytes) -> None:
-    """Grey: the tags of the semantic camera."""
+    """Writes the tags of the semantic camera as grey."""
     out[..., :3] = camera.drawn.labels[..., None]
 
 

@@ -51,7 +51,7 @@ class Camera:
     frame: int = -1  # that is drawn
 
     def look(self, around: Surroundings, clock: Clock, actor: Actor) -> tuple[Pictured, View]:
-        """Draw depth and keys, once per frame."""
+        """Draws depth and keys, once per frame, and returns what is pictured and the view."""
         scene, view = around.picture(), camera_view(self.spec, around.actors.pose(actor))
         if self.frame != clock.frame:
             scene.live.draw(view, around.hidden_for(actor), AUTO_LEVEL, self.drawn)
@@ -59,13 +59,13 @@ class Camera:
         return scene, view
 
     def paint(self, around: Surroundings, actor: Actor, scene: Pictured, view: View) -> None:
-        """Colours the picture that was drawn, with the lamps of the carrier."""
+        """Colours the picture that was drawn, in `rgb`, with the lamps of the carrier."""
         lamps = headlights(around.actors, actor)
         scene.shading.paint(view, lamps, self.drawn.inverse, self.drawn.key, self.rgb)
 
 
 def make_camera(actor: Actor, _: int) -> Camera:
-    """Makes a camera from an actor's attributes; WireError or ConfigError when they cannot be used."""
+    """Returns a camera made from an actor's attributes; WireError or ConfigError when they are unusable."""
     width = wire.integer(int(actor.attributes["image_size_x"]), "image_size_x", 1, WIDEST)
     height = wire.integer(int(actor.attributes["image_size_y"]), "image_size_y", 1, WIDEST)
     if width * height > MAX_PIXELS:

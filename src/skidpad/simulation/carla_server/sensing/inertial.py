@@ -13,7 +13,7 @@ from skidpad.simulation.carla_server.sensing.surroundings import Surroundings
 
 
 def _measure_motion(around: Surroundings, actor: Actor) -> ImuReading:
-    """What a unit on its carrier feels; without one it stands still."""
+    """Returns what a unit on its carrier feels; without one it stands still."""
     carrier = around.actors.carrier(actor)
     if carrier is None or carrier.body is None:
         return inertial.imu_at_rest(around.actors.pose(actor), around.gravity)
@@ -22,7 +22,7 @@ def _measure_motion(around: Surroundings, actor: Actor) -> ImuReading:
 
 
 def imu(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
-    """Specific force, rate of turn and compass in the sensor's axes."""
+    """Returns specific force, rate of turn and compass in the sensor's axes, with noise, as a message."""
     felt = _measure_motion(around, sensor.actor)
     noise, n = sensor.rng.standard_normal(6), sensor.number
     force = [
@@ -37,7 +37,7 @@ def imu(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
 
 
 def gnss(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
-    """Latitude and longitude in deg, altitude in m.
+    """Returns latitude and longitude in deg and altitude in m, with noise, as a message.
 
     Latitude grows with CARLA's y, as in the client's own map, although the IMU's north is its -y.
     """

@@ -24,7 +24,7 @@ HALF = 127.5  # grey level of zero
 
 
 def normals(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
-    """One picture; the sky has no normal and is half grey."""
+    """Returns one picture of normals as a message; the sky has no normal and is half grey."""
     camera: Camera = sensor.equipment
     _, view = camera.look(around, clock, sensor.actor)
     bgra_from_normals(world_normals(view, camera.drawn.inverse), camera.bgra)
@@ -32,20 +32,23 @@ def normals(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]
 
 
 def bgra_from_normals(found: Floats, out: NDArray[np.uint8]) -> None:
-    """(H, W, 3) of the world, ISO 8855, into (H, W, 4)."""
+    """Writes normals (H, W, 3) of the world, ISO 8855, as colours into out (H, W, 4)."""
     turned = vectors_to_carla(*found.reshape(-1, 3).T).reshape(found.shape)
     out[..., 2::-1] = np.rint(HALF + HALF * turned)
     out[..., 3] = 255
 
 
 def world_normals(view: View, inverse: NDArray[np.float32]) -> Floats:
-    """(H, W, 3) towards the camera, 0 where nothing is; inverse: planar, 1/m."""
+    """Returns (H, W, 3) unit normals in world axes, towards the camera, 0 where nothing is.
+
+    inverse (H, W): planar inverse depth, 1/m.
+    """
     found: Floats = camera_normals(view, inverse) @ view.rotation
     return found
 
 
 def camera_normals(view: View, inverse: NDArray[np.float32]) -> Floats:
-    """(H, W, 3) in the camera's axes."""
+    """Returns (H, W, 3) unit normals in the camera's axes, 0 where nothing is."""
     found = np.zeros((*inverse.shape, 3))
     _camera_normals(view, inverse, found)
     return found
@@ -53,7 +56,7 @@ def camera_normals(view: View, inverse: NDArray[np.float32]) -> Floats:
 
 @kernel
 def _camera_normals(view: View, inverse: NDArray[np.float32], out: Floats) -> None:
-    """Over a plane the inverse depth is linear in the pixels."""
+    """Writes normals into out (H, W, 3): over a plane the inverse depth is linear in the pixels."""
     height, width = inverse.shape
     for y in range(height):
         v = (y + 0.5 - view.cy) / view.focal
@@ -74,6 +77,6 @@ def _camera_normals(view: View, inverse: NDArray[np.float32], out: Floats) -> No
 
 @inner_kernel
 def _gentler(before: float, after: float) -> float:
-    """The difference that does not cross an edge; 0 without neighbours."""
+    """Returns the smaller difference, which does not cross an edge; 0 without neighbours (both inf)."""
     found = after if abs(after) < abs(before) else before
     return found if found < inf and found > -inf else 0.0

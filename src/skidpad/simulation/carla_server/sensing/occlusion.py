@@ -35,7 +35,10 @@ WHITE = 255.0
 def ambient_occlusion(
     view: View, inverse: NDArray[np.float32], normals: NDArray[np.float64], out: NDArray[np.uint8]
 ) -> None:
-    """(H, W): 255 where nothing hides a surface, and in the sky. inverse: 1/m; normals: camera axes."""
+    """Writes (H, W): 255 where nothing hides a surface, and in the sky, darker elsewhere.
+
+    inverse: 1/m; normals (H, W, 3): camera axes.
+    """
     height, width = inverse.shape
     for y in range(height):
         for x in range(width):

@@ -11,7 +11,7 @@ from skidpad.core.jit import kernel
 
 
 def bgra_from_rgb(packed: NDArray[np.uint32], out: Bytes) -> None:
-    """(H, W) packed red, green, blue, 255 into (H, W, 4)."""
+    """Writes (H, W) packed red, green, blue, 255 as BGRA into out (H, W, 4)."""
     rgba = packed.view(np.uint8).reshape(*packed.shape, 4)
     cv2.cvtColor(rgba, cv2.COLOR_RGBA2BGRA, dst=out)
 
@@ -31,7 +31,10 @@ def bgra_from_labels(labels: Bytes, out: Bytes) -> None:
 def bgra_from_instances(
     labels: Bytes, rows: NDArray[np.uint16], ids: NDArray[np.int64], out: Bytes
 ) -> None:
-    """(H, W) tags into red and actor ids into green (low byte) and blue; rows: 0 static."""
+    """Writes tags into red and actor ids into green (low byte) and blue of out (H, W, 4).
+
+    rows (H, W): 0 static, else row + 1; ids: actor ids by that number.
+    """
     for y in range(labels.shape[0]):
         for x in range(labels.shape[1]):
             id = ids[rows[y, x]]

@@ -40,7 +40,7 @@ class RadarMake:
     radar: Radar | None = None  # for the present number of rays per reading
 
     def with_rays(self, n: int) -> Radar:
-        """The radar that sends n rays per reading."""
+        """Returns the radar that sends n rays per reading; made anew when n changes."""
         if self.radar is None or self.radar.beam.rays != n:
             half_width = tan(radians(self.spec.horizontal_fov_deg / 2.0))
             half_height = tan(radians(self.spec.vertical_fov_deg / 2.0))
@@ -49,7 +49,7 @@ class RadarMake:
 
 
 def make_radar(actor: Actor, seed: int) -> RadarMake:
-    """Makes a radar from an actor's attributes."""
+    """Returns a radar made from an actor's attributes; WireError when they are unusable."""
     a = actor.attributes
     spec = RadarSpec(
         str(actor.id),
@@ -69,7 +69,10 @@ def make_radar(actor: Actor, seed: int) -> RadarMake:
 
 
 def radar(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
-    """Returns one message: velocity in m/s, azimuth and altitude in rad, depth in m of every return."""
+    """Returns one message: velocity in m/s, azimuth and altitude in rad, depth in m of every return.
+
+    It is empty where a reading has no ray.
+    """
     make: RadarMake = sensor.equipment
     n = int(make.spec.points_per_second * sensor.share(clock))
     if n == 0:
@@ -94,7 +97,10 @@ class LidarMake:
     angle: float = 0.0  # deg, within the field of view
 
     def turn(self, dt: float) -> Floats:
-        """(n,) azimuths in rad of what dt s sweep, left positive; CARLA's lidars turn right."""
+        """Turns the head by dt s and returns (n,) azimuths in rad of what it swept, left positive.
+
+        CARLA's lidars turn right.
+        """
         n = round(self.rate * dt / len(self.elevations))
         swept, start = self.rotation_hz * self.fov * dt, self.angle
         self.angle = (self.angle + swept) % self.fov if self.fov > 0.0 else 0.0
@@ -102,13 +108,16 @@ class LidarMake:
         return angles_to_carla(np.radians(steps % self.fov - self.fov / 2.0))
 
     def head(self, channel: NDArray[np.int64]) -> bytes:
-        """The message's beginning: angle of the head and points by channel."""
+        """Returns the message's beginning: angle of the head and points by channel.
+
+        channel (n,): of the points that are sent.
+        """
         counts = np.bincount(channel, minlength=len(self.elevations)).astype("<u4")
         return struct.pack("<fI", radians(self.angle), len(counts)) + counts.tobytes()
 
 
 def make_lidar(actor: Actor, _: int) -> LidarMake:
-    """Makes a lidar from an actor's attributes."""
+    """Returns a lidar made from an actor's attributes; WireError when they are unusable."""
     a = actor.attributes
     channels = wire.integer(int(a["channels"]), "channels", 1, MAX_CHANNELS)
     degrees = np.linspace(float(a["upper_fov"]), float(a["lower_fov"]), channels)
@@ -129,12 +138,12 @@ class _Scan:
     seen: RayHits
 
     def places(self, distance: Floats) -> Floats:
-        """(n, 3) in the sensor's frame, CARLA's axes."""
+        """Returns (n, 3) m in the sensor's frame, CARLA's axes, of the returns at (n,) distances."""
         return vectors_to_carla(*(self.seen.direction * distance[:, None]).T)
 
 
 def _scan(around: Surroundings, clock: Clock, sensor: Sensor, drop_off: float) -> _Scan:
-    """One tick's share of the sweep; a share `drop_off` of the rays is not sent."""
+    """Returns the returns of one reading's share of the sweep; a share `drop_off` of rays is not sent."""
     make: LidarMake = sensor.equipment
     azimuth = make.turn(sensor.share(clock))
     sent = np.ones((len(make.elevations), len(azimuth)), dtype=np.bool_)
@@ -152,7 +161,7 @@ def _scan(around: Surroundings, clock: Clock, sensor: Sensor, drop_off: float) -
 
 
 def plain_lidar(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
-    """x, y, z, intensity of what is left after drop-off, with noise along the ray."""
+    """Returns x, y, z, intensity of what is left after drop-off, with noise along the ray, as a message."""
     scan = _scan(around, clock, sensor, sensor.number("dropoff_general_rate"))
     limit, zero = sensor.number("dropoff_intensity_limit"), sensor.number("dropoff_zero_intensity")
     noise, distance = sensor.number("noise_stddev"), scan.seen.distance
@@ -167,7 +176,7 @@ def plain_lidar(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Mess
 
 
 def semantic_lidar(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
-    """x, y, z, cosine of incidence, actor id, tag."""
+    """Returns x, y, z, cosine of incidence, actor id and tag of all returns as a message."""
     scan = _scan(around, clock, sensor, 0.0)
     seen = scan.seen
     out = np.zeros(len(seen.distance), dtype=SEMANTIC_POINT)

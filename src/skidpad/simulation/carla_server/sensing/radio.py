@@ -68,7 +68,7 @@ class Radio:
 
 
 def make_radio(actor: Actor) -> Radio:
-    """Makes a radio from an actor's attributes; WireError when they cannot be used."""
+    """Returns a radio made from an actor's attributes; WireError when they cannot be used."""
     a = actor.attributes
     frequency, d_ref = float(a["frequency_ghz"]), float(a["d_ref"])
     for name, value in (("frequency_ghz", frequency), ("d_ref", d_ref)):
@@ -114,13 +114,13 @@ class Air:
     calls: list[Call] = field(default_factory=list)
 
     def send(self, frame: int, call: Call) -> None:
-        """Adds a message that is heard in this frame only."""
+        """Adds a call that is heard in this frame only; those of other frames are dropped."""
         if frame != self.frame:
             self.frame, self.calls = frame, []
         self.calls.append(call)
 
     def receive_calls(self, frame: int, own: Call) -> list[Call]:
-        """Returns what other stations of the kind send on the channel."""
+        """Returns what other stations of the same kind send on the same channel in this frame."""
         if frame != self.frame:
             return []
         same = (c for c in self.calls if c.kind == own.kind and c.channel == own.channel)
@@ -137,7 +137,7 @@ def find_crossed_boxes(
 
 
 def knife_edge(box: Box, a: Vector, b: Vector, wavelength: float) -> float:
-    """dB lost over the top of a vehicle between two antennas."""
+    """Returns the dB lost over the top of a vehicle between two antennas; 0 well below the line."""
     centre, half = box
     d1, d2 = hypot(centre.x - a[0], centre.y - a[1]), hypot(b[0] - centre.x, b[1] - centre.y)
     if not d1 or not d2:
@@ -153,7 +153,7 @@ def free_space(radio: Radio, distance: float) -> float:
 
 
 def two_rays(radio: Radio, distance: float, h_a: float, h_b: float) -> float:
-    """dB of a direct ray and one off the ground; heights over it in m."""
+    """Returns the dB lost by a direct ray and one off the ground; distance and heights over it in m."""
     reflected = sqrt(distance**2 + 4.0 * h_a * h_b)
     across = sqrt(max(distance**2 - (h_a - h_b) ** 2, NEAREST**2))
     sine, cosine = (h_a + h_b) / reflected, across / reflected
@@ -165,7 +165,7 @@ def two_rays(radio: Radio, distance: float, h_a: float, h_b: float) -> float:
 
 
 def winner(radio: Radio, way: Way, distance: float) -> float:
-    """Returns the path loss in dB by WINNER+."""
+    """Returns the path loss in dB by WINNER+ over `distance` m."""
     d, f = log10(distance), log10(radio.frequency_ghz)
     if way is Way.BUILDING:
         return 36.85 + 30.0 * d + 18.9 * f
@@ -177,7 +177,10 @@ def winner(radio: Radio, way: Way, distance: float) -> float:
 def loss(
     radio: Radio, way: Way, call: Call, place: Vector, ground: float, tops: Iterable[Box]
 ) -> float:
-    """dB between a call's antenna and one at `place`, without fading; tops: vehicles between."""
+    """Returns the dB between a call's antenna and one at `place`, without fading.
+
+    ground: m, height below that one; tops: vehicles between, which count for Way.VEHICLE only.
+    """
     a = call.place
     distance = max(sqrt(sum((p - q) ** 2 for p, q in zip(a, place, strict=True))), NEAREST)
     edges = [knife_edge(box, a, place, radio.wavelength) for box in tops]

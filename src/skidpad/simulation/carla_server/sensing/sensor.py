@@ -33,7 +33,10 @@ class Sensor:
         return float(self.actor.attributes[attribute])
 
     def is_due(self, time: float) -> bool:
-        """Whether it reads now; the period counts from its first reading."""
+        """Returns whether the sensor reads at `time` in s; if so, its next time is set.
+
+        The period counts from its first reading.
+        """
         due = time if self.due is None else self.due
         if time < due - EARLY:
             return False
@@ -42,7 +45,7 @@ class Sensor:
         return True
 
     def share(self, clock: Clock) -> float:
-        """s of work that one reading stands for."""
+        """Returns the s of work that one reading stands for: the period, one tick at least."""
         return max(clock.step, self.period)
 
 

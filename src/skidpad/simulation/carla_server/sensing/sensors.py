@@ -30,7 +30,10 @@ class SensorSet:
         self._sensors: dict[int, Sensor] = {}
 
     def add(self, actor: Actor) -> None:
-        """A new sensor; an error when its attributes cannot be used."""
+        """Adds a new sensor; WireError or ConfigError when its attributes cannot be used.
+
+        Kinds that send nothing are ignored.
+        """
         producer = self._producers.get(actor.blueprint.id)
         if producer is None:
             return
@@ -41,12 +44,12 @@ class SensorSet:
         self._sensors[actor.id] = Sensor(actor, period, rng, equipment)
 
     def forget(self, id: int) -> list[int]:
-        """It is gone; the streams of its G-buffers."""
+        """Removes a sensor and returns the streams of its G-buffers; [] for none."""
         sensor = self._sensors.pop(id, None)
         return list(sensor.textures.values()) if sensor is not None else []
 
     def of(self, id: int) -> Sensor | None:
-        """The sensor that is this actor; None when it is none that sends something."""
+        """Returns the sensor that is this actor; None when it is none that sends something."""
         return self._sensors.get(id)
 
     def has_listeners(self, hub: StreamHub) -> bool:
@@ -54,7 +57,10 @@ class SensorSet:
         return any(_is_heard(sensor, hub) for sensor in self._sensors.values())
 
     def produce(self, around: Surroundings, clock: Clock, hub: StreamHub) -> None:
-        """Measures one tick of every sensor that is due and listened to."""
+        """Reads and publishes every sensor that is due and listened to.
+
+        Before that radios send, in each tick.
+        """
         time = clock.elapsed
         for sensor in self._sensors.values():
             speak = self._producers[sensor.actor.blueprint.id].speak
@@ -90,6 +96,6 @@ def _is_heard(sensor: Sensor, hub: StreamHub) -> bool:
 
 
 def _head(type: SensorType, clock: Clock, place: Pose) -> bytes:
-    """The header of a message: frame, time and the sensor's own place."""
+    """Returns the header of a message: frame, time and the sensor's own place."""
     (x, y, z), (pitch, yaw, roll) = wire.transform(place)
     return snapshot.header(type, clock.frame, clock.elapsed, (x, y, z, pitch, yaw, roll))

@@ -40,7 +40,7 @@ class Station:
 
 
 def make_station(actor: Actor, _: int) -> Station:
-    """A sensor of awareness messages, from its attributes."""
+    """Returns the station of a sensor of awareness messages, from its attributes; WireError if unusable."""
     a = actor.attributes
     shortest, longest = float(a["gen_cam_min"]), float(a["gen_cam_max"])
     if not 0.0 <= shortest <= longest:
@@ -57,7 +57,7 @@ def make_messenger(actor: Actor, _: int) -> Station:
 
 
 def _call(around: Surroundings, sensor: Sensor) -> Call:
-    """Where this sensor's antenna is, with nothing to say yet."""
+    """Returns a call with where this sensor's antenna is, and no message yet."""
     actor, carrier = sensor.actor, around.actors.carrier(sensor.actor)
     pose = around.actors.pose(actor)
     below = pose.z if carrier is None else around.actors.pose(carrier).z - carrier.lift
@@ -69,7 +69,7 @@ def _call(around: Surroundings, sensor: Sensor) -> Call:
 
 
 def announce(around: Surroundings, clock: Clock, sensor: Sensor) -> None:
-    """Send an awareness message when one is due."""
+    """Radios an awareness message when one is due."""
     rhythm, carrier = sensor.equipment.rhythm, around.actors.carrier(sensor.actor)
     car = carrier if carrier is not None and carrier.family is Family.VEHICLE else None
     pose = around.actors.pose(sensor.actor if car is None else car)
@@ -86,7 +86,7 @@ def announce(around: Surroundings, clock: Clock, sensor: Sensor) -> None:
 
 
 def pass_on(around: Surroundings, clock: Clock, sensor: Sensor) -> None:
-    """Send what clients have said since the last tick."""
+    """Radios what clients have said since the last tick, if anything."""
     queue = sensor.equipment.queue
     if queue:
         station = sensor.actor.parent or sensor.actor.id
@@ -96,7 +96,7 @@ def pass_on(around: Surroundings, clock: Clock, sensor: Sensor) -> None:
 
 
 def receive(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
-    """All that arrives in this tick in one message; nothing when nothing does."""
+    """Returns all that arrives in this tick in one message; [] when nothing does."""
     own, heard = _call(around, sensor), []
     for call in around.air.receive_calls(clock.frame, own):
         power = _arriving(around, sensor, own, call)
@@ -109,7 +109,10 @@ def receive(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]
 
 
 def _arriving(around: Surroundings, sensor: Sensor, own: Call, call: Call) -> float | None:
-    """dBm; None when it is too far or too weak."""
+    """Returns the power in dBm at which a call arrives; None when it is too far or too weak.
+
+    Draws its fading.
+    """
     radio = sensor.equipment.radio
     if sum((a - b) ** 2 for a, b in zip(own.place, call.place, strict=True)) >= radio.reach**2:
         return None

@@ -15,7 +15,7 @@ STEPS: Final = 256.0**3 - 1.0  # of the code
 
 @kernel
 def bgra_from_inverse_depth(inverse: NDArray[np.float32], out: NDArray[np.uint8]) -> None:
-    """(H, W) 1/m into (H, W, 4); nothing, 0, is full scale."""
+    """Writes inverse depths (H, W) in 1/m as CARLA's depth code into out (H, W, 4); 0 is full scale."""
     for y in range(inverse.shape[0]):
         for x in range(inverse.shape[1]):
             share = 1.0
@@ -30,7 +30,7 @@ def bgra_from_inverse_depth(inverse: NDArray[np.float32], out: NDArray[np.uint8]
 
 @kernel
 def inverse_depth_from_bgra(bgra: NDArray[np.uint8], out: NDArray[np.float32]) -> None:
-    """(H, W, 4) to (H, W) 1/m; full scale is nothing, 0."""
+    """Writes CARLA's depth code (H, W, 4) as inverse depths in 1/m into out (H, W); full scale is 0."""
     for y in range(out.shape[0]):
         for x in range(out.shape[1]):
             code = (

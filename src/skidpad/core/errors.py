@@ -79,14 +79,14 @@ def install_command(extra: str) -> str:
 
 
 def require_range(field: str, value: float, low: float, high: float) -> float:
-    """`value` if low <= value <= high; else ConfigError naming field, value and range."""
+    """Returns `value` if low <= value <= high; else raises ConfigError naming field, value and range."""
     if not low <= value <= high:  # also catches NaN
         raise ConfigError(f"{field} must be between {low:g} and {high:g}, got {value!r}")
     return value
 
 
 def require_choice(field: str, value: str, allowed: list[str] | tuple[str, ...]) -> str:
-    """`value` if it is one of `allowed`; else ConfigError that lists them."""
+    """Returns `value` if it is one of `allowed`; else raises ConfigError that lists them."""
     if value not in allowed:
         raise ConfigError(f"unknown {field} {value!r}; choose one of: {', '.join(allowed)}")
     return value

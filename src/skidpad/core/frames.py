@@ -30,7 +30,7 @@ class CameraImage:
     packed: NDArray[np.uint32] | None = None  # (H, W) rgb as 4-byte pixels, where it is kept so
 
     def depth(self) -> Floats32:
-        """(H, W) planar depth in m, +inf where there is nothing; computed at each call."""
+        """Returns (H, W) planar depth in m, +inf where there is nothing; computed at each call."""
         assert self.inverse_depth is not None, "this camera delivers no depth"
         with np.errstate(divide="ignore"):
             metres: Floats32 = np.float32(1.0) / self.inverse_depth
@@ -38,7 +38,7 @@ class CameraImage:
 
 
 def pack(rgb: NDArray[np.uint8]) -> NDArray[np.uint32]:
-    """(H, W) pixels of bytes red, green, blue, 255 of an (H, W, 3) image."""
+    """Returns (H, W) pixels of 4 bytes, red, green, blue and 255, of an (H, W, 3) image."""
     padded = np.full((*rgb.shape[:2], 4), 255, dtype=np.uint8)
     padded[..., :3] = rgb
     return padded.view(np.dtype("<u4"))[..., 0]
@@ -49,13 +49,13 @@ class PartialImages(Mapping[str, CameraImage]):
 
     @abstractmethod
     def rows(self, id: str, first: int, end: int) -> CameraImage:
-        """The image with at least the rows first <= row < end; the others may hold anything."""
+        """Returns the image with at least the rows first <= row < end; the others may hold anything."""
 
 
 def image_rows(
     images: Mapping[str, CameraImage], id: str, rows: tuple[int, int]
 ) -> CameraImage | None:
-    """The image of a sensor with at least the rows [first, end); None: there is none.
+    """Returns the image of a sensor with at least the rows [first, end); None: there is none.
 
     Arrays have the size of the whole image; rows outside may hold anything.
     """

@@ -11,7 +11,7 @@ UTM_SCALE = 0.9996  # on the middle meridian
 def geolocation(
     east: float, north: float, latitude: float, longitude: float
 ) -> tuple[float, float]:
-    """(latitude, longitude) in deg of a place in m from an origin in deg.
+    """Returns (latitude, longitude) in deg of a place in m from an origin in deg.
 
     Mercator on a sphere, scaled at the origin, as CARLA computes it.
     """
@@ -24,10 +24,10 @@ def geolocation(
 def client_geolocation(
     east: float, north: float, latitude: float, longitude: float
 ) -> tuple[float, float]:
-    """The same as the client of CARLA 0.9.16 has it: transverse Mercator on a sphere.
+    """Returns (latitude, longitude) in deg as the client of CARLA 0.9.16 has it: transverse Mercator.
 
-    Its scale is UTM's, whatever scale, shift and ellipsoid the map names (found with the wheel, whose
-    numbers these are to the last digits). Spherical form of PROJ's tmerc, inverse.
+    On a sphere; its scale is UTM's, whatever scale, shift and ellipsoid the map names (found with the
+    wheel, whose numbers these are to the last digits). Spherical form of PROJ's tmerc, inverse.
     """
     along = north / (UTM_SCALE * EARTH_RADIUS) + radians(latitude)
     across = east / (UTM_SCALE * EARTH_RADIUS)

@@ -30,7 +30,7 @@ class Pose:
     yaw: float = 0.0
 
     def rotation(self) -> Array:
-        """(3, 3): columns are this frame's axes seen from the parent."""
+        """Returns (3, 3): columns are this frame's axes seen from the parent."""
         cr, sr = cos(self.roll), sin(self.roll)
         cp, sp = cos(self.pitch), sin(self.pitch)
         cy, sy = cos(self.yaw), sin(self.yaw)
@@ -43,7 +43,7 @@ class Pose:
         )
 
     def __matmul__(self, other: Pose) -> Pose:
-        """`pose_a_c = pose_a_b @ pose_b_c`."""
+        """Returns `pose_a_c = pose_a_b @ pose_b_c`."""
         m = self.rotation()
         x, y, z = m @ (other.x, other.y, other.z)
         r = m @ other.rotation()
@@ -57,7 +57,7 @@ class Pose:
         )
 
     def moved(self, forward: float = 0.0, left: float = 0.0, up: float = 0.0) -> Pose:
-        """The same attitude, shifted in the plane along its own heading, and up."""
+        """Returns the same attitude, shifted in the plane along its own heading, and up, in m."""
         c, s = cos(self.yaw), sin(self.yaw)
         return Pose(  # not `replace`: this is asked some thousand times a second
             self.x + forward * c - left * s,
@@ -70,7 +70,7 @@ class Pose:
 
 
 def wrap_angle(angle: float) -> float:
-    """`angle` in radians, wrapped to (-pi, pi]."""
+    """Returns `angle` in radians, wrapped to (-pi, pi]."""
     wrapped = (angle + pi) % (2.0 * pi) - pi
     return pi if wrapped == -pi else wrapped
 
@@ -86,7 +86,7 @@ def kmh_from_mps(v: float) -> float:
 
 
 def footprint(x: float, y: float, yaw: float, length: float, width: float) -> Array:
-    """(4, 2) corners of a box on the ground: front left, rear left, rear right, front right."""
+    """Returns (4, 2) corners of a box on the ground: front left, rear left, rear right, front right."""
     c, s = cos(yaw), sin(yaw)
     half = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * (length / 2.0, width / 2.0)
     corners: Array = half @ np.array([[c, s], [-s, c]]) + (x, y)

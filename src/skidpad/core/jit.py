@@ -35,7 +35,7 @@ IMPORT = re.compile(r"^ *from (\w+(?:\.\w+)*) import (\([^)]*\)|[^\n]*)", re.MUL
 
 
 def kernel_hash(file: Path, root: Path = PACKAGE) -> str:
-    """Hash of the text of `file` and of all files below `root` that its kernels may depend on."""
+    """Returns a hash of `file` and of all files below `root` that its kernels may depend on."""
     reached, waiting = {file}, [file]
     while waiting:
         new = imported(waiting.pop(), root) - reached
@@ -50,7 +50,7 @@ def kernel_hash(file: Path, root: Path = PACKAGE) -> str:
 
 @cache
 def imported(file: Path, root: Path) -> frozenset[Path]:
-    """The files below `root` that `file` imports from."""
+    """Returns the files below `root` that `file` imports from."""
     found = set()
     for module, names in IMPORT.findall(file.read_text(encoding="utf-8")):
         package = root.parent.joinpath(*module.split("."))
@@ -62,7 +62,7 @@ def imported(file: Path, root: Path) -> frozenset[Path]:
 
 
 def user_cache() -> Path:
-    """Where files of this user that can be made again are kept."""
+    """Returns the folder for files of this user that can be made again."""
     if sys.platform == "win32":
         return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "skidpad"
     if sys.platform == "darwin":
@@ -71,13 +71,16 @@ def user_cache() -> Path:
 
 
 def kernel_cache() -> Path:
-    """Where machine code is kept: one folder per file, in it one per hash."""
+    """Returns the folder for machine code: one folder per file, in it one per hash."""
     return user_cache() / "kernels"
 
 
 @cache
 def _cache_of(file: Path) -> str:
-    """The folder for the kernels of `file`; those of its oldest texts are removed."""
+    """Returns the folder for the kernels of `file`, made if need be; those of its oldest texts are removed.
+
+    "" where nothing can be written: machine code is then not kept.
+    """
     parent = kernel_cache() / ".".join(file.relative_to(PACKAGE).with_suffix("").parts)
     folder = parent / kernel_hash(file)
     try:
@@ -94,7 +97,7 @@ def _cache_of(file: Path) -> str:
 
 
 def is_kept(compiled: Any) -> bool:
-    """Whether machine code of this kernel's present text is on the disk; then it only has to load."""
+    """Returns whether machine code of this kernel's present text is on the disk; then it only has to load."""
     code = compiled.py_func.__code__
     own = os.environ.get("NUMBA_CACHE_DIR")
     folder = Path(own or _cache_of(Path(code.co_filename).resolve()) or os.devnull)
@@ -102,7 +105,7 @@ def is_kept(compiled: Any) -> bool:
 
 
 def kernel(function: F) -> F:
-    """Compile with numba: cached on disk, without the GIL, and without fast-math.
+    """Compiles with numba: cached on disk, without the GIL, and without fast-math.
 
     Fast-math would let results differ between processors (decision X-2), so no kernel has it.
     """
@@ -110,10 +113,11 @@ def kernel(function: F) -> F:
 
 
 def inner_kernel(function: F) -> F:
-    """Compile for other kernels alone, without the wrappers through which Python calls.
+    """Compiles for other kernels alone: a call from Python raises TypeError.
 
-    They take a fifth of the time to compile: the arrays of a named tuple are unpacked one by one. They
-    become part of their callers: to hand a map's arrays on takes longer than most of them do.
+    Without the wrappers through which Python calls, which take a fifth of the time to compile: the
+    arrays of a named tuple are unpacked one by one. They become part of their callers: to hand a map's
+    arrays on takes longer than most of them do.
     """
     compiled = _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True)
     compiled.__class__ = InnerKernel
@@ -124,7 +128,7 @@ class InnerKernel(CPUDispatcher):  # type: ignore[misc]
     """What has no way in from Python says so, where numba would follow a null pointer."""
 
     def __call__(self, *_args: object) -> NoReturn:
-        """Refused."""
+        """Raises TypeError: there is no way in from Python."""
         raise TypeError(f"{self.py_func.__qualname__} is for kernels alone; its .py_func is not")
 
 
@@ -193,5 +197,5 @@ else:
 
 @kernel
 def hold(value: T) -> Held[T]:
-    """Hold a named tuple for kernels; the arrays stay shared, so their changes are seen."""
+    """Returns a named tuple held for kernels; the arrays stay shared, so their changes are seen."""
     return Held(value)

@@ -18,12 +18,12 @@ from skidpad.core.geometry import Pose
 def pose_from_carla(
     x: float, y: float, z: float, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0
 ) -> Pose:
-    """CARLA (left-handed, m, deg) to ISO 8855 (right-handed, m, rad)."""
+    """Returns the ISO 8855 pose (right-handed, m, rad) of one of CARLA (left-handed, m, deg)."""
     return Pose(x, -y, z, radians(roll), -radians(pitch), -radians(yaw))
 
 
 def pose_to_carla(pose: Pose) -> tuple[float, float, float, float, float, float]:
-    """ISO 8855 to CARLA: x, y, z in m, roll, pitch, yaw in deg."""
+    """Returns the CARLA pose of one of ISO 8855: x, y, z in m, roll, pitch, yaw in deg."""
     return (
         pose.x,
         -pose.y,
@@ -35,30 +35,30 @@ def pose_to_carla(pose: Pose) -> tuple[float, float, float, float, float, float]
 
 
 def vector_from_carla(x: float, y: float, z: float) -> tuple[float, float, float]:
-    """A place, velocity or force; its own inverse."""
+    """Returns a place, velocity or force in the other axes; its own inverse."""
     return (x, -y, z)
 
 
 def turn_from_carla(x: float, y: float, z: float) -> tuple[float, float, float]:
-    """A rate of rotation about x, y, z, or a torque: an axial vector; its own inverse, no unit."""
+    """Returns a rate of rotation about x, y, z, or a torque, in the other axes; its own inverse, no unit."""
     return (x, -y, -z)
 
 
 def poses_to_carla(
     x: Floats, y: Floats, z: Floats, roll: Floats, pitch: Floats, yaw: Floats
 ) -> Floats:
-    """(n, 6) x, y, z in m, pitch, yaw, roll in deg, as CARLA's snapshots order them."""
+    """Returns (n, 6) x, y, z in m, pitch, yaw, roll in deg, as CARLA's snapshots order them."""
     turned = np.where(yaw == pi, 180.0, np.degrees(-yaw))  # in (-180, 180]
     return np.column_stack((x, -y, z, np.degrees(-pitch), turned, np.degrees(roll)))
 
 
 def vectors_to_carla(x: Floats, y: Floats, z: Floats) -> Floats:
-    """(n, 3) places, velocities or forces from ISO columns."""
+    """Returns (n, 3) places, velocities or forces from ISO columns."""
     return np.column_stack((x, -y, z))
 
 
 def turns_to_carla(x: Floats, y: Floats, z: Floats) -> Floats:
-    """(n, 3) rates of rotation from ISO columns, no unit changed."""
+    """Returns (n, 3) rates of rotation from ISO columns, no unit changed."""
     return np.column_stack((x, -y, -z))
 
 
@@ -68,10 +68,10 @@ def angles_to_carla(angle: Floats) -> Floats:
 
 
 def mirror_value(value: float) -> float:
-    """A steer, azimuth, yaw rate, lateral offset, curvature or y, in either direction."""
+    """Returns a steer, azimuth, yaw rate, lateral offset, curvature or y in the other axes, either way."""
     return -value
 
 
 def lanes_left_from_carla(offset: int) -> int:
-    """CARLA-handed lane offset (+1 is one lane right) to lanes to the left."""
+    """Returns a CARLA-handed lane offset (+1 is one lane right) as lanes to the left."""
     return -offset

@@ -13,9 +13,10 @@ ENDING = 40  # bytes that may follow: a number, a suffix
 
 
 def path_part(text: str, marks: str = MARKS, longest: int = LONGEST) -> str:
-    """`text` as one part of a path: never empty, hidden, "..", too long, or more than one part.
+    """Returns `text` as one part of a path: never empty, hidden, "..", too long, or more than one part.
 
-    What is neither letter, digit nor one of `marks` becomes a hyphen; a plain name stays as it is.
+    What is neither letter, digit nor one of `marks` becomes a hyphen; a plain name stays as it is. A
+    text of more than `longest` bytes ends in a hash of it.
     """
     plain = "".join(c if c.isalnum() or c in marks else "-" for c in text)
     plain = "-" * (len(plain) - len(plain.lstrip("."))) + plain.lstrip(".")
@@ -27,12 +28,12 @@ def path_part(text: str, marks: str = MARKS, longest: int = LONGEST) -> str:
 
 
 def slug(label: str) -> str:
-    """A label as a part of a file's name: letters, digits and hyphens."""
+    """Returns a label as a part of a file's name: letters, digits and hyphens."""
     return path_part(label, marks="")
 
 
 def inside(folder: Path, name: str) -> Path:
-    """The file or folder of this name in `folder`; ConfigError for a name that leads elsewhere."""
+    """Returns the file or folder of this name in `folder`; ConfigError for a name that leads elsewhere."""
     if name != path_part(name, longest=LONGEST + ENDING):
         raise ConfigError(f"{name!r:.200} is no name of a file or folder in {folder}")
     return folder / name

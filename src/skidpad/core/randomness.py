@@ -8,7 +8,7 @@ import numpy as np
 
 
 def stream(seed: int, *name: str | int) -> np.random.Generator:
-    """The generator of the noise source `name` in the run with `seed`.
+    """Returns the generator of the noise source `name` in the run with `seed`, at its beginning.
 
     The name is hashed, not counted: streams do not depend on the order in which they are made.
     """
@@ -16,6 +16,6 @@ def stream(seed: int, *name: str | int) -> np.random.Generator:
 
 
 def stream_key(seed: int, *name: str | int) -> int:
-    """A 64-bit key for kernels that hash (key, tick, pixel) themselves."""
+    """Returns a 64-bit key for kernels that hash (key, tick, pixel) themselves."""
     text = "/".join([str(seed), *map(str, name)]).encode()
     return int.from_bytes(hashlib.blake2b(text, digest_size=8).digest(), "little")

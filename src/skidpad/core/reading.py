@@ -46,7 +46,7 @@ UNUSABLE = (
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is such a file; False also for what no file can be called."""
+    """Returns whether there is such a file; False also for what no file can be called."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -54,7 +54,10 @@ def is_file(path: Path) -> bool:
 
 
 def read_bytes(path: Path, what: str, limit: int = TEXT_MAX) -> bytes:
-    """The content of a file; FileError when it cannot be read or is larger than `limit` bytes."""
+    """Returns the content of a file; FileError when it cannot be read or is larger than `limit` bytes.
+
+    what: the kind of file, for the error.
+    """
     try:
         with path.open("rb") as file:
             content = file.read(limit + 1)
@@ -67,12 +70,12 @@ def read_bytes(path: Path, what: str, limit: int = TEXT_MAX) -> bytes:
 
 
 def unusable(where: str, kind: str, error: BaseException) -> FileError:
-    """One sentence for content that is not what it should be."""
+    """Returns a FileError, one sentence, for content that is not what it should be; `where` begins it."""
     return FileError(f"{where} is not {kind}: {on_a_line(error)}")
 
 
 def decode_yaml(data: bytes, where: str, kind: Any = None) -> Any:
-    """The value of a YAML text, of type `kind` if given.
+    """Returns the value of a YAML text, of type `kind` if given.
 
     FileError when it is no YAML or too much of it, ConfigError when its values do not fit.
     """
@@ -87,7 +90,7 @@ def decode_yaml(data: bytes, where: str, kind: Any = None) -> Any:
 
 
 def convert_plain(plain: Any, kind: Any, where: str) -> Any:
-    """Plain data as a value of type `kind`; ConfigError that says what does not fit."""
+    """Returns plain data as a value of type `kind`; ConfigError that says what does not fit."""
     try:
         return msgspec.convert(plain, kind)
     except UNUSABLE as error:
@@ -95,7 +98,7 @@ def convert_plain(plain: Any, kind: Any, where: str) -> Any:
 
 
 def measure_yaml(data: bytes, where: str) -> None:
-    """FileError for a text that nests or repeats itself beyond any use."""
+    """Raises FileError for a text that nests or repeats itself beyond DEPTH_MAX or NODES_MAX."""
     sizes: list[int] = []  # of the collections that are open
     names: list[str | None] = []
     anchors: dict[str, int] = {}
@@ -127,7 +130,7 @@ def measure_yaml(data: bytes, where: str) -> None:
 
 
 def decode_json(data: bytes | str, where: str, kind: Any = Any) -> Any:
-    """The value of a JSON text, of type `kind`; FileError for anything else."""
+    """Returns the value of a JSON text, of type `kind`; FileError for anything else."""
     try:
         return msgspec.json.decode(data, type=kind)
     except UNUSABLE as error:
@@ -135,7 +138,10 @@ def decode_json(data: bytes | str, where: str, kind: Any = Any) -> Any:
 
 
 def read_arrays(data: bytes, where: str, kind: str = "an .npz file") -> dict[str, NDArray[Any]]:
-    """The arrays of an .npz file; FileError for anything else, before memory is taken for it."""
+    """Returns the arrays of an .npz file by name; FileError for anything else.
+
+    Sizes are checked before memory is taken for it.
+    """
     try:
         with zipfile.ZipFile(BytesIO(data)) as packed:
             members = packed.infolist()

@@ -80,7 +80,7 @@ def is_runtime(function: str) -> bool:
 
 
 def without_counting(text: str) -> str:
-    """The module without counting in its kernels.
+    """Returns the text of the module without counting in its kernels.
 
     Callees become private: another module must not take them for its own, which count.
     """

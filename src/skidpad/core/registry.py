@@ -34,11 +34,11 @@ class Entry(Protocol):
 
     @property
     def name(self) -> str:
-        """The name by which users ask for it."""
+        """Returns the name by which users ask for it."""
 
     @property
     def title(self) -> str:
-        """A few words for tables and pages."""
+        """Returns a few words for tables and pages."""
 
 
 E = TypeVar("E", bound=Entry)
@@ -94,7 +94,7 @@ class Registry(Generic[E]):
         return tuple(self.sources())
 
     def get(self, name: str) -> E:
-        """Returns the entry; ConfigError lists the names that exist, and the nearest."""
+        """Returns the entry; for an unknown name ConfigError lists those that exist, and the nearest."""
         source = self.sources().get(name)
         if source is None:
             near = get_close_matches(name, self.names(), n=1)
@@ -109,7 +109,7 @@ class Registry(Generic[E]):
         return tuple(source.load() for source in self.sources().values())
 
     def foreign_entries(self) -> tuple[E, ...]:
-        """Returns the entries of other packages."""
+        """Returns the entries of other packages; ConfigError for one that cannot be loaded."""
         return tuple(s.load() for s in self.sources().values() if s.package != "skidpad")
 
     def _loader(self, point: EntryPoint, package: str) -> Callable[[], E]:

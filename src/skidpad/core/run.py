@@ -233,7 +233,7 @@ class Route(Struct, frozen=True, kw_only=True, tag="route", forbid_unknown_field
 
     @property
     def place(self) -> str:
-        """The route by whose name results are kept apart."""
+        """Returns the name of the route by which results are kept apart."""
         return self.base or self.name
 
 
@@ -319,7 +319,7 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def cell(self) -> str:
-        """Name of the runs that differ from this one in the seed alone; it can name a folder."""
+        """Returns the name of the runs that differ from this one in the seed alone; it can name a folder."""
         if isinstance(self.course, Route):
             return path_part(self.course.name)
         if isinstance(self.course, Roads):
@@ -330,12 +330,12 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def name(self) -> str:
-        """Name of the run and of its folder."""
+        """Returns the name of the run and of its folder."""
         return f"{self.cell}-{self.seed:0{_DIGITS[type(self.course)]}d}"
 
     @property
     def grip(self) -> GripModel:
-        """What acts on the tyres: its setting, unless friction stays the original one."""
+        """Returns what acts on the tyres: its setting, unless friction stays the original one."""
         return self.settings.world.grip if self.friction is Friction.REDUCED else GripModel.NONE
 
     @property
@@ -357,15 +357,15 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def deadline_s(self) -> float:
-        """Wall time after which the run counts as hanging."""
+        """Returns the wall time in s after which the run counts as hanging."""
         return DEADLINE_BASE_S + DEADLINE_PER_SIMULATED_S * self.duration
 
     def resolved(self) -> dict[str, Any]:
-        """Everything that decides the run, as plain data (A-260); an address does not."""
+        """Returns everything that decides the run, as plain data (A-260); an address does not."""
         return self.to_plain() | {"backend": self.backend.resolved()}
 
     def to_plain(self) -> dict[str, Any]:
-        """The whole value as plain data, as it stands in config.yaml."""
+        """Returns the whole value as plain data, as it stands in config.yaml."""
         plain: dict[str, Any] = {"version": VERSION}
         for name, value in msgspec.to_builtins(self, order="deterministic").items():
             if name == "settings":  # flat, as in a profile
@@ -391,7 +391,7 @@ _DIGITS: dict[type[Struct], int] = {Roads: 3, Scenario: 6, Route: 5}  # of the s
 
 
 def run_from_plain(plain: dict[str, Any], where: str) -> RunSpec:
-    """The run that `to_plain` described; FileError that names `where` for anything else."""
+    """Returns the run that `to_plain` described; FileError that names `where` for anything else."""
     version = plain.get("version")
     if version != VERSION:
         raise FileError(f"{where} has version {version!r} of a run's description, not {VERSION}")

@@ -30,11 +30,11 @@ class AnySpec(Protocol):
 
     @property
     def id(self) -> str:
-        """The key of its readings in `frame.extra`."""
+        """Returns the key of its readings in `frame.extra`."""
 
     @property
     def mount(self) -> Pose:
-        """The pose relative to the vehicle's origin."""
+        """Returns the pose relative to the vehicle's origin."""
 
 
 Measure = Callable[[], Any]  # returns the reading of the present tick
@@ -68,7 +68,7 @@ class SensorType:
     numbers: Callable[[Any], Mapping[str, float]] | None = None
 
     def make(self, spec: AnySpec, host: object) -> Measure:
-        """Returns what measures for this spec in one run."""
+        """Returns a function that measures for this spec in one run."""
         return load_factory(self.factory)(spec, host)
 
     def describes(self, spec: object) -> bool:

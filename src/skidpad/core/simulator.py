@@ -44,7 +44,7 @@ class BackendChoice(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     ] = 0  # 0: never
 
     def resolved(self) -> dict[str, Any]:
-        """What of it decides a run; an address does not."""
+        """Returns what of it decides a run, as plain data; an address does not."""
         plain: dict[str, Any] = msgspec.to_builtins(self)
         return {name: value for name, value in plain.items() if name not in ADDRESS}
 

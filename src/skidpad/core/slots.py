@@ -9,7 +9,7 @@ T = TypeVar("T")
 
 
 def fill_slots(made: type[T]) -> type[T]:
-    """Gives a frozen dataclass with slots an `__init__` that takes half the time.
+    """Gives a frozen dataclass with slots, in place, an `__init__` that takes half the time; returns it.
 
     Python's own finds each slot by its name, through `object.__setattr__`; this one has the setter
     of every slot at hand. Signature, defaults and errors are the same.

@@ -62,7 +62,7 @@ class Normal(Struct, frozen=True, tag="normal", forbid_unknown_fields=True):
 
     @property
     def range(self) -> tuple[float, float]:
-        """The ends of the range; infinite where there is none."""
+        """Returns the ends of the range; infinite where there is none, 0 below a logarithm's."""
         lowest = 0.0 if self.is_log else -math.inf
         return (
             lowest if self.low is None else self.low,
@@ -120,7 +120,7 @@ class Choice(Struct, frozen=True, tag="choice", forbid_unknown_fields=True):
     weights: tuple[float, ...] = ()  # (): alike
 
     def value(self, u: float) -> str:
-        """Return the word below which the share `u` lies."""
+        """Returns the word in whose share of the distribution `u` lies."""
         reached = 0.0
         for word, share in zip(self.words, self._shares(), strict=True):
             reached += share
@@ -129,7 +129,7 @@ class Choice(Struct, frozen=True, tag="choice", forbid_unknown_fields=True):
         return self.words[-1]
 
     def likelihood(self, value: str) -> float:
-        """Return the weight of a word relative to that of the likeliest, 0 to 1."""
+        """Returns the weight of a word relative to that of the likeliest, 0 to 1; 0 for another word."""
         shares = self._shares()
         return shares[self.words.index(value)] / max(shares) if value in self.words else 0.0
 

@@ -45,22 +45,22 @@ class CameraSpec:
 
     @property
     def focal(self) -> float:
-        """Focal length in px: W / (2 tan(FOV / 2)) (eq. 6, A-040)."""
+        """Returns the focal length in px: W / (2 tan(FOV / 2)) (eq. 6, A-040)."""
         return self.width / (2.0 * tan(radians(self.fov_deg) / 2.0))
 
     @property
     def cx(self) -> float:
-        """Column of the principal point in px (A-040)."""
+        """Returns the column of the principal point in px (A-040)."""
         return self.width / 2.0
 
     @property
     def cy(self) -> float:
-        """Row of the principal point in px."""
+        """Returns the row of the principal point in px."""
         return self.height / 2.0
 
     @property
     def view(self) -> tuple[Pose, int, int, float, bool]:
-        """Cameras with equal views share one raster pass."""
+        """Returns what decides the raster: cameras with equal views share one pass."""
         return (self.mount, self.width, self.height, self.fov_deg, self.shows_own_body)
 
 

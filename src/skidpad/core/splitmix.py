@@ -14,7 +14,7 @@ _UNIT = 1.0 / 2**53
 
 @inner_kernel
 def scrambled(z: np.uint64) -> np.uint64:
-    """64 random bits of a counter: the finaliser of SplitMix64."""
+    """Returns 64 random bits of a counter: the finaliser of SplitMix64."""
     z = (z ^ (z >> np.uint64(30))) * _MIX_A
     z = (z ^ (z >> np.uint64(27))) * _MIX_B
     bits: np.uint64 = z ^ (z >> np.uint64(31))
@@ -23,5 +23,5 @@ def scrambled(z: np.uint64) -> np.uint64:
 
 @inner_kernel
 def unit(bits: np.uint64) -> float:
-    """A number in [0, 1) of 64 random bits."""
+    """Returns a number in [0, 1) of 64 random bits."""
     return float(bits >> np.uint64(11)) * _UNIT

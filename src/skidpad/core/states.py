@@ -48,17 +48,17 @@ class ActorStates(NamedTuple):
 
     @classmethod
     def empty(cls, n: int) -> ActorStates:
-        """n actors at the origin, at rest, not present."""
+        """Returns n actors at the origin, at rest, not present."""
         x, y, z, yaw, pitch, roll, vx, vy, yaw_rate, ax, ay = np.zeros((11, n))
         present = np.zeros(n, dtype=np.bool_)
         return cls(x, y, z, yaw, pitch, roll, vx, vy, yaw_rate, ax, ay, present)
 
     def copy(self) -> ActorStates:
-        """Independent arrays (a frame is valid until the next step, decision X-11)."""
+        """Returns independent arrays (a frame is valid until the next step, decision X-11)."""
         return ActorStates._make(a.copy() for a in self)
 
     def pose(self, i: int) -> Pose:
-        """Pose of actor i."""
+        """Returns the pose of actor i."""
         return Pose(
             float(self.x[i]),
             float(self.y[i]),

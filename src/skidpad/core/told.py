@@ -8,7 +8,7 @@ CUT = " [...] "
 
 
 def clean(text: str, longest: int = LONGEST) -> str:
-    """`text` without surrogates, which no encoding takes, and not longer than `longest`."""
+    """Returns `text` without surrogates, which no encoding takes, its middle cut out beyond `longest`."""
     if len(text) > longest:
         half = (longest - len(CUT)) // 2
         text = text[:half] + CUT + text[-half:]
@@ -16,12 +16,12 @@ def clean(text: str, longest: int = LONGEST) -> str:
 
 
 def on_a_line(error: BaseException, longest: int = OF_A_LIBRARY) -> str:
-    """What an exception says, cleaned and on one line; the name of its type where it says nothing."""
+    """Returns what an exception says, cleaned and on one line; the name of its type where it says nothing."""
     return clean(" ".join(str(error).split()) or type(error).__name__, longest)
 
 
 def describe_value(value: object, longest: int = LONGEST) -> str:
-    """`repr(value)`, cleaned; the name of its type where that raises."""
+    """Returns `repr(value)`, cleaned; the name of its type where that raises."""
     try:
         return clean(repr(value), longest)
     except Exception:  # foreign code: anything can happen

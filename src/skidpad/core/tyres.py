@@ -32,7 +32,7 @@ class Tyres(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 
     @property
     def wear(self) -> float:
-        """Share of the usable tread that is gone: 0 when new, 1 at 1.6 mm."""
+        """Returns the share of the usable tread that is gone: 0 when new, 1 at 1.6 mm."""
         return (NEW_MM - self.tread_mm) / (NEW_MM - WORN_MM)
 
 
@@ -51,5 +51,5 @@ def known_tyres() -> dict[str, Tyres]:
 
 
 def find_tyres(name: str) -> Tyres:
-    """The tyres with this name; ConfigError lists the known ones."""
+    """Returns the tyres with this name; ConfigError lists the known ones."""
     return known_tyres()[require_choice("tyres", name, list(known_tyres()))]

@@ -194,7 +194,7 @@ LABELS = frozenset(map(int, SemanticClass))
 
 
 def class_of(label: int) -> SemanticClass:
-    """The class of what a channel saw; a car's for -1, unknown, and for numbers beyond CARLA's."""
+    """Returns the class of what a channel saw; a car's for -1, unknown, and for numbers beyond CARLA's."""
     return SemanticClass(label) if label in LABELS else SemanticClass.CAR
 
 

@@ -58,21 +58,24 @@ class Weather:
 
     @property
     def is_night(self) -> bool:
-        """The sun is below the horizon: headlights on (A-218)."""
+        """Returns whether the sun is below the horizon: headlights on (A-218)."""
         return self.sun_altitude_deg < 0.0
 
     @property
     def precipitation_kind(self) -> str:
-        """`rain` or `clear`, the column of M-8."""
+        """Returns `rain` or `clear`, the column of M-8."""
         return "rain" if self.precipitation > 0.0 else "clear"
 
     @property
     def rain_with_ice(self) -> bool:
-        """Ice together with falling or standing water; refused where the models cannot say (B-002)."""
+        """Returns whether there is ice together with falling or standing water (B-002).
+
+        It is refused where the models cannot say.
+        """
         return self.ice_thickness > 0.0 and (
             self.precipitation > 0.0 or self.precipitation_deposits > 0.0
         )
 
     def values(self) -> dict[str, float]:
-        """The numeric fields by name, in declaration order."""
+        """Returns the numeric fields by name, in declaration order."""
         return {f.name: getattr(self, f.name) for f in fields(self) if f.name in RANGES}

@@ -39,14 +39,14 @@ class Context:
     controllers: Mapping[str, Any] = field(default_factory=dict)  # of entities, not yet active
 
     def entity(self, node: Node, name: str = "entityRef") -> str:
-        """An entity that an attribute names; a fault when there is none."""
+        """Returns the entity that an attribute names; a Fault when there is none."""
         text = node.text(name)
         if text not in self.entities:
             raise node.error(f"{name}: there is no entity {text!r}")
         return text
 
     def actors(self, nodes: Iterable[Node]) -> tuple[str, ...]:
-        """The entities that <EntityRef>s name, selections taken apart."""
+        """Returns the entities that <EntityRef>s name, each once, selections taken apart."""
         found: list[str] = []
         for node in nodes:
             name = node.text("entityRef")
@@ -55,9 +55,9 @@ class Context:
         return tuple(found)
 
     def road(self, node: Node) -> int:
-        """The road that an attribute roadId names; on a map with one road only that one, with a note.
+        """Returns the road that an attribute roadId names; on a map with one road only that one, with a note.
 
-        A fault names the ids that there are.
+        A Fault names the ids that there are.
         """
         text = node.text("roadId")
         number = id_number(text)
@@ -75,7 +75,10 @@ class Context:
         raise node.error(f"roadId: there is no road {text!r}; the map has {some}{more}")
 
     def element(self, node: Node) -> Path:
-        """The storyboard element that a condition names, by its name or the end of its path."""
+        """Returns the path of the storyboard element that a condition names, by name or end of its path.
+
+        The first one that fits; a Fault where none does.
+        """
         text = node.text("storyboardElementRef")
         kind = node.text("storyboardElementType", "")
         wanted = tuple(text.split("::"))
@@ -85,7 +88,7 @@ class Context:
         return fits[0]
 
     def attempt(self, make: Callable[[], Made]) -> Made | None:
-        """What is made, or None with the fault on the list, so that one hides no other."""
+        """Returns what is made, or None with the fault on the list, so that one hides no other."""
         try:
             return make()
         except Fault as fault:

@@ -10,12 +10,12 @@ PREFIX, SUFFIX = "criteria_", "Test"  # in 2019 without the prefix
 
 
 def is_criterion(name: str) -> bool:
-    """Return whether a condition of this name is a criterion of ScenarioRunner."""
+    """Returns whether a condition of this name is a criterion of ScenarioRunner."""
     return name.startswith(PREFIX) or name.endswith(SUFFIX)
 
 
 def file_criteria(root: Node) -> tuple[FileCriterion, ...]:
-    """Return the criteria of a file: conditions on parameters that it does not declare."""
+    """Returns the criteria of a file: conditions on parameters that it does not declare."""
     found: dict[str, FileCriterion] = {}
     for element in root.element.iter("Condition"):
         node = Node(element, root.file, root.values)
@@ -31,7 +31,7 @@ def file_criteria(root: Node) -> tuple[FileCriterion, ...]:
 
 
 def _limit(value: Node) -> float | None:
-    """Return the number that a criterion compares with; None where it states none."""
+    """Returns the number that a criterion compares with; None where it states none."""
     try:
         return value.number("value") if value.element.get("value") else None
     except Fault:

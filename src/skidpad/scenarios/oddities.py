@@ -12,7 +12,7 @@ V_MAX = 150.0  # m/s, 540 km/h: faster is no road vehicle
 
 
 def oddities(root: Node) -> Iterator[Finding]:
-    """Return a note for every absurd speed, count of zero and negative time or distance."""
+    """Yields a note for every absurd speed, count of zero and negative time or distance."""
     for element in root.element.iter(*LOOKS):
         node = Node(element, root.file, root.values)
         try:

@@ -55,7 +55,10 @@ class Acc:
         self.character = Character(headway=headway)
 
     def update(self, scene: Scene, name: str) -> float:
-        """Return the acceleration behind whoever is ahead in the lane."""
+        """Returns the acceleration in m/s^2 behind the vehicle ahead in the lane.
+
+        Without `setSpeed` the speed at the first call is kept.
+        """
         actor = scene.actors[name]
         if self.v_set < 0.0:
             self.v_set = actor.guide.v
@@ -110,19 +113,22 @@ class Names:
     _made: dict[str, Any] = field(default_factory=dict)
 
     def find(self, name: str) -> Make | None:
-        """Return the class of this name."""
+        """Returns the class of this name; None where it is not registered."""
         found = {**BUILT_IN, **REGISTERED, **self.given}.get(name)
         if found is None and name in SCENARIO_NAMES.sources():
             found = SCENARIO_NAMES.get(name).made
         return found
 
     def unknown(self, node: Node, what: str, name: str) -> Finding:
-        """Return what is said of a name that is not registered."""
+        """Returns the finding on a name that is not registered; an error if strict, else a note."""
         text = f"{what} {name!r} is not registered: it does nothing"
         return node.finding(text, Kind.ERROR if self.strict else Kind.NOTE)
 
     def hook(self, name: str, method: str) -> Callable[..., Any] | None:
-        """Return a method of the one object of this name in this file; None: not registered."""
+        """Returns a method of the one object of this name in this file; None: not registered.
+
+        ConfigError where the object has no such method.
+        """
         made = self.find(name)
         if made is None or name in BUILT_IN:
             return None
@@ -135,7 +141,7 @@ class Names:
 
 
 def call(name: str, function: Callable[..., Any], *args: Any) -> Any:
-    """Call a user's code; whatever it raises is said in one sentence."""
+    """Calls a user's code and returns its result; what it raises becomes a ConfigError in one sentence."""
     try:
         return function(*args)
     except ConfigError:
@@ -168,11 +174,11 @@ class ActiveController:
 
     @property
     def drives(self) -> bool:
-        """Return whether it says pedals and steer, by a method `drive`."""
+        """Returns whether it gives pedals and steer, by a method `drive`."""
         return hasattr(self.inner, "drive")
 
     def command(self, scene: Scene, actor: str) -> VehicleCommand:
-        """Return pedals and steer; ConfigError for anything else."""
+        """Returns pedals and steer; ConfigError for anything else."""
         found = call(self.name, self.inner.drive, scene, actor)
         if not isinstance(found, VehicleCommand) or not all(
             isfinite(v) for v in (found.throttle, found.brake, found.steer)
@@ -184,7 +190,7 @@ class ActiveController:
         return found
 
     def acceleration(self, scene: Scene, actor: str) -> float:
-        """Return what it asks for, m/s^2; ConfigError for what is no number."""
+        """Returns the acceleration that it asks for, m/s^2; ConfigError for what is no number."""
         a = call(self.name, self.inner.update, scene, actor)
         if not isinstance(a, (int, float)) or not isfinite(a):
             raise ConfigError(
@@ -194,7 +200,10 @@ class ActiveController:
 
 
 def controller_of(node: Node, names: Names) -> tuple[ControllerOf | None, Finding | None]:
-    """Return the controller inside a <Controller>, or what is said where it is not known."""
+    """Returns the controller inside a <Controller>, or what is said where it is not known.
+
+    One of both is None.
+    """
     name = node.text("name")
     made = names.find(name)
     if made is None:

@@ -60,12 +60,12 @@ class Scenario:
 
     @property
     def map(self) -> RoadMap:
-        """Road network on which the scenario plays."""
+        """Returns the road network on which the scenario plays."""
         return self.network.map
 
     @property
     def map_name(self) -> str:
-        """A bundled map's name, or a file's path."""
+        """Returns a bundled map's name, or a file's path."""
         return self.network.name
 
     @property
@@ -82,7 +82,7 @@ class Compiled:
     findings: tuple[Finding, ...]
 
     def playable(self) -> Scenario:
-        """The scenario; ScenarioError lists everything that keeps it from being played."""
+        """Returns the scenario; ScenarioError lists everything that keeps it from being played."""
         if self.scenario is None:
             raise ScenarioError([f for f in self.findings if f.kind not in HARMLESS])
         return self.scenario
@@ -97,9 +97,10 @@ def compile_scenario(
     ignore_unsupported: bool = False,
     lenient: bool = False,
 ) -> Scenario:
-    """The file as a scenario; ScenarioError lists everything that keeps it from being played.
+    """Returns the file as a scenario; ScenarioError lists everything that keeps it from being played.
 
-    maps: folders with roads that files name without saying where they are.
+    maps: folders with roads that files name without saying where they are. FileError for what is no
+    scenario at all. The other options: as in `check`.
     """
     found = check(
         file, parameters, ego, maps=maps, ignore_unsupported=ignore_unsupported, lenient=lenient
@@ -117,9 +118,11 @@ def check(
     lenient: bool = False,
     names: Names | None = None,
 ) -> Compiled:
-    """Compile, and tell everything that was found; FileError for what is no scenario at all.
+    """Compiles a file, and returns the scenario with all findings; FileError for what is no scenario at all.
 
-    lenient: what is missing but clear is filled in, with a warning. names: that the file may use.
+    ego: the entity that is to be it, None for the file's own; maps: folders with roads;
+    ignore_unsupported: what is unknown here is left out; lenient: what is missing but clear is filled
+    in, with a warning; names: that the file may use.
     """
     allowed = HARMLESS | {Kind.UNSUPPORTED} if ignore_unsupported else HARMLESS
     root = parse(file)
@@ -223,7 +226,7 @@ def _compile_scenario(root: Node, wish: _Wish, findings: list[Finding]) -> Scena
 def _entity_controllers(
     root: Node, catalogs: Catalogs, names: Names
 ) -> tuple[dict[str, ControllerOf], list[tuple[str, Finding]]]:
-    """Controllers of entities by name, and what is said of those that are not known."""
+    """Returns the controllers of entities by name, and what is said of those that are not known."""
     known: dict[str, ControllerOf] = {}
     unknown: list[tuple[str, Finding]] = []
     for entity in root.child("Entities").children("ScenarioObject"):
@@ -240,13 +243,13 @@ def _entity_controllers(
 
 
 def _added_entities(board: Node) -> frozenset[str]:
-    """Entities that events put into the world."""
+    """Returns the names of entities that events put into the world."""
     found = board.element.iterfind("Story//EntityAction[AddEntityAction]")
     return frozenset(node.get("entityRef", "") for node in found)
 
 
 def _activations(board: Storyboard, name: str) -> Iterator[bool]:
-    """Controllers of an entity that events switch on."""
+    """Yields True for each controller of an entity that an event switches on."""
     for story in board.stories:
         for act in story.acts:
             for group in act.groups:
@@ -259,7 +262,10 @@ def _activations(board: Storyboard, name: str) -> Iterator[bool]:
 
 
 def _network(root: Node, maps: Sequence[Path], findings: list[Finding]) -> Network:
-    """The road beside the file; a bundled map by its bare name; a straight road where none is named."""
+    """Returns the road beside the file; a bundled map by its bare name; a straight road for none.
+
+    A Fault where the road named is not there; a straight road, with a note, where it has no lane.
+    """
     logic = root.find("RoadNetwork", "LogicFile")
     if logic is None:
         return network_of(load_map(EMPTY_ROAD), EMPTY_ROAD, stand_in=True)
@@ -285,10 +291,10 @@ def _network(root: Node, maps: Sequence[Path], findings: list[Finding]) -> Netwo
 
 
 def _bare(name: str) -> str:
-    """The name of a map where a file names no folder."""
+    """Returns the name of a map where a file names no folder, else ""."""
     return Path(name).stem if len(Path(name).parts) == 1 else ""
 
 
 def _is_bundled(file: Path, name: str) -> bool:
-    """The road beside a scenario of our catalogue is a copy of a bundled one."""
+    """Returns whether the road beside a scenario of our catalogue is a copy of a bundled one."""
     return file.parent == FOLDER and _bare(name) in bundled_maps()

@@ -59,7 +59,7 @@ class Running(Protocol):
     """An action that is under way."""
 
     def step(self, scene: Scene) -> bool:
-        """Go on for one step; True when it is done."""
+        """Goes on for one step; True when it is done."""
         ...
 
 
@@ -80,15 +80,15 @@ class Controlling(Protocol):
 
     @property
     def drives(self) -> bool:
-        """Tells whether it says pedals and steer."""
+        """Tells whether it gives pedals and steer."""
         ...
 
     def acceleration(self, scene: Scene, actor: str) -> float:
-        """Return the acceleration that it asks for, m/s^2."""
+        """Returns the acceleration that it asks for, m/s^2."""
         ...
 
     def command(self, scene: Scene, actor: str) -> VehicleCommand:
-        """Return pedals and steer for the coming step."""
+        """Returns pedals and steer for the coming step."""
         ...
 
 
@@ -162,11 +162,17 @@ class Actor:
 
     @property
     def v_told(self) -> float:
-        """Speed that the file asks of it, m/s, negative backwards; its own, where it drives itself."""
+        """Returns the speed that the file asks of it, m/s, negative backwards; else its own.
+
+        Its own counts where the file does not drive it.
+        """
         return self.guide.v if self.driven_by_file else self.motion.speed
 
     def let_go(self, action: Running, network: Network) -> None:
-        """An action of it has been stopped: what it did has no more rate, a lane is followed again."""
+        """Ends an action of it that has been stopped: what it did has no more rate, a lane is followed again.
+
+        Any other action is ignored.
+        """
         if action is self.longitudinal:
             self.longitudinal, self.guide.a = None, 0.0
         if action is self.lateral:
@@ -181,7 +187,10 @@ class Actor:
             self.follow_road(network, self.guide.v)
 
     def lead(self, action: Running, track: Track, t: float) -> None:
-        """An action leads it along a track; what moved it aside is over, with times its speed too."""
+        """Lets an action lead it along a track; what moved it aside is over, with times its speed action too.
+
+        t: s, since when.
+        """
         self.v_after_track = None
         self.leading, self.track, self.led_since, self.lateral = action, track, t, None
         self.lane_steering = None
@@ -189,27 +198,27 @@ class Actor:
             self.longitudinal = None
 
     def pace_by(self, action: Running, scene: Scene) -> None:
-        """An action decides its speed; the newer one wins against a track with times."""
+        """Lets an action decide its speed; it ends a track with times that began in an earlier step."""
         self.longitudinal = action
         if self.track is not None and self.track.timed and self.led_since < scene.t:
             self.leave_track(scene.network)
 
     def leap(self, way: float) -> None:
-        """Be `way` m further along its lane or trajectory at the end of this step, at its own speed."""
+        """Puts it `way` m further along its lane or trajectory at the end of this step, at its own speed."""
         if self.track is not None:
             self.track.skip(way)
         else:
             self.guide.leap += way
 
     def place(self, network: Network) -> Place:
-        """Where it is, with its lane: the one that it keeps to, else the one under it."""
+        """Returns where it is, with its lane: the one that it keeps to, else the one under it."""
         guide = self.guide
         if self.driven_by_file and self.track is None and guide.base is not None:
             return guide.place(self.pose)
         return network.place_of(self.pose)
 
     def catch_up(self, network: Network) -> None:
-        """Bring the lane's point abreast of an actor that was not moved along it."""
+        """Brings the lane's point abreast of an actor that was not moved along it."""
         if not self.driven_by_file:
             self.guide.base = self.place(network).lane
         elif self.mode is not ActorMode.IDEAL and self.driver is not None:
@@ -220,11 +229,14 @@ class Actor:
         return corners(self.pose, self.entity.box)
 
     def centre(self, pose: Pose) -> Pose:
-        """Where the box's centre is when the reference point is at `pose`."""
+        """Returns where the box's centre is when the reference point is at `pose`."""
         return pose.moved(forward=self.entity.box.forward, left=self.entity.box.left)
 
     def command(self, t: float, dt: float) -> ActorCommand | None:
-        """The word to the backend for the step from t to t + dt."""
+        """Returns the command to the backend for the step from t to t + dt s, and moves on in it.
+
+        None where it is not there or the file does not move it. A word to appear or vanish comes once.
+        """
         if self.word is not None:
             word, self.word = self.word, None
             if word.place is not None and self.placed_by_file:
@@ -246,11 +258,14 @@ class Actor:
         )
 
     def overridden(self, command: VehicleCommand) -> VehicleCommand:
-        """What a driver does, with the inputs that the file works itself."""
+        """Returns what a driver does, with the inputs that the file works itself."""
         return replace(command, **self.worked) if self.worked else command
 
     def _place_command(self, t: float, dt: float) -> ActorCommand:
-        """Returns the command that places the actor on its trajectory or road, and updates its pose."""
+        """Returns the command that places the actor where it is at t s, and sets its pose to that.
+
+        dt: s of the step, for an actor on its lane.
+        """
         if self.track is not None:
             pose, v, _ = self.track.at(t)
             v = v if self.track.timed or self.track.steered else self.guide.v
@@ -260,7 +275,7 @@ class Actor:
         return ActorCommand(self.name, place=self.centre(pose), speed=v)
 
     def _pose_on_road(self, dt: float) -> Pose:
-        """Return the pose a step on along the lane, where it is put or steers to."""
+        """Moves on by dt s along the lane and returns the pose there, where it is put or steers to."""
         steering = self.lane_steering
         if steering is None:
             return self.guide.ideal(dt)
@@ -270,7 +285,7 @@ class Actor:
         return pose
 
     def put(self, network: Network, place: Place, v: float) -> None:
-        """It stands somewhere else from now on."""
+        """Puts it somewhere else, and into the world, from now on; it keeps its roads and no track."""
         self.lane_steering = None
         roads = self.guide.roads
         self.guide = Guide(network, place, v)
@@ -281,16 +296,16 @@ class Actor:
         self.word = ActorCommand(self.name, place=self.centre(place.pose), speed=v, present=True)
 
     def follow_road(self, network: Network, v: float) -> None:
-        """Drives from here along the lane at speed v: the default controller."""
+        """Makes it drive from here along the lane at speed v: the default controller; ends its track."""
         roads = self.guide.roads
         self.guide = Guide(network, network.place_of(self.pose), v)
         self.guide.roads = roads
         self.track = None
 
     def observe(self, motion: Motion, z: float, dt: float) -> None:
-        """Take over a tick's motion of the box's centre; nothing has lasted in the first one.
+        """Takes over a tick's motion of the box's centre; nothing has lasted in the first one.
 
-        z: of the ground, m, for whom the file does not place.
+        z: of the ground, m, for an actor that the file does not place. dt: s since the tick before.
         """
         placed, v, before = self.placed_by_file, self.v, self.motion
         self.motion = motion
@@ -345,7 +360,7 @@ class Scene:
     cruising: dict[str, float] = field(default_factory=dict)  # m/s that traffic's vehicles want
 
     def moved(self, path: Path, move: Move) -> None:
-        """An element of the storyboard goes through a transition."""
+        """Notes that an element of the storyboard goes through a transition."""
         self.moves.append((path, move))
         self.story.append(Happening(self.t, path, move.value))
 
@@ -361,14 +376,14 @@ class Scene:
         self.contacts = {c.static or truth.table.names[c.actor] for c in truth.contacts}
 
     def between(self, a: str, b: str) -> Point:
-        """Where b lies as seen from a: m forward, m left."""
+        """Returns where b lies as seen from a: m forward, m left."""
         from_, to = self.actors[a].pose, self.actors[b].pose
         dx, dy = to.x - from_.x, to.y - from_.y
         c, s = cos(from_.yaw), sin(from_.yaw)
         return dx * c + dy * s, dy * c - dx * s
 
     def touch(self, a: str, b: str) -> bool:
-        """Whether two entities are in contact now."""
+        """Returns whether two entities are in contact now; never one that is absent or a ghost."""
         if (a == self.ego and b in self.contacts) or (b == self.ego and a in self.contacts):
             return True
         one, other = self.actors[a], self.actors[b]
@@ -384,7 +399,7 @@ class Scene:
         return high - low < body
 
     def _stands(self, name: str) -> tuple[float, float]:
-        """Height of the road under an entity, and of its body; m.
+        """Returns the height of the road under an entity, and of its body; m.
 
         The road's, because a place without z means the ground and is read as z = 0.
         """
@@ -393,11 +408,11 @@ class Scene:
         return actor.pose.z if lane is None else lane.z, actor.entity.box.height
 
     def tell_time(self, environment: Environment) -> None:
-        """Set the clock, where an environment says a time of day."""
+        """Sets the clock, where an environment says a time of day."""
         if environment.moment is not None:
             self.clock = Clock(environment.moment, self.t, environment.clock_runs)
 
     def notice(self, text: str) -> None:
-        """Say once what could not be done."""
+        """Adds once to the notices what could not be done."""
         if text not in self.notices:
             self.notices.append(text)

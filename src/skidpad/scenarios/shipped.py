@@ -25,12 +25,12 @@ class Shipped:
 
 
 def scenario_file(name: str) -> Path:
-    """The 1.2 file of a scenario of the catalogue."""
+    """Returns the 1.2 file of a scenario of the catalogue; ConfigError for an unknown name."""
     return FOLDER / f"{require_choice('scenario', name, NAMES)}.xosc"
 
 
 def find_scenario(file: Path) -> Path:
-    """Return a file or folder, also of a name of the catalogue; FileError where there is neither."""
+    """Returns a file or folder, also of a name of the catalogue; FileError where there is neither."""
     if not file.exists() and str(file) in NAMES:
         return scenario_file(str(file))
     if not file.exists():

@@ -32,7 +32,7 @@ class SignalController:
     delay: float
 
     def phase(self, t: float) -> Phase | None:
-        """At t s of its cycle; None where there is no cycle."""
+        """Returns the phase at t s of its cycle; None where there is no cycle."""
         cycle = sum(p.duration for p in self.phases)
         if cycle <= 0.0:
             return None
@@ -44,7 +44,7 @@ class SignalController:
         return self.phases[0]
 
     def begin_of(self, name: str) -> float | None:
-        """When a phase begins in the cycle, s; None where there is no such phase."""
+        """Returns when a phase begins in the cycle, s; None where there is no such phase."""
         t = 0.0
         for phase in self.phases:
             if phase.name == name:
@@ -54,7 +54,7 @@ class SignalController:
 
 
 def compile_signals(road: Node | None) -> tuple[SignalController, ...]:
-    """Those of a <RoadNetwork>; a delay counts from the controller that is referred to."""
+    """Returns the controllers of a <RoadNetwork>; a delay counts from the controller that is referred to."""
     signals = None if road is None else road.find("TrafficSignals")
     if signals is None:
         return ()
@@ -94,7 +94,7 @@ def _delay(node: Node, nodes: Mapping[str, Node]) -> float:
 
 
 def read_signal_state(state: str) -> LightState | None:
-    """What a light shows: a colour, or three lamps from the top (`on;off;off`).
+    """Returns what a light shows: a colour, or three lamps from the top (`on;off;off`).
 
     The standard leaves states to the road's own signals; other words are for conditions alone: None.
     """
@@ -108,7 +108,10 @@ def read_signal_state(state: str) -> LightState | None:
 
 
 def held_lights(scene: Scene) -> tuple[tuple[int, LightState], ...]:
-    """Signals that the file has set, by the road's ids, in colours; `id=7` as CARLA's files have it."""
+    """Returns the colours of signals that the file has set, by the road's ids; `id=7` as CARLA has it.
+
+    Signals in other states are left out.
+    """
     states = (
         (id_number(n.removeprefix("id=")), read_signal_state(s)) for n, s in scene.signals.items()
     )
@@ -124,7 +127,7 @@ class SignalPlan:
         self.told: dict[str, str] = {}
 
     def step(self, scene: Scene) -> None:
-        """Tell the scene which phases and states begin now."""
+        """Sets the phases and states that begin now in the scene's signals."""
         for k, controller in enumerate(self.controllers):
             name = controller.name
             asked = scene.signals.get(name)

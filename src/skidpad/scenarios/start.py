@@ -68,7 +68,7 @@ class _Wish:
 
 
 def compile_start(init: Node, ctx: Context) -> Start:
-    """The <Init> of a storyboard; what is faulty goes to the list of findings."""
+    """Compiles the <Init> of a storyboard; what is faulty goes to the list of findings."""
     wishes: dict[str, _Wish] = {}
     worldwide: list[GlobalAction] = []
     gone: set[str] = set()
@@ -153,7 +153,7 @@ class _Starting:
         return self._known[key]
 
     def place(self, network: Network) -> Place:
-        """Where it begins; while that is worked out, where it is so far."""
+        """Returns where it begins; while that is worked out, where it is so far."""
         del network
         if self._known.get("place") is _ASKED and self._so_far is not None:
             return self._so_far
@@ -176,7 +176,7 @@ class _Starting:
         return self._so_far or network.place_of(ORIGIN)
 
     def _place_after(self, action: PrivateAction) -> Place:
-        """Where an action that takes no time puts it: along its lane, aside, or straight on."""
+        """Returns where an action that takes no time puts it: along its lane, aside, or straight on."""
         itself, network = cast("Actor", self), self.ctx.network
         here = self._so_far = self._so_far or network.place_of(ORIGIN)
         self.guide = guide = Guide(network, here, 0.0)
@@ -226,7 +226,10 @@ _ASKED = object()
 def _worked_out(
     init: Node, wishes: Mapping[str, _Wish], gone: set[str], ctx: Context
 ) -> Iterator[tuple[str, Begin]]:
-    """Yields where entities begin; what <Init> puts nowhere stands at the origin, as in esmini."""
+    """Yields names and where entities begin; what <Init> puts nowhere stands at the origin, as in esmini.
+
+    An entity with a fault, or one that an event is to add, begins without a place.
+    """
     actors: dict[str, _Starting] = {}
     scene = Scene(ctx.network, 0.0, cast("Mapping[str, Actor]", actors))
     for name in ctx.entities:

@@ -120,7 +120,7 @@ LEVELS: Mapping[str, Level] = {
 
 
 def element_paths(board: Node, ctx: Context) -> list[tuple[str, Path]]:
-    """Types and paths of all elements, for conditions that name them, entries of catalogs too."""
+    """Returns types and paths of all elements, for conditions that name them, entries of catalogs too."""
     found: list[tuple[str, Path]] = []
 
     def look(node: Node, above: Path) -> None:
@@ -145,7 +145,7 @@ def element_paths(board: Node, ctx: Context) -> list[tuple[str, Path]]:
 
 
 def compile_storyboard(board: Node, ctx: Context) -> Storyboard:
-    """The <Storyboard>; what is faulty goes to the list of findings."""
+    """Compiles the <Storyboard>; what is faulty goes to the list of findings."""
     ctx.elements = element_paths(board, ctx)
     stories = tuple(_story(inner(s), ctx) for s in board.children("Story"))
     return Storyboard(stories, compile_trigger(board.find("StopTrigger"), ctx))

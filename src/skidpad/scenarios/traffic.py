@@ -35,7 +35,7 @@ class Speeds(NamedTuple):
     high: float | None = None
 
     def draw(self, rng: Random, map: RoadMap, point: LanePoint) -> float:
-        """Draws the speed of a vehicle that appears at a place."""
+        """Draws the speed in m/s of a vehicle that appears at a place; without limits that of the lane."""
         if self.low is not None and self.high is not None:
             return rng.uniform(self.low, self.high)
         limit = map.limit(point)
@@ -77,14 +77,14 @@ class Pool:
 
 
 def vanish(scene: Scene, actor: Actor) -> None:
-    """Out of the world, and free to come again."""
+    """Takes a vehicle of traffic out of the world, free to come again."""
     scene.cruising.pop(actor.name, None)
     actor.present = False
     actor.word = ActorCommand(actor.name, present=False)
 
 
 def _free(scene: Scene, spots: Spots, v: float, length: float) -> Flags:
-    """Returns spots where a body of this length may appear at v m/s without hard braking of others."""
+    """Returns (N,) spots where a body `length` m long may appear at v m/s without hard braking of others."""
     mask = np.ones(len(spots.x), np.bool_)
     for actor in scene.actors.values():
         if actor.present:
@@ -114,7 +114,7 @@ class Sourcing:
         self.due: float | None = None
 
     def step(self, scene: Scene) -> bool:
-        """Lets vehicles come until it is stopped."""
+        """Lets vehicles come until it is stopped; True then."""
         if self.stopped:
             return True
         self.due = scene.t if self.due is None else self.due
@@ -141,7 +141,7 @@ class Sinking:
         self.due = 0.0
 
     def step(self, scene: Scene) -> bool:
-        """Takes vehicles out until it is stopped."""
+        """Takes vehicles out until it is stopped; True then."""
         if self.stopped:
             return True
         pose = self.region.centre.place(scene).pose
@@ -186,7 +186,7 @@ class Filling:
         self.due: float | None = None
 
     def step(self, scene: Scene) -> bool:
-        """Keeps the number of vehicles until it is stopped."""
+        """Keeps the number of vehicles until it is stopped; True then, or at once without `later`."""
         if self.stopped:
             return True
         if self.due is None:
@@ -221,7 +221,7 @@ class Filling:
 
 
 def drive(scene: Scene) -> None:
-    """All vehicles of traffic for one step: along their lanes, behind others, out at a road's end.
+    """Moves all vehicles of traffic for one step: along their lanes, behind others, out at a road's end.
 
     Source: the Intelligent Driver Model of `simulation.world.traffic.idm`.
     """

@@ -20,7 +20,7 @@ from skidpad.scenarios.start import Begin, Start
 
 
 def hitch_of(pose: Pose, tractor: Entity) -> tuple[float, float]:
-    """Returns where a vehicle's hitch is."""
+    """Returns x and y in m of a vehicle's hitch."""
     dx = tractor.coupling.hitch or 0.0
     return pose.x + dx * cos(pose.yaw), pose.y + dx * sin(pose.yaw)
 
@@ -64,7 +64,7 @@ def line_up(start: Start, entities: Mapping[str, Entity], network: Network) -> S
 
 
 def connect_at_begin(actors: Mapping[str, Actor]) -> None:
-    """Connect what the vehicles of a file tow from the begin."""
+    """Connects what the vehicles of a file tow from the begin."""
     for tractor, trailer in towing_pairs({name: a.entity for name, a in actors.items()}):
         actors[trailer.name].towed_by = actors[tractor.name]
 
@@ -81,7 +81,10 @@ def _depth(actor: Actor) -> int:
 
 
 def tow_command(actor: Actor, tractor: Actor, dt: float) -> ActorCommand | None:
-    """Returns where a trailer is at the end of the step; None while either is not in the world."""
+    """Moves a trailer behind its tractor and returns where it is at the end of the step of dt s.
+
+    None while either is not in the world.
+    """
     if not (actor.present and tractor.present):
         return None
     pose, motion = tractor.pose, tractor.motion

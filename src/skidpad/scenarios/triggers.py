@@ -36,11 +36,11 @@ class AnyEntity:
     condition: EntityCondition
 
     def probe(self) -> Probe:
-        """Returns what tells whether the condition holds for any entity, or for all."""
+        """Returns a function of the scene: whether the condition holds for any entity, or for all."""
         return self._holds
 
     def holding(self, scene: Scene) -> list[str]:
-        """The entities for which it holds now."""
+        """Returns the entities for which it holds now."""
         names = (n for n in self.names if scene.actors[n].present)
         return [n for n in names if self.condition.holds(scene, n)]
 
@@ -86,7 +86,7 @@ class Watched:
         self.past: deque[tuple[float, bool]] = deque()
 
     def holds(self, scene: Scene) -> bool:
-        """The result of `delay` s ago; the story tells when it changes."""
+        """Returns the result of `delay` s ago; adds a change of it to the story. Once per step."""
         result = self._result(scene)
         if result is not self.said:
             self.said = result
@@ -121,7 +121,10 @@ class Watch:
         return bool(self.groups)
 
     def fires(self, scene: Scene) -> bool:
-        """Every condition is looked at in every step, so that delays and edges stay true."""
+        """Returns whether all conditions of any group hold; to be called once per step.
+
+        Every condition is looked at each time, so that delays and edges stay true.
+        """
         self.fired = []
         for group in self.groups:
             are_met = True
@@ -132,14 +135,17 @@ class Watch:
         return bool(self.fired)
 
     def triggering(self, scene: Scene) -> list[str]:
-        """The entities that made it fire just now."""
+        """Returns the entities that made it fire just now."""
         conditions = (c.timed.condition for group in self.fired for c in group)
         asked = [c for c in conditions if isinstance(c, AnyEntity)]
         return list(dict.fromkeys(n for c in asked for n in c.holding(scene)))
 
 
 def compile_trigger(node: Node | None, ctx: Context) -> Trigger:
-    """A <StartTrigger> or <StopTrigger>; faulty conditions go to the list of findings."""
+    """Compiles a <StartTrigger> or <StopTrigger>; faulty conditions go to the list of findings.
+
+    Such a condition never holds; None gives an empty trigger.
+    """
     if node is None:
         return EMPTY
     groups = []

@@ -54,7 +54,7 @@ FIRST_DISTANCE, REPAIRED_DISTANCE = 12.0, 2.0  # m, chosen as docs/grip.md says 
 def variant_parameters(
     variant: CutIn, v_ghost: float = FROM_REST["GhostSpeed"]
 ) -> dict[str, float]:
-    """Values of the file's parameters that make the variant. v_ghost: m/s."""
+    """Returns the values of the file's parameters that make the variant. v_ghost: m/s."""
     late = 0.0 if variant is CutIn.ORIGINAL else SPAWN_DELAY * DT
     repaired = variant is CutIn.FIXED
     return FROM_REST | {
@@ -66,7 +66,7 @@ def variant_parameters(
 
 @cache
 def variations() -> dict[str, dict[str, Spread]]:
-    """What a seed varies, by scenario and parameter."""
+    """Returns what a seed varies, by scenario and parameter."""
     text = (files("skidpad.scenarios") / "variation.yaml").read_bytes()
     return msgspec.yaml.decode(text, type=dict[str, dict[str, Spread]])
 
@@ -77,7 +77,7 @@ def drawn_parameters(
     variant: CutIn = CutIn.FIXED,
     nominal: Mapping[str, float] = MappingProxyType({}),
 ) -> dict[str, float]:
-    """Parameters of a scenario for a seed; the same for every weather and friction (X-8).
+    """Returns the parameters of a scenario for a seed; the same for every weather and friction (X-8).
 
     nominal: values drawn around in place of the file's.
     """
@@ -95,7 +95,7 @@ def drawn_parameters(
 
 
 def drawn_skill(name: str, seed: int) -> dict[str, float]:
-    """Gains of the scripted drivers, by actor."""
+    """Returns the gains of the scripted drivers, by actor, around 1."""
     spread = Spread(spread=SKILL_SPREAD)
     return {
         actor: spread.draw(1.0, stream(seed, "scenario", name, "driver", actor))

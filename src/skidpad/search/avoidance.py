@@ -63,7 +63,7 @@ def find_run_avoidance(
 
 
 def track_of(log: RunLog, actor: int) -> Track:
-    """Return the recorded box of an actor."""
+    """Returns the recorded box of an actor in all ticks of the log."""
     a, i = log.actors, actor
     x, y, yaw = (np.asarray(c[:, i], dtype=np.float64) for c in (a.x, a.y, a.yaw))
     return Track(
@@ -72,7 +72,7 @@ def track_of(log: RunLog, actor: int) -> Track:
 
 
 def motion_of(log: RunLog, actor: int) -> Motion:
-    """Return the recorded speed along the heading, and the yaw rate, of an actor."""
+    """Returns the recorded speed along the heading in m/s, and the yaw rate in rad/s, of an actor."""
     a = log.actors
     series = (a.vx, a.vy, a.yaw, a.yaw_rate)
     vx, vy, yaw, rate = (np.asarray(c[:, actor], dtype=np.float64) for c in series)
@@ -83,7 +83,10 @@ def _foreseen(
     log: RunLog, road: RoadMap, tracks: list[Track], actor: int | None, rows: np.ndarray,
     standing: list[Track],
 ) -> Flags:  # fmt: skip
-    """(rows,) whether constant motion leads to the failure, and what is touched can be seen."""
+    """Returns (rows,) whether constant motion leads to the failure, and what is touched can be seen.
+
+    actor: row of what is touched, as in `find_run_avoidance`. Seeing is asked only back to the last gap.
+    """
     ego = predict_motion(tracks[0], motion_of(log, 0), rows)
     if actor is None or actor < 0:
         z = np.repeat(log.actors.z[rows, 0], ego.x.shape[1])
@@ -104,7 +107,7 @@ def _foreseen(
 
 
 def _start(log: RunLog, road: RoadMap, row: int, reaction: float) -> tuple[Start, Path]:
-    """Return the ego's state in a row and the path of its lane from there on."""
+    """Returns the ego's state in a row and the path of its lane from there on; straight on off the lanes."""
     track, motion = track_of(log, 0), motion_of(log, 0)
     x, y, yaw = (float(c[row]) for c in track[:3])
     z, v = float(log.actors.z[row, 0]), max(float(motion.speed[row]), 0.0)
@@ -128,7 +131,10 @@ def _start(log: RunLog, road: RoadMap, row: int, reaction: float) -> tuple[Start
 
 
 def _path(places: Floats, heading: float, far: int) -> Path:
-    """Return a path through places (n, 4), which goes on straight where the road ends."""
+    """Returns a path through places (n, 4) x, y, z, curvature, at least `far` m long.
+
+    heading: rad at its begin. It goes on straight where the road ends.
+    """
     way = np.append(0.0, np.cumsum(np.hypot(np.diff(places[:, 0]), np.diff(places[:, 1]))))
     chords = np.arctan2(np.diff(places[:, 1]), np.diff(places[:, 0]))
     middle = 0.5 * (way[1:] + way[:-1])

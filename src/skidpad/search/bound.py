@@ -93,7 +93,10 @@ def boxes_overlap(a: Track, b: Track) -> Flags:
 
 
 def predict_motion(track: Track, motion: Motion, rows: NDArray[np.int64]) -> Track:
-    """Return where constant speed and yaw rate lead from each row: arrays (rows, times)."""
+    """Returns where constant speed and yaw rate lead from each row: arrays (rows, times).
+
+    Times run from 0 to KNOWN in steps of PREDICTED; the box is always present.
+    """
     t = np.arange(0.0, KNOWN + 1e-9, PREDICTED)
     v, rate = motion.speed[rows, None], motion.yaw_rate[rows, None]
     half = 0.5 * rate * t
@@ -108,7 +111,7 @@ def predict_motion(track: Track, motion: Motion, rows: NDArray[np.int64]) -> Tra
 
 
 def replace_places(track: Track, x: Floats, y: Floats, yaw: Floats) -> Track:
-    """Return a box of the same size at other places."""
+    """Returns a box of the same size at other places, always present."""
     return Track(x, y, yaw, np.ones(np.shape(x), dtype=bool), track.length, track.width)
 
 
@@ -144,7 +147,7 @@ def is_in_sight(eye: Track, seen: Track, others: Sequence[Track], row: int) -> b
 
 
 def first_known_row(foreseen: Flags) -> int:
-    """Return the first row of the stretch of foreseen rows that ends the mask; the last row at least."""
+    """Returns the first row of the stretch of foreseen rows that ends the mask; the last row without one."""
     missed = np.flatnonzero(~foreseen)
     return min(int(missed[-1]) + 1 if len(missed) else 0, len(foreseen) - 1)
 
@@ -197,7 +200,7 @@ def drive_manoeuvres(
     start: Start, path: Path, aims: Floats, holds: Flags, rows: int, mu: float, dt: float,
     reaction: float,
 ) -> tuple[Track, Floats]:  # fmt: skip
-    """Return the ego's box (manoeuvres, rows) in each manoeuvre, and the way along the path.
+    """Returns the ego's box (manoeuvres, rows) in each manoeuvre, and the way along the path in m.
 
     Args:
         start: the ego's state in row 0.
@@ -244,7 +247,10 @@ def drive_manoeuvres(
 
 
 def _stays_on_road(ego: Track, z: Floats, beyond: Beyond) -> bool:
-    """Return whether no corner goes farther beyond the road's edge than it is at the start."""
+    """Returns whether no corner goes farther beyond the road's edge than it is at the start.
+
+    z: heights in m, one per place of `ego`.
+    """
     chosen = slice(None, None, CHECKED)
     c, s = np.cos(ego.yaw[chosen]), np.sin(ego.yaw[chosen])
     for ahead, left in ((0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5)):
@@ -259,11 +265,11 @@ def _stays_on_road(ego: Track, z: Floats, beyond: Beyond) -> bool:
 def continue_track(
     track: Track, speed: Floats, row: int, more: int, dt: float, road_heading: float
 ) -> list[Track]:
-    """Return two ways in which a box may go on after a row, where its motion is not its own any more.
+    """Returns two ways in which a box may go on after a row, where its motion is not its own any more.
 
     Both are straight and slow down as in the half second before the row, until the box stands: one
     along its heading, one along the road's, as a car that changes lanes may go on or end there. A
-    manoeuvre has to avoid both.
+    manoeuvre has to avoid both. more: rows that are added, of dt s each.
     """
     back = max(row - max(round(0.5 / dt), 1), 0)
     v = float(speed[row])

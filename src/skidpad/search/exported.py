@@ -42,7 +42,7 @@ class ExportedHazard:
         return self.root.findall("Entities/ScenarioObject")
 
     def keep_one_world(self) -> None:
-        """Take out what other channels saw, and other egos."""
+        """Takes out, in place, what other channels saw, and other egos; FileError where no other is left."""
         for thing in self._objects():
             name = thing.attrib["name"]
             is_other_ego = _property(thing, "type") == "ego_vehicle" and name != self.ego
@@ -74,7 +74,7 @@ class ExportedHazard:
         return self.root.find(path)
 
     def ego_way(self) -> Way:
-        """Return the recorded way of the ego."""
+        """Returns the recorded way of the ego; FileError without two places."""
         group = self._group(self.ego)
         way = [] if group is None else list(_vertices(group))
         if len(way) < 2:
@@ -82,7 +82,10 @@ class ExportedHazard:
         return way
 
     def add_parameters(self, way: Way) -> tuple[tuple[Variable, ...], dict[str, float]]:
-        """Declare the parameters, use them, and leave the ego to its driver."""
+        """Declares the parameters and uses them, in place, so that the ego is left to its driver.
+
+        Returns how they vary, and their values as recorded. way: of `ego_way`.
+        """
         (t, x, y, h), speed = way[0], self._first_speed()
         mean = hypot(way[-1][1] - x, way[-1][2] - y) / max(way[-1][0] - t, 1e-3)
         values = {SPEED: speed, AHEAD: 0.0, PACE: 1.0, CRUISE: max(speed, mean, SLOWEST)}
@@ -104,7 +107,10 @@ class ExportedHazard:
         return 0.0 if target is None else max(float(target.attrib["value"]), 0.0)
 
     def _nearest(self, x: float, y: float) -> float:
-        """Return the way from the ego's place to the nearest other's, bumper to bumper at most, m."""
+        """Returns the m from the ego's place to the nearest other's; inf without one.
+
+        Less 5 m for both bodies, at least 0.5.
+        """
         nearest = inf
         for part in self.root.findall("Storyboard/Init/Actions/Private"):
             place = part.find(".//WorldPosition")

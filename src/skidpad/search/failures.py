@@ -38,7 +38,7 @@ HALVINGS = 7  # of the way from a harmless value to a failing one: to less than 
 
 
 def group_failures(found: Search, failures: Iterable[Trial]) -> list[Group]:
-    """Return avoidable failures by kind, the largest group first, in each the likeliest first."""
+    """Returns the avoidable failures by kind, the largest group first, in each the likeliest first."""
     kinds: dict[str, list[Trial]] = {}
     for trial in failures:
         if trial.is_avoidable:
@@ -52,11 +52,11 @@ def group_failures(found: Search, failures: Iterable[Trial]) -> list[Group]:
 
 
 def find_border(found: Search, group: Group, trials: Sequence[Trial], runner: Runner) -> Group:
-    """Return the group with the smallest change that makes its first failure harmless.
+    """Returns the group with the smallest change that makes its first failure harmless.
 
-    Begins at the nearest harmless trial. Value by value the harmless one's is put back to the
-    failing one's as long as the run stays harmless, so that few differ; then the way between both
-    is halved until it is shorter than 1 %.
+    Begins at the nearest harmless trial; without one the group stays as it is. Value by value the
+    harmless one's is put back to the failing one's as long as the run stays harmless, so that few
+    differ; then the way between both is halved until it is shorter than 1 %.
     """
     failure = group.failures[0]
     harmless = nearest_harmless(failure, trials)
@@ -86,7 +86,7 @@ def find_border(found: Search, group: Group, trials: Sequence[Trial], runner: Ru
 
 
 def nearest_harmless(failure: Trial, trials: Iterable[Trial]) -> Trial | None:
-    """Return the nearest trial of the unit cube that is no failure and was really driven."""
+    """Returns the nearest trial of the unit cube that was driven and is no failure; None without one."""
     at = np.array(failure.unit)
     good = [t for t in trials if t.is_harmless]
     return min(good, key=lambda t: float(np.linalg.norm(np.array(t.unit) - at)), default=None)
@@ -102,7 +102,7 @@ def list_changes(space: Space, harmless: Trial, failing: Trial) -> tuple[Change,
 
 
 def _drive(found: Search, unit: Iterable[float], runner: Runner) -> Trial:
-    """Drive one point that is no trial of the search."""
+    """Drives one point that is no trial of the search, and returns what it came to."""
     point = Point(found.template, found.space, 0, unit_tuple(unit), found.objective)
     return drive_all([point], runner)[0]
 
@@ -119,12 +119,15 @@ def kept_trials(groups: Sequence[Group]) -> list[Trial]:
 
 
 def write_hazard(out: Path, hazard: Hazard) -> None:
-    """Write what a search found about the hazard that it began from."""
+    """Writes what a search found about the hazard that it began from into its folder."""
     write_bytes(out / HAZARD, msgspec.json.format(msgspec.json.encode(hazard)))
 
 
 def write_findings(out: Path, found: Search, findings: Findings) -> None:
-    """Write what was found, the avoidable failures as a file to play, and some of them as runs."""
+    """Writes what was found, the avoidable failures as a file to play, and some of them as runs.
+
+    Those runs, of `kept_trials`, are driven again unless their folders exist.
+    """
     write_bytes(out / FOUND, msgspec.json.encode(findings))
     course = found.template.course
     avoidable = [trial for group in findings.groups for trial in group.failures]

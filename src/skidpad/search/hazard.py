@@ -103,7 +103,11 @@ def prepare_scene(source: Path, id: str | None, out: Path) -> Scene:
 
 
 def choose_record(source: Path, id: str | None) -> HazardRecord:
-    """Return one hazard of a monitor's folder, or of its file hazards.txt."""
+    """Returns one hazard of a monitor's folder, or of its file hazards.txt, or the record in a file.
+
+    id: of the hazard, None where there is one. FileError for what is no hazard, ConfigError for none
+    or several without an id, or an unknown one.
+    """
     if source.is_file() and source.name != TEXT_FILE:  # one record, as a fleet gives it
         if id is not None:
             raise ConfigError(f"--hazard chooses one of a monitor's folder; {source} is one record")
@@ -137,7 +141,7 @@ def _read_one(file: Path) -> HazardRecord:
 
 
 def _known_road(record: HazardRecord) -> Path | None:
-    """Return the file of the map that the record names, where it comes with Skidpad unchanged."""
+    """Returns the file of the map that the record names; None unless it comes with Skidpad unchanged."""
     name = record.context.get("map", "")
     if name not in bundled_maps() or load_map(name).content_hash != record.context.get("map_hash"):
         return None
@@ -146,7 +150,7 @@ def _known_road(record: HazardRecord) -> Path | None:
 
 
 def _centre_lane(road: Path) -> None:
-    """Move the straight road of an export so that the ego is in the middle of a lane, not between two."""
+    """Moves the straight road of an export, in its file, so that the ego is in the middle of a lane."""
     root = ElementTree.parse(road).getroot()
     line, width = root.find(".//planView/geometry"), root.find(".//right/lane/width")
     assert line is not None
@@ -158,7 +162,10 @@ def _centre_lane(road: Path) -> None:
 
 
 def _write_scene(source: Path, title: str, folder: Path, is_road_known: bool = False) -> Scene:
-    """Writes the recorded and the varied scenario of an exported hazard and returns them as a scene."""
+    """Writes the recorded and the varied scenario of an exported hazard and returns them as a scene.
+
+    FileError where the ego's way bends and its road is not known.
+    """
     root = ElementTree.parse(source).getroot()
     found = ExportedHazard(root, source)
     found.keep_one_world()
@@ -189,7 +196,7 @@ def _bend_of(way: Way) -> float:
 
 
 def recorded_unit(space: Space, values: dict[str, float]) -> tuple[float, ...]:
-    """Return the point of the cube that stands for the recorded values; 0.5 for what no record says."""
+    """Returns the point of the unit cube that stands for the recorded values; 0.5 for what no record says."""
     return tuple(
         0.5
         if isinstance(v.law, Choice) or v.name not in values

@@ -73,7 +73,9 @@ def check_folder(out: Path, name: str = SEARCH, *, resume: bool) -> None:
 
 
 def search(found: Search, out: Path, runner: Runner, known: Sequence[Trial]) -> Iterator[Trial]:
-    """Drive the search to its end, one trial after the other in their order.
+    """Drives the search to its end and yields one trial after the other in their order.
+
+    It goes on only as far as it is iterated; each trial is also appended to the folder's file.
 
     Args:
         found: what is searched.
@@ -109,7 +111,7 @@ class StoredTrials:
             write_bytes(path, _encode(known))
 
     def drive(self, points: Sequence[Point]) -> list[Trial]:
-        """Return the trials of points, in their order.
+        """Returns the trials of points, in their order; drives those not stored and appends them to the file.
 
         Raises:
             FileError: the file holds another point under the number of one of these.
@@ -137,7 +139,7 @@ def _encode(trials: Sequence[Trial]) -> bytes:
 
 
 def _drive_with_reference(points: Sequence[Point], runner: Runner) -> list[Trial]:
-    """Drive points, and every failure once more with the reference driver at the wheel."""
+    """Returns the trials of points, every failure with that of the reference driver at the wheel."""
     trials = drive_all(points, runner)
     failing = {t.number for t in trials if t.is_failure}
     again = [replace(p, template=with_reference(p.template)) for p in points if p.number in failing]
@@ -146,12 +148,12 @@ def _drive_with_reference(points: Sequence[Point], runner: Runner) -> list[Trial
 
 
 def _told_margin(trial: Trial) -> float:
-    """Return what a method learns; a crash that the reference driver has as well is no place to look."""
+    """Returns what a method learns; a failure that is not avoidable is no place to look: NO_CONFLICT."""
     return NO_CONFLICT if trial.is_failure and not trial.is_avoidable else trial.margin
 
 
 def drive_all(points: Sequence[Point], runner: Runner) -> list[Trial]:
-    """Drive points side by side; a run that killed its worker or hung is a fault. In their order."""
+    """Returns the trials of points in their order; a run that killed its worker or hung is a fault."""
     by_key = {str(p.number): p for p in points}
     jobs = [Job(key, drive_point, p, DEADLINE_S) for key, p in by_key.items()]
     found = {}

@@ -51,7 +51,7 @@ class Closeness:
 
 
 def _rising(value: float | None, scale: float) -> float:
-    """Return 0 for a value of 0, 1/2 at the scale, 1 for a value that never applied."""
+    """Returns 0 for a value of 0, 1/2 at the scale, 1 for None, a value that never applied."""
     return 1.0 if value is None else max(value, 0.0) / (max(value, 0.0) + scale)
 
 
@@ -126,7 +126,10 @@ def is_failure(contact: Contact) -> bool:
 
 
 def _margin(contact: Contact | None, departed: bool, share: float) -> float:
-    """share: 0 to 1, how far a run without contact stayed away."""
+    """Returns the margin of a run by its hardest contact, by a departure, or without both by `share`.
+
+    share: 0 to 1, how far a run without contact stayed away.
+    """
     speed = 0.0 if contact is None else contact.v_graded
     if departed or (contact is not None and is_failure(contact)):
         return -max(speed - LIGHT_BELOW, 0.0) / SPEED_SCALE

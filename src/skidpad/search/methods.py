@@ -33,7 +33,7 @@ class Method(Protocol):
         ...
 
     def tell(self, points: Floats, margins: Floats) -> None:
-        """Take what became of the points that were asked for, in their order."""
+        """Takes in what became of the points that were asked for: margins (count,), in their order."""
         ...
 
 
@@ -49,7 +49,7 @@ class Random:
         return self.rng.random((count, self.d))
 
     def tell(self, points: Floats, margins: Floats) -> None:
-        """Learn nothing: points do not depend on margins."""
+        """Learns nothing: points do not depend on margins."""
 
 
 class Halton:
@@ -66,7 +66,7 @@ class Halton:
         return np.asarray(self.sequence.random(count))
 
     def tell(self, points: Floats, margins: Floats) -> None:
-        """Learn nothing: points do not depend on margins."""
+        """Learns nothing: points do not depend on margins."""
 
 
 class Descents:
@@ -94,7 +94,7 @@ class Descents:
         return np.array([self.descent.ask() for _ in range(count)])
 
     def tell(self, points: Floats, margins: Floats) -> None:
-        """Let the descent learn; end it when it found failures or is stuck."""
+        """Lets the descent learn; ends it when half of the points fail or it is stuck."""
         self.seen += [(float(m), tuple(p)) for m, p in zip(margins, points.tolist(), strict=True)]
         if self.descent is None:
             return
@@ -104,7 +104,10 @@ class Descents:
             self.descent = None
 
     def _start(self, count: int) -> CMA:
-        """Returns a new CMA-ES search from the best point that is apart from all earlier starts."""
+        """Returns a new CMA-ES search from the best point that is apart from all earlier starts.
+
+        From a point of the sequence where none is. count: points of each of its populations.
+        """
         from cmaes import CMA
 
         ordered = (np.array(p) for _, p in sorted(self.seen))
@@ -157,13 +160,16 @@ METHODS: Mapping[str, Callable[[int, int, int], Method]] = {
 
 
 def make_method(name: str, dimensions: int, seed: int, budget: int) -> Method:
-    """Return a method by its name, at its beginning.
+    """Returns a method by its name, at its beginning.
 
     Args:
         name: of METHODS.
         dimensions: of the space.
         seed: the same one gives the same points.
         budget: runs that it will be asked for in all.
+
+    Raises:
+        MissingExtra: `tpe` without the extra `search`.
     """
     return METHODS[name](dimensions, seed, budget)
 

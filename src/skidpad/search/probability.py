@@ -51,7 +51,7 @@ class Estimate:
 
     @property
     def half_width(self) -> float:
-        """Relative half-width: how far the upper end lies above the estimate; inf where p is 0."""
+        """Returns the relative half-width, by which the upper end lies above p; inf where p is 0."""
         return self.high / self.p - 1.0 if self.p > 0.0 else inf
 
 
@@ -85,7 +85,7 @@ class Exploration:
 
     @property
     def failing(self) -> Floats:
-        """(n, d) failures of the last levels of all repetitions."""
+        """Returns (n, d) failures of the last levels of all repetitions."""
         return np.concatenate([c.z[c.margins <= 0.0] for c in self.chains])
 
 
@@ -119,7 +119,7 @@ def explore(
 
 
 def _conclude(chains: Chains, keep: int) -> bool:
-    """End a repetition whose level holds enough failures; else note the bound of the next event."""
+    """Ends a repetition whose level holds enough failures and returns True; else notes the next bound."""
     if chains.is_over:
         return True
     bound = float(np.sort(chains.margins, kind="stable")[keep - 1])
@@ -135,7 +135,10 @@ def _conclude(chains: Chains, keep: int) -> bool:
 def _descend(
     limit: Limit, going: list[Chains], rng: np.random.Generator, keep: int, length: int
 ) -> int:
-    """Sample the next event of each repetition by chains from its best samples; return the runs."""
+    """Replaces each repetition's samples by those of the next event; returns the number of runs.
+
+    They come from chains of `length` that begin at its `keep` best samples.
+    """
     best = [np.argsort(c.margins, kind="stable")[:keep] for c in going]
     at = np.stack([c.z[b] for c, b in zip(going, best, strict=True)])
     margins = np.stack([c.margins[b] for c, b in zip(going, best, strict=True)])
@@ -199,13 +202,16 @@ class Weighted:
 
     @property
     def effective(self) -> float:
-        """How many failures of equal weight tell as much (Kish's effective sample size)."""
+        """Returns how many failures of equal weight tell as much (Kish's effective sample size).
+
+        0.0 without a failure.
+        """
         w = self.weights[self.margins <= 0.0]
         return float(w.sum() ** 2 / (w**2).sum()) if len(w) else 0.0
 
 
 def sample_mixture(limit: Limit, failing: Floats, rng: np.random.Generator, count: int) -> Weighted:
-    """Draw from the mixture around failures and ask the limit.
+    """Draws from the mixture around failures, asks the limit and returns the weighted samples.
 
     Args:
         limit: the margin of each sample.
@@ -229,7 +235,7 @@ def _blocks(z: Floats) -> list[Floats]:
 
 
 def _weights(z: Floats, centres: Floats) -> Floats:
-    """Return the density of the standard normal over that of the mixture, at most 1 / DEFENCE."""
+    """Returns (n,) density of the standard normal over that of the mixture, at most 1 / DEFENCE."""
     d = z.shape[1]
     plain = -0.5 * (z**2).sum(axis=1)
     apart = (z**2).sum(axis=1)[:, None] + (centres**2).sum(axis=1)[None, :] - 2.0 * z @ centres.T
@@ -240,7 +246,10 @@ def _weights(z: Floats, centres: Floats) -> Floats:
 
 
 def importance_estimate(samples: Weighted, runs_before: int = 0) -> Estimate:
-    """Return the weighted share of failures with the normal interval of its logarithm."""
+    """Returns the weighted share of failures with the normal interval of its logarithm.
+
+    0, with no upper end, where no sample fails. runs_before: of the exploration, which count as well.
+    """
     terms = np.where(samples.margins <= 0.0, samples.weights, 0.0)
     p, n = float(terms.mean()), len(terms)
     if p == 0.0:
@@ -262,7 +271,7 @@ class Agreement:
 
     @property
     def is_determined(self) -> bool:
-        """Whether both are narrow enough and agree."""
+        """Returns whether both are narrow enough and agree."""
         return not self.why_not
 
 

@@ -60,7 +60,7 @@ class LimitOfRuns:
         self.trials: list[Trial] = []
 
     def __call__(self, z: Floats) -> Floats:
-        """Return the margins of samples (n, d) in their order."""
+        """Returns the margins of samples (n, d) in their order; drives those that are not stored."""
         first = len(self.trials)
         self.trials += self.stored.drive([
             Point(self.template, self.asked.space, first + k, unit_tuple(u), OBJECTIVE)
@@ -70,14 +70,17 @@ class LimitOfRuns:
         return np.array([t.margin for t in self.trials[first:]])
 
     def simulated_s(self, first: int, last: int | None = None) -> float:
-        """Return the simulated seconds of a stretch of runs."""
+        """Returns the simulated seconds of the runs from number `first` up to, without, `last`."""
         return sum(t.simulated_s for t in self.trials[first:last])
 
 
 def estimate_risk(
     asked: Risk, out: Path, runner: Runner, known: Sequence[Trial], on_run: Callable[[int], None]
 ) -> RiskFound:
-    """Drive everything that the question needs, write what came of it and return it."""
+    """Drives everything that the question needs, writes what came of it and returns it.
+
+    on_run: called with the runs so far after each batch.
+    """
     limit = LimitOfRuns(asked, out, runner, known, on_run)
     rng = np.random.default_rng(asked.seed)
     found = explore(limit, len(asked.space.variables), rng, asked.repetitions, asked.per_level)
@@ -145,7 +148,7 @@ def _end(value: float) -> float | None:
 
 
 def _kinds(trials: Sequence[Trial], samples: Weighted) -> dict[str, float]:
-    """Return the share of the probability by kind of failure, the largest first."""
+    """Returns the share of the probability by kind of failure, the largest first; {} without a failure."""
     shares: dict[str, float] = defaultdict(float)
     for trial, weight in zip(trials, samples.weights, strict=True):
         if trial.is_failure:

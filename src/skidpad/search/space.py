@@ -62,7 +62,7 @@ def _require_range(name: str, law: Uniform | Normal) -> Law:
 
 
 def apply_values(template: RunSpec, values: Mapping[str, Value]) -> RunSpec:
-    """Return the run with these values in its scenario and its weather."""
+    """Returns the run with these values in its scenario, its weather and its seed."""
     course = template.course
     assert isinstance(course, Scenario)
     own = {n for n in values if n == SEED or n.partition(".")[0] == WEATHER}

@@ -43,7 +43,7 @@ class Point:
 
 
 def drive_point(point: Point) -> Trial:
-    """Drive a point in this process and return its trial; a file that refuses its values is a fault."""
+    """Drives a point in this process and returns its trial; a file that refuses its values is a fault."""
     values = point.space.values(point.unit)
     blank = Trial(number=point.number, unit=point.unit, values=values, margin=NO_CONFLICT)
     try:
@@ -54,7 +54,7 @@ def drive_point(point: Point) -> Trial:
 
 
 def describe_run(blank: Trial, driven: Run, objective: str) -> Trial:
-    """Return `blank` with everything that a run says."""
+    """Returns `blank` with everything that a run says; a run that failed is a fault."""
     log = driven.log
     if driven.outcome is Outcome.AGENT_ERROR or not len(log):
         last = driven.error.strip().rpartition("\n")[2]
@@ -67,7 +67,7 @@ def describe_run(blank: Trial, driven: Run, objective: str) -> Trial:
 
 
 def _bound_of(driven: Run, near: Closeness) -> str:
-    """Return what avoids the contact of a failure, or its departure where that came first."""
+    """Returns what avoids the contact of a failure, or its departure where that came first; "": nothing."""
     log, road = driven.log, load_map(driven.road)
     contact = near.contact if near.contact is not None and is_failure(near.contact) else None
     departed = None if near.departed_s is None else round(near.departed_s / log.header.dt)

@@ -23,7 +23,7 @@ class GlobalAction(Protocol):
     """Something that happens to the world."""
 
     def happen(self, scene: Scene) -> Running:
-        """Acts at once, or from now on."""
+        """Acts at once, or begins to, and returns the running action."""
         ...
 
 
@@ -47,9 +47,10 @@ class NoEffect:
 def note_bound(
     scene: Scene, actor: Actor, element: str, asked: float, applied: float, of: str
 ) -> bool:
-    """Says what a bound makes of an action; of: the quantity, its unit and the bound's name.
+    """Notes in the log what a bound makes of an action; returns whether the bound acts.
 
-    Returns whether the bound acts.
+    of: "quantity, unit, bound", as in "duration, s, maxAcceleration". It acts where asked and applied
+    differ by more than SAME.
     """
     quantity, unit, bound = of.split(", ")
     acts = abs(asked - applied) > SAME * max(abs(asked), abs(applied))
@@ -90,7 +91,7 @@ class Dynamics:
     following: Following = Following.POSITION
 
     def span(self, size: float) -> float:
-        """Time in s, or distance in m, of a change by `size`; 0 for a step."""
+        """Returns the time in s, or distance in m, of a change by `size`; 0 for a step."""
         if self.shape is Shape.STEP:
             return 0.0
         if self.dimension is not Dimension.RATE:

@@ -95,7 +95,10 @@ class DistanceKept:
         self.waits, self.noted = not action.straight, False
 
     def step(self, scene: Scene) -> bool:
-        """Move the offset towards it as fast as is allowed."""
+        """Moves the offset towards the distance as fast as is allowed; True once the action is over.
+
+        It is over where another lateral action has taken its place, or at the distance unless continuous.
+        """
         actor, guide, action = self.actor, self.actor.guide, self.action
         if actor.lateral is not self or guide.base is None:
             return True
@@ -118,7 +121,10 @@ class DistanceKept:
         return there
 
     def _choose_speed(self, scene: Scene, excess: float) -> None:
-        """Sets the speed to the left: straight to the distance, or by a spring within an acceleration."""
+        """Sets the speed to the left: straight to the distance, or by a spring within an acceleration.
+
+        excess: m to the left that are left to go.
+        """
         bounds, dt = self.action.bounds, scene.dt
         own = max(abs(self.actor.guide.v) - SLOW, 0.0)
         if bounds.a == inf:
@@ -141,7 +147,7 @@ class DistanceKept:
         return copysign(applied, v)
 
     def _end(self, scene: Scene, base: LanePoint) -> float:
-        """The offset at which the distance is kept, m; the sides are those of the other entity."""
+        """Returns the offset in m at which the distance is kept; the sides are those of the other entity."""
         action, here = self.action, self.actor.guide.offset
         other = reference_pose(scene, scene.actors[action.other])
         size = action.size(scene, self.actor)
@@ -170,7 +176,7 @@ class Approach:
         actor.lead(self, self, t)
 
     def at(self, t: float) -> tuple[Pose, float, float]:
-        """Pose and speed at time t, straight on from the last step's."""
+        """Returns pose, speed and acceleration (0) at time t s, straight on from the last step's."""
         return self.pose.moved(forward=self.v * (t - self.t)), self.v, 0.0
 
     def way_to(self, place: Pose, t: float) -> float:
@@ -182,7 +188,10 @@ class Approach:
         self.pose = self.pose.moved(forward=way)
 
     def step(self, scene: Scene) -> bool:
-        """Take a step along the way; True once an action that does not go on is there."""
+        """Takes a step along the way; True once another action has taken its place, or it is there.
+
+        A continuous action is never there.
+        """
         actor, action = self.actor, self.action
         if actor.track is not self:
             return True

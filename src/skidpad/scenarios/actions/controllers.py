@@ -30,13 +30,17 @@ class Activate:
 
     @property
     def says(self) -> bool | None:
-        """Whether a controller is active afterwards; None: as before."""
+        """Returns whether a controller is active afterwards; None: as before."""
         if self.lateral is None and self.longitudinal is None:
             return None
         return bool(self.lateral or self.longitudinal)
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """The ego changes hands; others have a controller, where one of a known name is theirs."""
+        """Hands an actor to its controller or to the file, and returns an action that is done.
+
+        For the ego this says which of the two drives; others have a controller only where one of a known
+        name is theirs.
+        """
         actor.assigned = self.assigned or actor.assigned
         if actor.mode is not None and self.says is not None:
             self._switch(scene, actor)
@@ -48,7 +52,7 @@ class Activate:
         return DONE
 
     def _switch(self, scene: Scene, actor: Actor) -> None:
-        """Turn domains of a controller of another actor than the ego on and off."""
+        """Turns the domains of the controller of another actor than the ego on and off."""
         found = actor.assigned or self.controllers.get(actor.name)
         asked = zip((self.lateral, self.longitudinal), actor.controls, strict=True)
         lateral, longitudinal = (old if new is None else new for new, old in asked)
@@ -86,7 +90,10 @@ def compile_activate(node: Node, ctx: Context) -> Activate:
 
 
 def compile_assign(node: Node, ctx: Context) -> Activate:
-    """An <AssignControllerAction>; before 1.1 it also activated what it assigned."""
+    """Compiles an <AssignControllerAction>; before 1.1 it also activated what it assigned.
+
+    A controller that is not known becomes a note.
+    """
     found: ControllerOf | None = None
     for one in node.children("CatalogReference", "Controller"):
         try:
@@ -107,7 +114,10 @@ class Override:
     inputs: Mapping[str, float | None]  # by field of a VehicleCommand
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Sets pedals and wheel from now on; an entity that is placed by the file has none."""
+        """Sets pedals and wheel from now on, and returns an action that is done.
+
+        An entity that is placed by the file, or has no driver, has none: a notice says so.
+        """
         if actor.mode is ActorMode.IDEAL or actor.driver is None:
             return NoEffect("OverrideControllerValueAction").begin(scene, actor)
         for name, value in self.inputs.items():
@@ -172,20 +182,20 @@ class Visibility:
     sensors: bool
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Sensors see the actor, or do not, from the next step on."""
+        """Sets whether sensors see the actor from the next step on, and returns an action that is done."""
         del scene
         actor.visible = self.sensors
         return DONE
 
 
 def compile_visibility(node: Node, ctx: Context) -> Visibility:
-    """A <VisibilityAction>; pictures for people and other traffic are not told apart from sensors."""
+    """Compiles a <VisibilityAction>; pictures for people and other traffic go by its `sensors`, too."""
     del ctx
     return Visibility(node.flag("sensors", default=True))
 
 
 def compile_controller(node: Node, ctx: Context) -> PrivateAction:
-    """A <ControllerAction>: one of these, or before 1.1 several."""
+    """Compiles a <ControllerAction>: one action, or before 1.1 several."""
     made = [TABLE[child.tag](child, ctx) for child in node.children() if _is_known(child)]
     if not made:
         raise node.error("needs an action")

@@ -42,7 +42,7 @@ class Limits:
         return self.a_max == self.b_max == inf
 
     def of(self, own: Performance) -> Performance:
-        """Together with what the entity can do."""
+        """Returns the stricter of these limits and of what the entity can do."""
         return Performance(
             min(self.v_max, own.v_max),
             min(self.a_max, own.a_max),
@@ -115,7 +115,7 @@ class KeepGap:
         return min(max(its) - own.forward + own.length / 2.0, 0.0)
 
     def wanted(self, scene: Scene, side: Displacement) -> float:
-        """How far the other one should be ahead, m."""
+        """Returns how far the other one should be ahead, m; negative where the entity is to lead."""
         v = abs(scene.actors[self.other].v_told)
         size = abs(self.distance if self.distance is not None else (self.time_gap or 0.0) * v)
         return -size if side is Displacement.LEADING else size
@@ -130,7 +130,7 @@ class GapKept:
         self.action, self.actor, self.side, self.limits = action, actor, side, limits
 
     def step(self, scene: Scene) -> bool:
-        """Demand the speed of the end of this step."""
+        """Sets the speed demanded for the end of this step; True once the action is over."""
         if self.actor.longitudinal is not self:
             return True
         action, guide = self.action, self.actor.guide
@@ -153,11 +153,17 @@ class GapKept:
         return False
 
     def _is_steady(self, v_other: float) -> bool:
-        """It has the other one's speed, which a distance at once asks of what drives on its tyres."""
+        """Returns whether its speed is the other one's; asked only of a gap without limits on tyres.
+
+        True for every gap with limits.
+        """
         return not self.action.limits.none or abs(self.actor.motion.speed - v_other) < STEADY
 
     def _limit_jerk(self, now: float, wanted: float, dt: float) -> float:
-        """An acceleration that grows no faster than the file allows; it may end at once, as in esmini."""
+        """Returns an acceleration that grows no faster than the file allows; it may end at once.
+
+        now, wanted: m/s^2 before and as asked for; dt: s. As in esmini.
+        """
         rates = self.limits
         if wanted < 0.0:
             return max(wanted, now - rates.b_rate * dt)

@@ -114,9 +114,10 @@ SAME_SLOPE = 1e-6  # m/s^2
 def pieces_under_way(
     v: float, a: float, end: float, most: float, jerk: Jerk, duration: float | None
 ) -> list[Piece] | None:
-    """Returns a change of speed that begins with an acceleration and ends without one.
+    """Returns a change of speed that begins with the acceleration `a` and ends without one.
 
-    None where the acceleration lies beyond what the change needs.
+    most: m/s^2; duration: s that it shall take, None for as fast as the limits allow. None where the
+    acceleration lies beyond what the change needs.
     """
     size = end - v
     mean = size / duration if duration else copysign(most, size)
@@ -147,7 +148,10 @@ SAME_SLOPE = 1e-6  # m/s^2
 
 
 def settle(v: float, a: float, jerk: Jerk) -> Piece:
-    """Returns the piece that brings an acceleration that is under way to 0 first."""
+    """Returns the piece that brings an acceleration `a` under way to 0 at the limit of jerk.
+
+    Its duration is 0 where a is 0 or jerk is not limited.
+    """
     rate = jerk.down if a > 0.0 else jerk.up
     if a == 0.0 or rate == inf:
         return Piece(0.0, v, 0.0, 0.0)
@@ -188,7 +192,7 @@ class SmoothProfile:
         self.actor, self.began, self.pieces, self.end = actor, began, pieces, end
 
     def step(self, scene: Scene) -> bool:
-        """Demand the speed of the end of this step; True when the last speed is reached."""
+        """Sets the speed demanded for the end of this step; True when the last speed is reached."""
         if self.actor.longitudinal is not self:
             return True
         t, guide = scene.t + scene.dt - self.began, self.actor.guide

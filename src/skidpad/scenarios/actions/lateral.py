@@ -40,7 +40,10 @@ class ChangeOfOffset:
         self.to_lane, self.noted = to_lane, False
 
     def step(self, scene: Scene) -> bool:
-        """Demand the offset of the end of this step; an actor that stands does not move aside."""
+        """Sets the offset demanded for the end of this step; True once the action is over.
+
+        An actor that stands does not move aside.
+        """
         actor, guide = self.actor, self.actor.guide
         if actor.lateral is not self or actor.track is not None:
             return True
@@ -63,7 +66,7 @@ class ChangeOfOffset:
         return self.change.over(now)
 
     def _note(self, scene: Scene, asked: float, applied: float) -> None:
-        """Says once that it should move aside faster than it goes."""
+        """Notes once that it should move aside faster than it goes."""
         element = "LaneChangeAction" if self.to_lane else "LaneOffsetAction"
         if not self.noted:
             self.noted = note_bound(scene, self.actor, element, asked, applied, ASIDE)
@@ -78,7 +81,7 @@ class SteeredChange(ChangeOfOffset):
         self.steering.settled = False
 
     def step(self, scene: Scene) -> bool:
-        """Demand the offset, and aim at the one further on."""
+        """Sets the offset demanded, and aims at the one further on; True when the vehicle is there."""
         if self.actor.lateral is not self or self.actor.track is not None:
             return True
         over, v = super().step(scene), abs(self.actor.guide.v)
@@ -98,7 +101,10 @@ class OffsetKept(ChangeOfOffset):
         self.action, self.there = action, False
 
     def step(self, scene: Scene) -> bool:
-        """Stays beside the reference entity, moving aside no faster than the entity goes."""
+        """Stays beside the reference entity, moving aside no faster than it goes itself.
+
+        True once another action has taken its place.
+        """
         if not self.there:
             self.there = super().step(scene)
         elif self.actor.lateral is self:
@@ -144,7 +150,10 @@ class LaneChange:
         return self.dynamics.span(1.0) <= 0.0
 
     def aim(self, scene: Scene, name: str, guide: Guide) -> float | None:
-        """Makes the new lane the reference of a guide; returns the offset in it, None without lanes."""
+        """Makes the new lane the reference of a guide and returns the offset in it in m.
+
+        None, with a notice, where it or the other entity is on no lane.
+        """
         network, here = scene.network, guide.base
         target = self.target(scene)
         if here is None or target is None:
@@ -190,7 +199,10 @@ class LaneOffset:
     continuous: bool
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """The duration follows from the largest lateral acceleration."""
+        """Begins the change and returns it running.
+
+        Its duration follows from the largest lateral acceleration.
+        """
         actor.leave_track(scene.network)
         actor.catch_up(scene.network)
         guide = actor.guide
@@ -203,7 +215,10 @@ class LaneOffset:
         return actor.lateral
 
     def target(self, scene: Scene, actor: Actor) -> float:
-        """Offset left of the lane as it runs, m; the file's counts left of increasing s, or of the other."""
+        """Returns the offset left of the lane as it runs, m, that is asked for.
+
+        The file's number counts left of increasing s, or left of the other entity.
+        """
         base = actor.guide.base
         if base is None:
             return actor.guide.offset
@@ -216,7 +231,10 @@ class LaneOffset:
 
 
 def compile_lane_offset(node: Node, ctx: Context) -> LaneOffset:
-    """Compiles a <LaneOffsetAction>: an offset in m, absolute or from another entity's."""
+    """Compiles a <LaneOffsetAction>: an offset in m, absolute or from another entity's.
+
+    A lateral acceleration of 0 or less is a fault.
+    """
     found = node.child("LaneOffsetActionDynamics")
     a_max = found.limit("maxLateralAcc", A_LATERAL)
     if a_max <= 0.0:

@@ -26,14 +26,14 @@ class LightState:
     off: float = FLASH
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Switches the lamp from the next step on."""
+        """Switches the lamp at once and returns an action that is done."""
         change = LampChange(scene.t, actor.name, self.lamp, self.mode, self.on, self.off)
         scene.lamps.append(change)
         return DONE
 
 
 def compile_light_state(node: Node, ctx: Context) -> PrivateAction:
-    """A <LightStateAction>; lamps of users' own names are noted."""
+    """Compiles a <LightStateAction>; one on a lamp of a user's own name has no effect, with a note."""
     kind, state = node.child("LightType").only(), node.child("LightState")
     if kind.tag == "UserDefinedLight":
         name = kind.text("userDefinedLightType")

@@ -48,7 +48,7 @@ class Synchronize:
     steady: Steady = Steady()
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Aims for the meeting from now on."""
+        """Aims for the meeting from now on; returns the running action."""
         goals = self.goal.place(scene), self.other_goal.place(scene)
         going = Synchronized(self, actor, *goals)
         actor.pace_by(going, scene)
@@ -81,7 +81,10 @@ class Synchronized:
         self.noted = False
 
     def step(self, scene: Scene) -> bool:
-        """Demand the speed of the end of this step."""
+        """Sets the speed demanded for the end of this step; True once either is at its goal.
+
+        True, too, once another action has taken its place.
+        """
         if self.actor.longitudinal is not self:
             return True
         action, guide, dt = self.action, self.actor.guide, scene.dt
@@ -115,7 +118,10 @@ class Synchronized:
         return False
 
     def _speed(self, v: float, own: float, time: float, v_end: float, scene: Scene) -> float:
-        """Returns the speed at the end of this step, `own` m and `time` s before the end with v_end."""
+        """Returns the speed at the end of this step, `own` m and `time` s before the end with v_end.
+
+        v: m/s now. It may be below zero, which the caller cuts.
+        """
         steady, dt = self.action.steady, scene.dt
         last = max(steady.distance, steady.time * v_end)
         if last > 0.0 and v_end > 0.0:
@@ -151,16 +157,19 @@ class Synchronized:
             self.noted = note_bound(scene, self.actor, "SynchronizeAction", asked, applied, of)
 
     def _share_of_road(self, scene: Scene) -> float:
-        """Part of its speed that runs along the road, of which esmini plans the course away.
+        """Returns the part of its speed that runs along the road; 1 off every lane.
 
-        On a trajectory it plans with the speed of the step before.
+        esmini plans the course away with it.
         """
         pose = self.actor.pose
         lane = scene.network.place_of(pose).lane
         return 1.0 if lane is None else abs(cos(pose.yaw - lane.heading))
 
     def _stopping(self, scene: Scene, v: float, v_road: float, own: float, v_end: float) -> float:
-        """The course would go backwards: stop on the way instead, then go on."""
+        """Returns the speed of a step on the way to a stop, which replaces a course that would go backwards.
+
+        v: m/s now; v_road: that along the road; own: m to go; v_end: m/s at the end.
+        """
         dt, time = scene.dt, 2.0 * v_road * own / (v_road * v_road + v_end * v_end)
         if time * v_road / 2.0 > own / 2.0:
             self.phase = Phase.STOPPING
@@ -176,9 +185,9 @@ class Synchronized:
 
 
 def away(v: float, v_end: float, own: float, time: float) -> tuple[float, float]:
-    """Acceleration of a course that goes away from the straight one and back at the same rate.
+    """Returns the acceleration of a course that goes away from the straight one and back at the same rate.
 
-    Returns it with the speed at the turn, so that `own` m take `time` s and end at v_end.
+    Besides, the speed at the turn, so that `own` m take `time` s and end at v_end; (0, 0) without one.
     """
     if abs(v_end - v) < LEAST:
         turn = 2.0 * own / time - v

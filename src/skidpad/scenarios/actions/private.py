@@ -50,7 +50,7 @@ GROUPS = ("LongitudinalAction", "LateralAction", "RoutingAction", "AppearanceAct
 
 
 def private_action(node: Node, ctx: Context) -> PrivateAction:
-    """The action inside a <PrivateAction>; one that holds none is over as it begins."""
+    """Compiles the action inside a <PrivateAction>; an empty one is over as it begins, with a note."""
     if next(node.children(), None) is None:
         ctx.findings.append(node.finding("holds no action: nothing is done", Kind.NOTE))
         return controllers.Several(())

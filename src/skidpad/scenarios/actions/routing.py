@@ -36,7 +36,7 @@ class Teleport:
     position: Position
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Puts the entity there at once, keeping the demanded speed."""
+        """Puts the entity there at once, keeping the demanded speed; returns an action that is done."""
         actor.put(scene.network, self.position.place(scene), actor.guide.v)
         return DONE
 
@@ -53,7 +53,7 @@ class AssignRoute:
     route: ScenarioRoute
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Sets the route at once; it matters at the next fork."""
+        """Sets the route at once and returns an action that is done; it matters at the next fork."""
         del scene
         actor.guide.roads = self.route.roads
         return DONE
@@ -69,7 +69,10 @@ class RandomRoute:
     """Take any way at forks from now on: drawn by the entity's name, the same in every run."""
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Sets a random route at once; it matters at the next fork."""
+        """Sets a random route at once and returns an action that is done; it matters at the next fork.
+
+        Off the road it sets none, with a notice.
+        """
         place = actor.place(scene.network)
         here = place.lane
         if here is None:
@@ -93,7 +96,7 @@ class AcquirePosition:
     position: Position
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Sets the way to the position at once; it matters at the next fork."""
+        """Sets the way to the position and returns an action that is done; it matters at the next fork."""
         actor.guide.roads = _way_there(scene.network, actor, self.position, scene)
         return DONE
 
@@ -142,8 +145,9 @@ class FollowTrajectory:
         return line.at_time(-self._zero(line, self.timing, 0.0) / self.timing.scale)
 
     def _zero(self, line: Line, timing: Timing, t: float) -> float:
-        """Scenario time of line time 0 where the action begins at t; as esmini, relative times begin at
-        the place on the line that the action asks for.
+        """Returns the scenario time of line time 0 where the action begins at t s.
+
+        As in esmini, relative times begin at the place on the line that the action asks for.
         """
         if not timing.relative:
             return timing.offset
@@ -151,7 +155,10 @@ class FollowTrajectory:
         return timing.offset + t - skipped
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Absolute times count from the begin of the scenario."""
+        """Leads the actor along the line from now on and returns the running action.
+
+        Absolute times count from the begin of the scenario.
+        """
         line = self.trajectory.traced(scene, actor.pose)
         guide = actor.guide
         led: Paced | Timed | Steered
@@ -190,7 +197,10 @@ class Timed:
         self.actor, self.track = actor, track
 
     def step(self, scene: Scene) -> bool:
-        """Moves on until the last point is reached; the entity then drives on along its lane."""
+        """Moves on until the last point is reached, then returns True; the entity drives on along its lane.
+
+        True, too, once another action has taken its place.
+        """
         if self.actor.track is not self.track:
             return True
         next_t = scene.t + scene.dt
@@ -209,7 +219,10 @@ class Paced:
         self.actor, self.track = actor, track
 
     def step(self, scene: Scene) -> bool:
-        """Moves on until the end is reached; the entity then drives on along its lane."""
+        """Moves on until the end is reached, then returns True; the entity drives on along its lane.
+
+        True, too, once another action has taken its place.
+        """
         if self.actor.track is not self.track:
             return True
         if not self.track.step(scene.t, self.actor.guide.v, scene.dt):
@@ -228,7 +241,10 @@ class Steered:
         self.actor, self.track, self.times, self.noted = actor, track, times, False
 
     def step(self, scene: Scene) -> bool:
-        """Steers until the end is reached; the vehicle then drives on along its lane."""
+        """Steers until the end is reached, then returns True; the vehicle drives on along its lane.
+
+        True, too, once another action has taken its place.
+        """
         actor, track = self.actor, self.track
         if actor.track is not track:
             return True
@@ -247,7 +263,7 @@ class Steered:
         return there
 
     def _note(self, scene: Scene) -> None:
-        """Says once where the vehicle cannot turn as the line asks."""
+        """Notes once where the vehicle cannot turn as the line asks."""
         asked, most = abs(self.track.asked_curvature), abs(self.track.curvature)
         if most < asked < inf and not self.noted:
             self.noted = True
@@ -263,7 +279,10 @@ class Steered:
 
 
 def go_on_after_track(actor: Actor, network: Network) -> None:
-    """Follow the lane, where a track has ended; in a file without a road there is none: stand."""
+    """Makes an actor follow its lane where its track has ended; without a road it stands from then on.
+
+    Nothing happens while its track has not ended.
+    """
     v, actor.v_after_track = actor.v_after_track, None
     if v is None or actor.track is None:
         return
@@ -276,7 +295,7 @@ def go_on_after_track(actor: Actor, network: Network) -> None:
 
 
 def compile_follow(node: Node, ctx: Context) -> FollowTrajectory:
-    """A <FollowTrajectoryAction>, with the places of its parts in 1.0 and since."""
+    """Compiles a <FollowTrajectoryAction>, with the places of its parts in 1.0 and since."""
     reference = node.find("Trajectory") or node.find("CatalogReference")
     if reference is None:
         reference = node.child("TrajectoryRef").only()

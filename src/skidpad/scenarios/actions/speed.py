@@ -66,7 +66,7 @@ class Speed:
         return d.shape is Shape.STEP or (d.dimension is not Dimension.RATE and d.value <= 0.0)
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Begins the change from the speed demanded so far."""
+        """Begins the change from the speed demanded so far; returns it running."""
         finish_step(scene, actor)
         v, limits = actor.guide.v, actor.entity.performance
         asked = self.target.speed(scene)
@@ -93,7 +93,10 @@ class Speed:
         return going
 
     def _smooth(self, scene: Scene, actor: Actor, end: float, bound: float) -> Running:
-        """Begin the change within the limits of the entity: its acceleration rises, stays and falls."""
+        """Begins the change within the limits of the entity: its acceleration rises, stays and falls.
+
+        end: m/s; bound: m/s^2.
+        """
         guide, change, jerk = actor.guide, self.dynamics, jerk_of(actor.entity.performance)
         first = settle(guide.v, acceleration_under_way(actor), jerk)
         v, _ = first.at(first.duration)
@@ -131,7 +134,10 @@ def finish_step(scene: Scene, actor: Actor) -> None:
 
 
 def acceleration_under_way(actor: Actor) -> float:
-    """Returns the acceleration of a change that is replaced, m/s^2; one that is no step of the file."""
+    """Returns the acceleration in m/s^2 that a replaced change has reached.
+
+    That of the demand; where it is 0, the measured one, if a limit of the entity allows it.
+    """
     limits = actor.entity.performance
     most = limits.a_max if actor.a > 0.0 else limits.b_max
     if actor.guide.a or most == inf or abs(actor.a) > most * (1.0 + ROUNDING):
@@ -143,7 +149,7 @@ ROUNDING = 1e-6  # of an acceleration that is measured over a step
 
 
 def duration_bound(size: float) -> str:
-    """Returns what bounds the duration of a change of speed, for its note."""
+    """Returns what bounds the duration of a change of speed by `size` m/s, for its note."""
     return f"duration, s, {'maxAcceleration' if size > 0.0 else 'maxDeceleration'}"
 
 
@@ -153,12 +159,12 @@ def jerk_of(limits: Performance) -> Jerk:
 
 
 def limit_speed(v: float, limits: Performance) -> float:
-    """A speed that the entity can reach."""
+    """Returns the speed nearest to v m/s that the entity can reach."""
     return copysign(min(abs(v), limits.v_max), v)
 
 
 def over_distance(v: float, end: float, change: Dynamics) -> float:
-    """Time of a change over a distance: it takes place at the mean of both speeds."""
+    """Returns the s that a change over a distance takes: it takes place at the mean of both speeds."""
     if change.shape is Shape.STEP or abs(end - v) < SLOW:
         return 0.0
     way = max(change.value, 0.0)
@@ -169,7 +175,7 @@ def over_distance(v: float, end: float, change: Dynamics) -> float:
 
 
 def least_span(size: float, span: float, shape: Shape, limits: Performance) -> float:
-    """Time that the entity needs at least; a step stays one."""
+    """Returns the s that the entity needs at least for a change by `size` m/s; 0 for a step."""
     most = limits.a_max if size > 0.0 else limits.b_max
     if span <= 0.0 or shape is Shape.STEP or most == inf:
         return 0.0
@@ -185,7 +191,10 @@ class ChangeOfSpeed:
         self.noted = False
 
     def step(self, scene: Scene) -> bool:
-        """Demand the speed of the end of this step."""
+        """Sets the speed demanded for the end of this step; True once the action is over.
+
+        A continuous one is over only when another action has taken its place.
+        """
         if self.actor.longitudinal is not self:
             return True
         t, guide = scene.t + scene.dt - self.began - self.late, self.actor.guide
@@ -215,7 +224,10 @@ class ChangeOfSpeed:
 
 
 def reachable(scene: Scene, actor: Actor, now: float, v: float, noted: bool) -> tuple[float, bool]:
-    """Returns a speed that an entity can have a step after another one, and whether a bound is noted."""
+    """Returns the speed nearest to v m/s that can follow `now` a step later, and whether a bound is noted.
+
+    noted: whether it was before; it is noted once.
+    """
     limits, dt = actor.entity.performance, scene.dt
     limited = min(max(v, now - limits.b_max * dt), now + limits.a_max * dt)
     if not noted:
@@ -235,7 +247,10 @@ class SmoothChange(SmoothProfile):
         self.follow, self.noted = follow, False
 
     def step(self, scene: Scene) -> bool:
-        """Demand the speed of the end of this step; afterwards that of the target, within limits."""
+        """Sets the speed demanded for the end of this step; afterwards that of the target, within limits.
+
+        True once the action is over, which with a target to follow is only when another replaces it.
+        """
         actor, before = self.actor, self.actor.guide.v
         over = super().step(scene)
         if not over or self.follow is None or actor.longitudinal is not self:
@@ -271,7 +286,7 @@ class Profile:
     following: Following = Following.POSITION
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Begins the profile from the speed demanded so far."""
+        """Begins the profile from the speed demanded so far; returns it running."""
         finish_step(scene, actor)
         own = actor.entity.performance if self.following is Following.FOLLOW else Performance()
         jerk = Jerk(min(self.jerk.up, own.a_rate), min(self.jerk.down, own.b_rate))
@@ -352,7 +367,7 @@ class Profile:
         return min(self.limits.b_max, own.b_max, DEFAULT_CHANGE)
 
     def _most(self, scene: Scene, actor: Actor, name: str, asked: float, own: float) -> float:
-        """Returns the acceleration of an entry without a time; says where it is not the file's."""
+        """Returns the m/s^2 of an entry without a time; notes where it is not the file's."""
         most = min(asked, own, DEFAULT_CHANGE)
         if asked < inf and any(duration is None for _, duration in self.entries):
             of = f"{name}, m/s^2, that of its <Performance> or {DEFAULT_CHANGE:g}"
@@ -370,7 +385,7 @@ class Profiled:
         self.actor, self.rows = actor, list(zip(times, speeds, strict=True))
 
     def step(self, scene: Scene) -> bool:
-        """Demand the speed of the end of this step."""
+        """Sets the speed demanded for the end of this step; True when the last speed is reached."""
         if self.actor.longitudinal is not self:
             return True
         t, guide = scene.t + scene.dt, self.actor.guide

@@ -44,7 +44,7 @@ class StopTraffic:
     name: str
 
     def happen(self, scene: Scene) -> Running:
-        """Ends the traffic at once; vehicles that are there drive on."""
+        """Ends the traffic at once and returns an action that is done; vehicles that are there drive on."""
         flows: list[Flow] = scene.flows
         for flow in flows:
             if self.name in ("", flow.name):
@@ -70,7 +70,10 @@ def _count(node: Node, name: str, ctx: Context) -> int:
 
 
 def _draw_vehicles(node: Node, count: int, ctx: Context) -> tuple[str, ...]:
-    """Vehicles that may come, shared out by the weights of a distribution; cars without one."""
+    """Adds `count` vehicles that may come to ctx.hired and returns their names; cars without a distribution.
+
+    They are shared out by the weights of the distribution, always in the same way.
+    """
     kinds = list(_kinds(node, ctx))
     total = sum(weight for weight, _ in kinds)
     if total <= 0.0:

@@ -12,7 +12,7 @@ from skidpad.scenarios.scene import DONE, Actor, Running, Scene
 
 
 def can_tow(tractor: Entity, trailer: Entity) -> bool:
-    """Whether the first vehicle has a hitch and the second a coupler."""
+    """Returns whether the first vehicle has a hitch and the second a coupler."""
     return tractor.coupling.hitch is not None and trailer.coupling.coupler is not None
 
 
@@ -31,7 +31,10 @@ class ConnectTrailer:
     trailer: str
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Couples at once; without a hitch or a coupler nothing happens, and the log says so."""
+        """Couples at once and returns an action that is done.
+
+        Without a hitch or a coupler nothing happens, and a notice says so.
+        """
         trailer = scene.actors[self.trailer]
         if any(one is trailer for one in train_of(actor)):
             scene.notice(f"{actor.name} does not tow {trailer.name}, which tows it, or is itself")
@@ -47,7 +50,7 @@ class DisconnectTrailer:
     """Let the own trailer go; on a road it keeps its speed, as the standard says nothing of brakes."""
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Disconnects the actor's trailer, which goes on along its road."""
+        """Disconnects the actor's trailer, which goes on along its road; returns an action that is done."""
         for trailer in scene.actors.values():
             if trailer.towed_by is actor:
                 trailer.towed_by = None

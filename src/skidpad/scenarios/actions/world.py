@@ -25,7 +25,10 @@ class AddEntity:
     position: Position
 
     def happen(self, scene: Scene) -> Running:
-        """At a place, with the speed demanded so far; what is there already stays where it is."""
+        """Puts the entity at its place with the speed demanded so far; returns an action that is done.
+
+        An entity that is there already stays where it is, with a notice.
+        """
         actor = scene.actors[self.name]
         if actor.present:
             scene.notice(f"<AddEntityAction> of {self.name} has no effect: it is there already")
@@ -42,7 +45,7 @@ class DeleteEntity:
     name: str
 
     def happen(self, scene: Scene) -> Running:
-        """Takes the entity out from the next step on."""
+        """Takes the entity out from the next step on; returns an action that is done."""
         actor = scene.actors[self.name]
         actor.present = False
         actor.word = ActorCommand(self.name, present=False)
@@ -68,7 +71,10 @@ class SetValue:
     change: Callable[[str], str]
 
     def happen(self, scene: Scene) -> Running:
-        """Sets the value at once; with a notice and no change where the old one is no number."""
+        """Sets the value at once and returns an action that is done.
+
+        Where the old one is no number, as a change needs, it stays, with a notice.
+        """
         values = scene.variables if self.variable else scene.parameters
         old = values[self.name]
         try:
@@ -112,7 +118,7 @@ class SetSignal:
     state: str
 
     def happen(self, scene: Scene) -> Running:
-        """Sets the signal's state, or its controller's phase, at once."""
+        """Sets the signal's state, or its controller's phase, at once; returns an action that is done."""
         scene.signals[self.name] = self.state
         return DONE
 
@@ -135,7 +141,7 @@ class SetEnvironment:
     environment: Environment
 
     def happen(self, scene: Scene) -> Running:
-        """Sets weather and time from the next step on."""
+        """Sets weather and time from the next step on; returns an action that is done."""
         scene.environments.append(self.environment)
         scene.tell_time(self.environment)
         return DONE
@@ -154,13 +160,16 @@ class UserAction:
     text: str
 
     def happen(self, scene: Scene) -> Running:
-        """Calls the user's hook at once."""
+        """Calls the user's code at once with the scene and the text; returns an action that is done."""
         self.act(scene, self.text)
         return DONE
 
 
 def user_defined(node: Node, ctx: Context) -> GlobalAction:
-    """A <UserDefinedAction> by the type of its command; a monitor that is set has no effect."""
+    """Compiles a <UserDefinedAction> by the type of its command; a monitor that is set has no effect.
+
+    A type that is not registered has none either, with a finding.
+    """
     command = node.find("CustomCommandAction")
     if command is None:
         return NoEffect(node.tag)

@@ -18,7 +18,7 @@ class Condition(Protocol):
     """Something that holds now or not; `probe` makes what is asked once per step."""
 
     def probe(self) -> Probe:
-        """A fresh observer, as a run begins."""
+        """Returns a fresh observer: a function of the scene, for one run, to be called once per step."""
         ...
 
 
@@ -26,7 +26,7 @@ class EntityCondition(Protocol):
     """Something that holds for an entity or not."""
 
     def holds(self, scene: Scene, actor: str) -> bool:
-        """Looked at once per step and entity."""
+        """Returns whether it holds for an entity now; called at most once per step and entity."""
         ...
 
 
@@ -38,7 +38,10 @@ class Rule:
     value: float
 
     def met(self, quantity: float) -> bool:
-        """Whether the quantity stands so to the value; infinity is beyond every number."""
+        """Returns whether the quantity stands so to the value; infinity is beyond every number.
+
+        They are equal where they differ by less than SAME.
+        """
         difference = quantity - self.value
         if abs(difference) < SAME:
             return self.rule in ("equalTo", "greaterOrEqual", "lessOrEqual")
@@ -46,7 +49,7 @@ class Rule:
 
 
 def rule(node: Node, value: str = "value") -> Rule:
-    """The attributes `rule` and `value` of a condition."""
+    """Returns the comparison in the attributes `rule` and `value` of a condition."""
     return Rule(rule_name(node), node.number(value))
 
 

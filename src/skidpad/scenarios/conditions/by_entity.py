@@ -39,7 +39,7 @@ class Reaches:
     value: float
 
     def holds(self, scene: Scene, actor: str) -> bool:
-        """Whether it holds now; before the first tick nothing has lasted."""
+        """Returns whether the count has reached the value now; before the first tick nothing has lasted."""
         a = scene.actors[actor]
         if self.quantity is Quantity.OFF_ROAD:
             lasted = time_off_road(a, scene.network, scene.t)
@@ -78,7 +78,10 @@ class Motion:
     other: str | None
 
     def holds(self, scene: Scene, actor: str) -> bool:
-        """Against the value; a relative one is taken in the axes of the triggering entity."""
+        """Returns whether speed or acceleration meets the comparison; a vertical one counts 0.
+
+        A relative one is taken in the axes of the triggering entity.
+        """
         own = scene.actors[actor]
         if self.component is Component.VERTICAL:
             return self.rule.met(0.0)
@@ -169,7 +172,7 @@ class Angle:
     other: str | None
 
     def holds(self, scene: Scene, actor: str) -> bool:
-        """Whether the angle is as asked now."""
+        """Returns whether the angle is as asked now, within the tolerance; never where it is NaN."""
         here = scene.actors[actor].pose
         if self.other is not None:
             value = self._of(scene, here) - self._of(scene, scene.actors[self.other].pose)
@@ -237,7 +240,7 @@ class Clearance:
         return not any(self._inside(scene, here, base, place.along, n) for n in others)
 
     def _wanted(self, lane: int, sign: int) -> set[int]:
-        """Ids of the lanes that are asked for."""
+        """Returns the OpenDRIVE ids of the lanes asked for, seen from `lane`; sign: 1 towards higher ids."""
         return {
             next_lane_id(lane, sign * k) if k else lane
             for low, high in self.lanes
@@ -245,7 +248,7 @@ class Clearance:
         }
 
     def _has_lane(self, scene: Scene, base: LanePoint, sign: int) -> bool:
-        """Whether a lane of those that are asked for is beside the entity: no lane is no room."""
+        """Returns whether a lane of those asked for is beside the entity; none is no room."""
         wanted = self._wanted(base.lane_id, sign) or {base.lane_id}
         if not self.opposite:
             wanted = {i for i in wanted if (i > 0) == (base.lane_id > 0)}
@@ -308,7 +311,7 @@ PAST = 0.05  # m beyond the last place of a lane
 
 
 def time_off_road(actor: Actor, network: Network, t: float) -> float:
-    """Return how long an actor has been beside every lane, s; ask in every step."""
+    """Returns how many s an actor has been beside every lane; to be asked in every step."""
     pose = actor.pose
     point = network.map.project(pose.x, pose.y, pose.z, driving=False)
     on_lane = point is not None and abs(point.offset) <= 0.5 * point.width
@@ -320,7 +323,7 @@ def time_off_road(actor: Actor, network: Network, t: float) -> float:
 
 
 def time_past_road(actor: Actor, network: Network, t: float) -> float:
-    """Return how long an actor has been at the end of a road, s; beside its lane ask in every step."""
+    """Returns how many s an actor has been at the end of a road; off its lane to be asked in every step."""
     if actor.driven_by_file and actor.track is None:
         return actor.at_end
     lane = network.place_of(actor.pose).lane

@@ -53,7 +53,7 @@ class Value:
         return self.holds_among(scene.variables if self.variable else scene.parameters)
 
     def holds_among(self, values: Mapping[str, str]) -> bool:
-        """Tells whether it holds among these values."""
+        """Returns whether it holds among these values; KeyError where the name is not among them."""
         return holds_between(self.rule, values[self.name], self.value)
 
 
@@ -72,7 +72,7 @@ def _value(node: Node, ctx: Context) -> Condition:
 
 
 def _is_criterion(node: Node) -> bool:
-    """ScenarioRunner judges by conditions of these names, and reads nothing else of them."""
+    """Returns whether a condition has a name by which ScenarioRunner judges, and reads nothing else."""
     named = next(node.element.iterancestors("Condition"), None)
     return named is not None and is_criterion(str(named.get("name", "")))
 
@@ -94,7 +94,7 @@ class ElementState:
     state: State
 
     def probe(self) -> Probe:
-        """Returns the element's state as it is now."""
+        """Returns a function of the scene: whether the element is in the state now."""
         return lambda scene: scene.states.get(self.path, State.STANDBY) is self.state
 
 
@@ -106,7 +106,10 @@ class ElementMove:
     move: Move
 
     def probe(self) -> Probe:
-        """True once after each; every observer keeps its own place in the list of moves."""
+        """Returns a function of the scene that is True once after each such transition.
+
+        Every observer keeps its own place in the list of moves.
+        """
         seen = 0
 
         def holds(scene: Scene) -> bool:
@@ -137,7 +140,7 @@ class Signal:
     state: str
 
     def probe(self) -> Probe:
-        """Returns the signal's state as it is now."""
+        """Returns a function of the scene: whether the signal is in the state now."""
         wanted, id = read_signal_state(self.state), id_number(self.name.removeprefix("id="))
 
         def holds(scene: Scene) -> bool:
@@ -155,7 +158,7 @@ class TimeOfDay:
     rule: Rule
 
     def probe(self) -> Probe:
-        """Returns the time of day as it is now."""
+        """Returns a function of the scene: whether its time of day meets the comparison now."""
         return lambda s: s.clock is not None and self.rule.met(s.clock.now(s.t))
 
 
@@ -177,7 +180,7 @@ class UserValue:
     value: str
 
     def probe(self) -> Probe:
-        """Returns a probe that reads the value when it is asked."""
+        """Returns a function of the scene that reads the value, and whether it meets the comparison."""
         return lambda scene: holds_between(self.rule, str(self.read(scene)), self.value)
 
 

@@ -34,7 +34,7 @@ class Measure:
     free: bool
 
     def distance(self, scene: Scene, actor: Actor, goal: Pose, other: Actor | None) -> float:
-        """Measures from an entity to a place, or to the entity there; m, never negative."""
+        """Returns the distance from an entity to a place, or to the entity there; m, never negative."""
         if self.direction in EUCLIDEAN:
             if not self.free:
                 return hypot(goal.x - actor.pose.x, goal.y - actor.pose.y)
@@ -58,7 +58,10 @@ class Measure:
         return abs(dx if forward else dy)
 
     def _room(self, actor: Actor, other: Actor | None, way: float, forward: bool) -> float:
-        """What the bodies take of a signed distance of their reference points, m."""
+        """Returns what the bodies take of a signed distance of their reference points, m.
+
+        0 unless outlines count. way: m; forward: it runs along the road, else across.
+        """
         if not self.free:
             return 0.0
         sign = 1.0 if way >= 0.0 else -1.0
@@ -72,7 +75,7 @@ class Measure:
 
 
 def measure(node: Node, free: str = "freespace") -> Measure:
-    """The attributes of a condition that say how it measures."""
+    """Returns how a condition measures, by its attributes."""
     along = node.flag("alongRoute", default=False)  # the way to ask for the road before 1.1
     axes = node.choice("coordinateSystem", Axes, Axes.ROAD if along else Axes.ENTITY)
     default = Direction.LONGITUDINAL if along else Direction.EUCLIDEAN
@@ -96,7 +99,7 @@ class Distance:
 
 
 def target(scene: Scene, other: str | None, goal: Position | None) -> tuple[Pose, Actor | None]:
-    """Where a condition measures to, and the entity that is there."""
+    """Returns where a condition measures to, and the entity that is there; None for a place."""
     if other is not None:
         actor = scene.actors[other]
         return actor.pose, actor
@@ -150,7 +153,7 @@ class TimeToCollision:
     goal: Position | None
 
     def holds(self, scene: Scene, actor: str) -> bool:
-        """Returns whether the time to collision in s meets the comparison; inf where nothing closes in."""
+        """Returns whether the time to collision in s meets the comparison; inf where nothing closes."""
         own = scene.actors[actor]
         goal, other = target(scene, self.other, self.goal)
         distance = self.measure.distance(scene, own, goal, other)

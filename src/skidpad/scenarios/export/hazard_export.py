@@ -35,9 +35,10 @@ def export_hazard(
     version: OscVersion = OscVersion.V1_2,
     world: str | None = None,
 ) -> tuple[Path, Path]:
-    """Write ID-TYPE.xosc and .xodr into `folder`, ID-TYPE_1.0 for version 1.0.
+    """Writes ID-TYPE.xosc and .xodr into `folder`, ID-TYPE_1.0 for version 1.0; returns both paths.
 
-    world: the one channel of a 1.0 file.
+    world: the one channel of a file; None: all, for version 1.0 the driving one. ConfigError for an
+    unknown channel, InputError without an ego to export.
     """
     channels = _channels(record, version, world)
     entities = [track for track in tracks(record, channels) if track.t]
@@ -63,7 +64,7 @@ def export_hazard(
 
 
 def _paint(entities: Sequence[Track], record: HazardRecord) -> None:
-    """Colours by channel; what another channel than the first one saw is no second body."""
+    """Sets the colours by channel; what another channel than the first one saw is made a ghost."""
     first = entities[0].channel
     for track in entities:
         colours = EGO_COLOURS if track.is_ego else OBJECT_COLOURS
@@ -86,7 +87,10 @@ def _channels(record: HazardRecord, version: OscVersion, world: str | None) -> t
 def road_under(
     entities: Sequence[Track], name: str
 ) -> tuple[ElementTree.Element, tuple[float, float, float]]:
-    """A straight road under every position; a place beside it and its heading."""
+    """Returns a straight road under every position, and a place beside it with its heading.
+
+    entities: the ego first. x, y in m and rad. InputError where they spread over ROAD_SIZE_MAX.
+    """
     ego = entities[0]
     dx, dy = ego.x[-1] - ego.x[0], ego.y[-1] - ego.y[0]
     h = atan2(dy, dx) if hypot(dx, dy) > 5.0 else ego.heading[0]

@@ -79,7 +79,7 @@ class _Road:
         return self.sides[lane, left]
 
     def _runs(self, lane: int, left: bool) -> Iterator[tuple[int, int]]:
-        """Yields the stretches of one marking, as first and last sample."""
+        """Yields the stretches of one marking, as numbers of the first and last sample of the map."""
         first, size = int(self.map.lanes.first[lane]), int(self.map.lanes.size[lane])
         samples = self.map.samples
         marks = (samples.marking_left if left else samples.marking_right)[first : first + size]
@@ -159,7 +159,7 @@ def _write_lane(road: _Road, lane: int) -> None:
 
 
 def _write_signs(map: RoadMap, truth: GroundTruth) -> None:
-    """Write the signs, one message for each with the lanes that it is valid for."""
+    """Writes the signs, one message for each with the lanes that it is valid for."""
     table = map.signals
     written: dict[int, Any] = {}
     for row in range(len(table.id)):
@@ -188,7 +188,7 @@ def _write_signs(map: RoadMap, truth: GroundTruth) -> None:
 
 
 def _refer(message: Any, *identifiers: str) -> None:
-    """Name the part of the OpenDRIVE file that a message is of."""
+    """Names the part of the OpenDRIVE file that a message is of, in the message."""
     reference = message.source_reference.add()
     reference.type = "net.asam.opendrive"
     reference.identifier.extend(identifiers)

@@ -32,7 +32,7 @@ class Vertex(NamedTuple):
 
 
 def pieces(vertices: Sequence[Vertex], sparse: bool = False) -> list[list[Vertex]]:
-    """The motion as trajectories that follow each other; where one ends the next begins.
+    """Returns the motion as trajectories that follow each other; where one ends the next begins.
 
     Vertices that say no more than their neighbours are left out where they are near; sparse:
     everywhere. Times must rise.
@@ -49,7 +49,10 @@ def pieces(vertices: Sequence[Vertex], sparse: bool = False) -> list[list[Vertex
 
 
 def thin_vertices(vertices: Sequence[Vertex], sparse: bool = False) -> list[Vertex]:
-    """Drops the vertices between which motion is as even without them."""
+    """Returns the vertices without those that the motion is as even without.
+
+    Only near ones are left out; sparse: any.
+    """
     table = np.array(vertices)
     kept, i, last = [0], 0, len(vertices) - 1
     while i < last:
@@ -63,7 +66,10 @@ def thin_vertices(vertices: Sequence[Vertex], sparse: bool = False) -> list[Vert
 
 
 def _even(rows: np.ndarray) -> bool:
-    """Whether those between the first and the last one lie on the straight way in time."""
+    """Returns whether those between the first and the last one lie on the straight way in time.
+
+    rows: (n, 5) of t, x, y, z, h; within SHIFT_MAX and TURN_MAX.
+    """
     first, last = rows[0], rows[-1]
     way = float(np.hypot(last[1] - first[1], last[2] - first[2]))
     if way >= NEAR and last[0] - first[0] > HELD_MAX:

@@ -41,7 +41,7 @@ def export_run(
     version: OscVersion = OscVersion.V1_2,
     environment: Environment | None = None,
 ) -> tuple[Path, Path, bool]:
-    """Write STEM.xosc and STEM.xodr into `folder`; returns them, and whether the road is the run's.
+    """Writes STEM.xosc and STEM.xodr into `folder`; returns them, and whether the road is the run's.
 
     environment: weather and road of the run, where they are known.
     roads: files of which one may be the run's road; bundled ones are known. Without it a straight
@@ -73,7 +73,7 @@ def export_run(
 
 
 def road_of(log: RunLog, roads: Iterable[Path]) -> Path | None:
-    """The OpenDRIVE file that the run was driven on, by its content."""
+    """Returns the OpenDRIVE file that the run was driven on, by its content; None without one."""
     bundled = FOLDER / f"{log.header.map}.xodr"
     for file in (*roads, bundled):
         if file.suffix != ".xodr" or not file.is_file():
@@ -85,7 +85,7 @@ def road_of(log: RunLog, roads: Iterable[Path]) -> Path | None:
 
 
 def log_tracks(log: RunLog) -> list[Track]:
-    """Everybody of a log, the ego first; times in s from its first moment."""
+    """Returns the tracks of all actors of a log, the ego first; times in s from its first moment."""
     found = []
     for i, name in enumerate(log.table.names):
         there = np.flatnonzero(log.present[:, i])
@@ -95,7 +95,7 @@ def log_tracks(log: RunLog) -> list[Track]:
 
 
 def _track(log: RunLog, i: int, name: str, there: np.ndarray) -> Track:
-    """Returns the track of actor i of a log, at the moments where the mask `there` is true."""
+    """Returns the track of actor i of a log at the rows `there`."""
     a, table = log.actors, log.table
     x, y, z, yaw = (v[there, i].astype(np.float64) for v in (a.x, a.y, a.z, a.yaw))
     vx, vy = (v[there, i].astype(np.float64) for v in (a.vx, a.vy))

@@ -15,7 +15,10 @@ CLEAR = 100_000.0  # m, where a file says nothing of the sight
 
 
 def environment_action(environment: Environment, *, old: bool) -> Any:
-    """The action; old: by the vocabulary of 1.0, where clouds are words and rain is a share."""
+    """Returns the <EnvironmentAction> of an environment.
+
+    old: by the vocabulary of 1.0, where clouds are words and rain is a share.
+    """
     elevation = environment.sun_elevation_deg or 0.0
     sun = xosc.Sun(
         1.0 if old else LIGHT if elevation > 0.0 else 0.0,

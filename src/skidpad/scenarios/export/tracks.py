@@ -39,12 +39,15 @@ class Track:
     ghost: bool = False  # it touches nothing
 
     def stretches(self) -> list[tuple[int, int]]:
-        """First index and index after the last one of each time that it is there."""
+        """Returns first index and index after the last one of each time that it is there.
+
+        A gap of more than GAP_MAX ends one.
+        """
         breaks = (np.flatnonzero(np.diff(self.t) > GAP_MAX) + 1).tolist()
         return list(zip([0, *breaks], [*breaks, len(self.t)], strict=True))
 
     def add(self, t: float, state: list[float]) -> None:
-        """Append a state x, y, heading, vx, vy."""
+        """Appends the state x, y, heading, vx, vy at t s; below V_STANDING the heading is held."""
         x, y, heading, vx, vy = state
         v = hypot(vx, vy)
         if v < V_STANDING and self.heading:
@@ -59,14 +62,14 @@ class Track:
         self.v.append(v if vx * cos(heading) + vy * sin(heading) >= 0.0 else -v)
 
     def distance(self, t: float, x: float, y: float) -> float:
-        """Distance of a place at `t` from where the track would be at its last velocity, m."""
+        """Returns the m of a place at t s from where the track would be at its last velocity."""
         ahead = (t - self.t[-1]) * self.v[-1]
         h = self.heading[-1]
         return hypot(x - self.x[-1] - ahead * cos(h), y - self.y[-1] - ahead * sin(h))
 
 
 def tracks(record: HazardRecord, channels: tuple[str, ...]) -> list[Track]:
-    """The egos and objects of `channels` in the worlds of a record, egos first."""
+    """Returns the egos and objects of `channels` in the worlds of a record, egos first; [] without worlds."""
     egos: list[Track] = []
     objects: list[Track] = []
     if not record.worlds:
@@ -93,7 +96,7 @@ def tracks(record: HazardRecord, channels: tuple[str, ...]) -> list[Track]:
 
 
 def _extend(mine: list[Track], channel: str, t: float, frame: ChannelFrame) -> None:
-    """Add the objects of one frame to the tracks of their channel."""
+    """Adds the objects of one frame at t s to the tracks of their channel, or begins new ones."""
     free = [track for track in mine if t - track.t[-1] <= GAP_MAX]
     for i, state in enumerate(frame.objects.tolist()):
         if not np.isfinite(state).all():
@@ -113,7 +116,10 @@ def _extend(mine: list[Track], channel: str, t: float, frame: ChannelFrame) -> N
 
 
 def _find(free: list[Track], identity: int, t: float, state: list[float]) -> Track | None:
-    """Returns the free track with that id or, for -1, the nearest one without id in reach; else None."""
+    """Returns the track of an object among those not taken yet; None where there is none.
+
+    With an identity the track that has it; for -1 the nearest without one within MATCH_DISTANCE.
+    """
     if identity >= 0:
         return next((track for track in free if track.id == identity), None)
     near = [(track.distance(t, state[0], state[1]), k) for k, track in enumerate(free)]
@@ -122,7 +128,10 @@ def _find(free: list[Track], identity: int, t: float, state: list[float]) -> Tra
 
 
 def _box(polygon: Floats) -> tuple[float, float, float, float]:
-    """Length, width and centre of the box around a polygon in its own frame."""
+    """Returns length, width and centre of the box around a polygon in its own frame, m.
+
+    No size is below MIN_SIZE.
+    """
     points = polygon[np.isfinite(polygon).all(axis=1)]
     if len(points) == 0:
         return MIN_SIZE, MIN_SIZE, 0.0, 0.0

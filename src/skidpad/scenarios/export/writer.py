@@ -76,11 +76,11 @@ class Sheet:
 
     @property
     def old(self) -> bool:
-        """Whether the file is written as version 1.0."""
+        """Returns whether the file is written as version 1.0."""
         return self.version is OscVersion.V1_0
 
     def parked(self, k: int) -> tuple[float, float, float]:
-        """A parking place of its own for entity k."""
+        """Returns a parking place of its own for entity k: x, y in m, heading in rad."""
         x, y, h = self.parking
         return x + 8.0 * k * cos(h), y + 8.0 * k * sin(h), h
 
@@ -91,7 +91,7 @@ def write_scenario(path: Path, entities: Sequence[Track], sheet: Sheet) -> None:
 
 
 def write_element(path: Path, element: ElementTree.Element) -> None:
-    """Write an element as an XML file."""
+    """Writes an element as an XML file."""
     ElementTree.indent(element, " ")
     write_bytes(path, ElementTree.tostring(element, encoding="utf-8", xml_declaration=True))
 
@@ -165,7 +165,10 @@ def _rgb(colour: str) -> str:
 
 
 def _initial(init: Any, track: Track, sheet: Sheet, k: int) -> None:
-    """Place and speed at the start; what is not there yet is taken out of the world."""
+    """Adds place and speed at the start; what is not there yet is taken out of the world.
+
+    In version 1.0 it waits beside the road instead. k: number of the entity.
+    """
     late = track.t[0] > 1e-6
     first, speed = _vertices(track)[0], track.v[0]
     if late and sheet.old:
@@ -195,7 +198,7 @@ def _waiting(t: float, sheet: Sheet, k: int, further: float = 0.0) -> Vertex:
 
 
 def _motion(track: Track, sheet: Sheet, k: int) -> Any:
-    """The manoeuvre group of one entity: appear, follow trajectories, vanish, appear again."""
+    """Returns the manoeuvre group of one entity: appear, follow trajectories, vanish, appear again."""
     manoeuvre = xosc.Maneuver(f"{track.name}_manoeuvre")
     stretches = [_vertices(track)[a:b] for a, b in track.stretches()]
     if sheet.old:
@@ -210,7 +213,7 @@ def _motion(track: Track, sheet: Sheet, k: int) -> Any:
 
 
 def _with_waits(stretches: Sequence[Sequence[Vertex]], sheet: Sheet, k: int) -> list[Vertex]:
-    """All stretches, with waits beside the road before, between and after them."""
+    """Returns all stretches as one, with waits beside the road before, between and after them."""
     rows: list[Vertex] = []
     for stretch in stretches:
         begin = stretch[0].t
@@ -236,7 +239,7 @@ def _stay(manoeuvre: Any, name: str, rows: Sequence[Vertex], sheet: Sheet, suffi
 
 
 def _lead(manoeuvre: Any, name: str, rows: Sequence[Vertex], sheet: Sheet, word: str) -> None:
-    """The trajectories of a stretch, one event each; the last vertex is held for a second."""
+    """Adds the trajectories of a stretch, one event each; the last vertex is held for a second."""
     held = [*rows, rows[-1]._replace(t=round(rows[-1].t + 1.0, 3))]  # no controller takes over
     for n, piece in enumerate(pieces(held, sheet.sparse)):
         label = f"{name}_{word}" if n == 0 else f"{name}_{word}_p{n + 1}"
@@ -264,7 +267,10 @@ def _position(v: Vertex) -> Any:
 
 
 def _after(t: float, sheet: Sheet, point: str = "start") -> Any:
-    """Triggers at simulation time `t`; OpenSCENARIO 1.0 knows no `greaterOrEqual`."""
+    """Returns a trigger at simulation time t s; OpenSCENARIO 1.0 knows no `greaterOrEqual`.
+
+    point: "start" or "stop".
+    """
     rule = xosc.Rule.greaterThan if sheet.old else xosc.Rule.greaterOrEqual
     value = round(t - EARLY, 3) if t > 0.0 or sheet.old else 0.0
     condition = xosc.SimulationTimeCondition(value, rule)

@@ -62,7 +62,7 @@ class Line:
         return self.s[-1]
 
     def at_length(self, s: float) -> Pose:
-        """The pose at length s, clamped to the line."""
+        """Returns the pose at length s in m, clamped to the line."""
         return self._between(*self._find(self.s, s))
 
     def tangent(self, s: float) -> float:
@@ -76,12 +76,15 @@ class Line:
         return self.named[k] is not None and not self.tangential
 
     def at_time(self, t: float) -> Pose:
-        """The pose at time t, clamped to the line; linear between points."""
+        """Returns the pose at time t s, clamped to the line; linear between points."""
         assert self.t is not None
         return self._between(*self._find(self.t, t))
 
     def speed_at(self, t: float) -> float:
-        """Speed at time t along the heading, m/s; that of the last moving segment beyond the end."""
+        """Returns the speed at time t s along the heading, m/s; that of the last segment beyond the end.
+
+        Negative where the line is driven backwards; 0 where the segment takes no time.
+        """
         assert self.t is not None
         k, _ = self._find(self.t, t)
         span = self.t[k + 1] - self.t[k] if k + 1 < len(self.t) else 0.0
@@ -94,7 +97,7 @@ class Line:
         return (-distance if backwards else distance) / span
 
     def length_at(self, t: float) -> float:
-        """Returns the length reached at time t."""
+        """Returns the length in m reached at time t s."""
         assert self.t is not None
         k, u = self._find(self.t, t)
         return self.s[k] + (u * (self.s[k + 1] - self.s[k]) if k + 1 < len(self.s) else 0.0)
@@ -119,7 +122,7 @@ class Line:
         return found
 
     def time_at(self, s: float) -> float:
-        """Time at length s, clamped to the line."""
+        """Returns the time in s at length s in m, clamped to the line."""
         assert self.t is not None
         k, u = self._find(self.s, s)
         return self.t[k] + (u * (self.t[k + 1] - self.t[k]) if k + 1 < len(self.t) else 0.0)
@@ -168,7 +171,10 @@ class Line:
         return wrap_angle(a + u * wrap_angle(b - a))
 
     def _course(self, k: int) -> float:
-        """Direction of the segment that begins at vertex k, or of the nearest one with a length, rad."""
+        """Returns the direction in rad of the segment that begins at point k, or the nearest with a length.
+
+        Where none has a length, the heading of the point, else 0.
+        """
         j = min(k + 1, len(self.x) - 1)
         while j < len(self.x) - 1 and hypot(self.x[j] - self.x[k], self.y[j] - self.y[k]) < NEAR:
             j += 1
@@ -182,7 +188,10 @@ class Line:
 def clothoid(
     start: Pose, curvature: float, rate: float, length: float, times: tuple[float, float] | None
 ) -> list[Vertex]:
-    """Points of a curve whose curvature begins at `curvature` and grows by `rate` per m."""
+    """Returns points of a curve whose curvature begins at `curvature` and grows by `rate` per m.
+
+    times: s of the first and the last point, the others evenly between; None: without times.
+    """
     count = min(max(int(length / STEP), 4), STEPS_MAX)
     s = np.linspace(0.0, length, count + 1)
     heading = start.yaw + s * (curvature + 0.5 * rate * s)
@@ -195,7 +204,7 @@ def clothoid(
 def _integrate(
     start: float, rate: NDArray[np.float64], s: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Integral of samples by the rule of Gregory: trapezoids with their end slopes."""
+    """Returns the integral of samples over s by the rule of Gregory: trapezoids with their end slopes."""
     step = s[1] - s[0]
     trapezoids = 0.5 * step * (rate[1:] + rate[:-1])
     slope = np.gradient(rate, step, edge_order=2)
@@ -207,9 +216,9 @@ def _integrate(
 def nurbs(
     order: int, points: Sequence[Vertex], weights: Sequence[float], knots: Sequence[float]
 ) -> list[Vertex]:
-    """Points of a rational B-spline; time is a dimension of it where every point has one.
+    """Returns points of a rational B-spline; time is a dimension of it where every point has one.
 
-    It runs evenly along the spline where only the ends have times.
+    It runs evenly along the spline where only the ends have times, and has none without both.
     """
     from scipy.interpolate import BSpline  # 20 MB that only a file with splines needs
 
@@ -240,7 +249,7 @@ def nurbs(
 
 
 def even_knots(order: int, points: int) -> list[float]:
-    """The knots of a spline whose file gives none: clamped at its ends, even between them."""
+    """Returns the knots of a spline whose file gives none: clamped at its ends, even between them."""
     inside = points - order
     middle = [(k + 1) / (inside + 1) for k in range(inside)]
     return [0.0] * order + middle + [1.0] * order

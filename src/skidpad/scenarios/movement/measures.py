@@ -38,7 +38,7 @@ class Direction(Enum):
 
 
 def corners(pose: Pose, box: Box) -> list[Point]:
-    """The outline of an entity on the ground."""
+    """Returns the four corners of an entity on the ground."""
     found = []
     for a, b in ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)):
         p = pose.moved(forward=box.forward + a * box.length, left=box.left + b * box.width)
@@ -47,14 +47,14 @@ def corners(pose: Pose, box: Box) -> list[Point]:
 
 
 def between(origin: Pose, x: Some, y: Some) -> tuple[Some, Some]:
-    """A point, or arrays of them, in the axes of a pose: m forward, m left."""
+    """Returns a point, or arrays of them, in the axes of a pose: m forward, m left."""
     dx, dy = x - origin.x, y - origin.y
     c, s = cos(origin.yaw), sin(origin.yaw)
     return dx * c + dy * s, dy * c - dx * s
 
 
 def overlap(a: Sequence[Point], b: Sequence[Point]) -> float:
-    """Distance of two convex outlines along the best separating axis; negative where they overlap."""
+    """Returns the m between two convex outlines along the best separating axis; negative: they overlap."""
     best = -inf
     for shape in (a, b):
         for k, (x0, y0) in enumerate(shape):
@@ -70,7 +70,7 @@ def overlap(a: Sequence[Point], b: Sequence[Point]) -> float:
 
 
 def clearance(a: Sequence[Point], b: Sequence[Point]) -> float:
-    """Shortest distance of two convex outlines, 0 where they touch."""
+    """Returns the shortest distance of two convex outlines in m, 0 where they touch."""
     if overlap(a, b) <= 0.0:
         return 0.0
     return min(_to_edges(p, shape) for one, shape in ((a, b), (b, a)) for p in one)
@@ -90,12 +90,15 @@ def _to_edges(p: Point, shape: Sequence[Point]) -> float:
 
 
 def extent_gap(a: Sequence[float], b: Sequence[float]) -> float:
-    """Free room between two intervals on one axis, 0 where they meet."""
+    """Returns the m between two intervals on one axis, 0 where they meet."""
     return max(min(b) - max(a), min(a) - max(b), 0.0)
 
 
 def along_road(network: Network, a: Pose, b: Pose) -> Point | None:
-    """From a to b along the road and across it: m, positive ahead of and left of a; None off road."""
+    """Returns the way from a to b along the road and across it: m, positive ahead of and left of a.
+
+    None off the road, or where no way leads from either to the other.
+    """
     here, there = network.coordinates(a), network.coordinates(b)
     if here is None or there is None:
         return None

@@ -34,7 +34,10 @@ LONGEST = 1e150  # of a span, whose square is a number
 
 
 def progress(shape: Shape, u: float) -> tuple[float, float, float]:
-    """Share covered at u in [0, 1] and its first two derivatives by u."""
+    """Returns the share covered at u in [0, 1] and its first two derivatives by u.
+
+    Shape.STEP is not meant.
+    """
     if shape is Shape.LINEAR:
         return u, 1.0, 0.0
     if shape is Shape.SINUSOIDAL:
@@ -52,7 +55,7 @@ class Transition:
     shape: Shape
 
     def at(self, p: float) -> tuple[float, float, float]:
-        """Value and first two derivatives at `p`."""
+        """Returns the value and its first two derivatives at `p`; the end, and zeros, from `span` on."""
         if self.over(p):
             return self.end, 0.0, 0.0
         share, rate, bend = progress(self.shape, p / self.span)
@@ -94,7 +97,7 @@ class Guide:
         self.turn = look if self.along > 0.0 else wrap_angle(look - pi)
 
     def advance(self, motion: Motion | Pose) -> None:
-        """Move the reference point abreast of the actor."""
+        """Moves the reference point on, to abreast of the actor; at the end of the road it stays."""
         if self.base is None:
             return
         dx, dy = motion.x - self.base.x, motion.y - self.base.y
@@ -107,9 +110,9 @@ class Guide:
         return Place(pose, None if self.base is None else replace(self.base, offset=self.offset))
 
     def shift_to(self, lane_id: int) -> float | None:
-        """Make another lane across the road the reference; returns the way left to it, m.
+        """Makes another lane across the road the reference; returns the way left to it, m.
 
-        None where there is no such lane: the reference stays.
+        None where there is no such lane, or no lane at all: the reference stays.
         """
         if self.base is None:
             return None
@@ -124,7 +127,7 @@ class Guide:
         return -left
 
     def preview(self, way: float, offset: float) -> Pose | None:
-        """Returns the place `way` m further along at an offset; None at the end of the road."""
+        """Returns the place `way` m further along at an offset; None at the road's end or without a lane."""
         if self.base is None:
             return None
         sense = self.along if self.v >= 0.0 else -self.along
@@ -132,7 +135,7 @@ class Guide:
         return None if further is None else self.network.aside(further, offset)
 
     def demand(self, motion: Motion) -> Demand:
-        """Goes on by one step, and returns what a driver has to do in it."""
+        """Moves the reference point abreast of an actor, and returns what a driver has to do."""
         self.advance(motion)
         if self.base is None:
             return Demand(self.v, self.a, 0.0, 0.0, 0.0, 0.0, reverse=self.v < 0.0)
@@ -152,7 +155,10 @@ class Guide:
         )
 
     def ideal(self, dt: float) -> Pose:
-        """The pose of an actor that does exactly as demanded, one step on."""
+        """Moves on by dt s exactly as demanded and returns the pose there.
+
+        What the speed, leap and way aside of this one step were is used up.
+        """
         v, self.pace = self.v if self.pace is None else self.pace, None
         leap, aside, self.leap, self.aside = self.leap, self.aside, 0.0, 0.0
         way = v * dt
@@ -169,7 +175,10 @@ class Guide:
         return self._current_pose()
 
     def _along_lane(self, way: float) -> float:
-        """Returns how far along the lane so many m beside it lead; where the bend changes, as measured."""
+        """Returns the m along the lane's centre that `way` m beside it lead.
+
+        Where the bend changes on the way they are measured.
+        """
         assert self.base is not None
         bend, offset = self.base.curvature, self.offset
         distance = way / max(1.0 - bend * offset, SQUEEZED)
@@ -197,7 +206,7 @@ class Guide:
             self.base = rest
 
     def _rest(self, distance: float) -> LanePoint | None:
-        """The last place before the road's end."""
+        """Returns the last place before the road's end within `distance` m; None where there is none."""
         assert self.base is not None
         low, high = 0.0, abs(distance)
         sign = 1.0 if distance > 0.0 else -1.0

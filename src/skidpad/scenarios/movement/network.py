@@ -58,19 +58,22 @@ class Network:
 
     @cached_property
     def roads(self) -> dict[int, RoadRecord]:
-        """Reference lines, read only where a file asks for road coordinates."""
+        """Returns the roads of the file by id, read only where a file asks for road coordinates."""
         file = map_file(self.name)
         return parse(file.read_bytes(), file.name).roads
 
     @cached_property
     def labels(self) -> dict[int, str]:
-        """Ids of the roads as the file writes them, by their numbers."""
+        """Returns the ids of the roads as the file writes them, by their numbers."""
         if map_file(self.name).suffix == ".npz":  # a baked map keeps the numbers only
             return {road: str(road) for road in np.unique(self.map.lanes.road).tolist()}
         return {road.id: road.label for road in self.roads.values()}
 
     def place_of(self, pose: Pose) -> Place:
-        """A pose with the lane under it: a driving lane where there is one, else any."""
+        """Returns a pose with the lane under it: a driving lane where there is one, else any.
+
+        Beside all lanes it is the nearest driving lane's point, None where that is out of reach.
+        """
         for driving in (True, False):
             point = self._project(pose, driving)
             if point is not None and abs(point.offset) <= 0.5 * point.width + ON_LANE:
@@ -128,7 +131,7 @@ class Network:
         return self.place_of(Pose(at.x, at.y, at.z, yaw=wrap_angle(at.heading)))
 
     def coordinates(self, pose: Pose) -> RoadCoordinates | None:
-        """Road coordinates of a pose; None off the map."""
+        """Returns the road coordinates of a pose; None off the map."""
         point = self.place_of(pose).lane
         if point is None:
             return None
@@ -151,7 +154,7 @@ class Network:
         return any(one.id == point.lane_id and one.type == "none" for one in section.lanes)
 
     def slopes(self, pose: Pose) -> tuple[float, float]:
-        """Pitch (nose down) and roll (left side up) of a body on the road there, rad; 0 off it."""
+        """Returns pitch (nose down) and roll (left side up) of a body on the road there, rad; 0 off it."""
         at = self.coordinates(pose)
         if at is None:
             return 0.0, 0.0
@@ -164,7 +167,7 @@ class Network:
         return -atan(along * c + across * d), atan(across * c - along * d)
 
     def forward(self, point: LanePoint) -> bool:
-        """Traffic of this lane runs with increasing road s."""
+        """Returns whether the traffic of this lane runs with increasing road s."""
         first = int(self.map.lanes.first[point.lane])
         s = self.map.samples.s_road
         return bool(s[first + 1] > s[first])
@@ -178,7 +181,7 @@ class Network:
         return self._route_lengths[key]
 
     def beside(self, point: LanePoint, lane_id: int) -> LanePoint | None:
-        """The same place across the road on another lane of it; None where there is no such lane."""
+        """Returns the same place across the road on another lane of it; None where there is no such lane."""
         lanes = self.map.lanes
         same = (lanes.road == point.road) & (lanes.section == lanes.section[point.lane])
         found = np.flatnonzero(same & (lanes.lane_id == lane_id))
@@ -190,7 +193,7 @@ class Network:
             return None
 
     def abreast(self, point: LanePoint, x: float, y: float) -> tuple[LanePoint, float]:
-        """The place of a point's lane that is abreast of (x, y), and how far left of it that is."""
+        """Returns the place of a point's lane abreast of (x, y), and how many m left of it these lie."""
         near = point
         for _ in range(ABREAST_STEPS):
             dx, dy = x - near.x, y - near.y
@@ -203,7 +206,10 @@ class Network:
         return near, (dy * cos(near.heading) - dx * sin(near.heading)) / self.lean(near)
 
     def ahead(self, point: LanePoint, distance: float, roads: tuple[int, ...]) -> LanePoint | None:
-        """The place further along; at forks towards the given roads, else straight on."""
+        """Returns the place `distance` m further along, negative: back; at forks towards the given roads.
+
+        Without roads it goes straight on at forks. None at the end of the road.
+        """
         if not roads:
             return self.map.ahead(point, distance)
         while True:
@@ -240,7 +246,10 @@ class Network:
             point, left = further, left - STEP
 
     def _wanted(self, lane: int, forward: bool, roads: tuple[int, ...]) -> int | None:
-        """The lane after this one that is on the way; else one through a junction to a road of it."""
+        """Returns the lane after this one that is on the way; else one through a junction to a road of it.
+
+        forward: after in the sense of the traffic, else before. None where neither is.
+        """
         step = self.map.successors if forward else self.map.predecessors
         found, road = step(lane), self.map.lanes.road
         here = int(road[lane])
@@ -258,7 +267,7 @@ class Network:
 
 
 def next_lane_id(lane: int, change: int) -> int:
-    """`change` lanes towards higher ids; the centre line has id 0 and is no lane."""
+    """Returns the id `change` lanes towards higher ids; the centre line has id 0 and is no lane."""
     target = lane + change
     if target == 0 or (target > 0) != (lane > 0):
         target += 1 if change > 0 else -1
@@ -267,5 +276,5 @@ def next_lane_id(lane: int, change: int) -> int:
 
 @lru_cache(maxsize=8)
 def network_of(map: RoadMap, name: str, *, stand_in: bool = False) -> Network:
-    """The network of a loaded map, made once."""
+    """Returns the network of a loaded map, made once."""
     return Network(map, name, stand_in=stand_in)

@@ -107,7 +107,7 @@ class SteeredTrack:
         return way % self.line.length if self.closed else way
 
     def skip(self, way: float) -> None:
-        """Be `way` m further along the line."""
+        """Puts it `way` m further along the line, onto the line, with its yaw unchanged."""
         self.s += way
         yaw = self.pose.yaw
         self.pose = replace(self.point(self.s), yaw=yaw)
@@ -120,7 +120,7 @@ class SteeredTrack:
         return pose.moved(forward=s - on) if s != on else pose
 
     def move_to(self, t: float) -> bool:
-        """Goes on to time t; True at the end of the line."""
+        """Goes on to time t s; True at the end of the line, which a closed one has not."""
         self.pose, _, _ = self.at(t)
         self._project(SEARCH + 2.0 * abs(self.v) * (t - self.t))
         self.t = t
@@ -129,7 +129,7 @@ class SteeredTrack:
         return not self.closed and self.s >= self.line.length - SLOW
 
     def aim_at(self, v: float, dt: float) -> None:
-        """Turns the wheels to the line and asks for speed v in the coming step."""
+        """Turns the wheels to the line and changes its speed towards v m/s in the coming step of dt s."""
         self.v = self._reachable(v, dt)
         self.first = self.first or self.v
         way = look_ahead(self.axles, self.v)
@@ -144,7 +144,8 @@ class SteeredTrack:
     def pace(self, line_speed: float, line_length: float) -> float:
         """Returns the speed that brings it to where its times want it, m/s, without going back.
 
-        It is no faster than it can turn to where it aims.
+        line_speed, line_length: m/s and m that the times ask for. It is no faster than it can turn to
+        where it aims.
         """
         late = line_length - self.s
         brake = sqrt(2.0 * self.most.b_max * abs(late)) if self.most.b_max < inf else inf
@@ -178,7 +179,7 @@ class LaneSteering:
         self.offset: float | None = None
 
     def step(self, guide: Guide, pose: Pose, dt: float) -> Pose:
-        """Returns the pose a step on."""
+        """Returns the pose a step of dt s on; moves the guide's point along and sets `settled`."""
         v = guide.v
         guide.advance(pose)
         offset, self.offset = guide.offset if self.offset is None else self.offset, None

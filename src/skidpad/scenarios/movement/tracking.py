@@ -26,7 +26,7 @@ class Track(Protocol):
     steered: bool
 
     def at(self, t: float) -> tuple[Pose, float, float]:
-        """Pose, speed and acceleration at scenario time t."""
+        """Returns pose, speed and acceleration at scenario time t s."""
         ...
 
     def way_to(self, place: Pose, t: float) -> float:
@@ -34,7 +34,7 @@ class Track(Protocol):
         ...
 
     def skip(self, way: float) -> None:
-        """Be `way` m further along the line."""
+        """Puts it `way` m further along the line."""
         ...
 
 
@@ -50,7 +50,7 @@ class TimedTrack:
         self.first = begin + scale * line.t[0]
 
     def at(self, t: float) -> tuple[Pose, float, float]:
-        """Pose, speed and acceleration (0) at time t; beyond the end straight on at its speed."""
+        """Returns pose, speed and acceleration (0) at time t s; beyond the end straight on at its speed."""
         own = (t - self.begin) / self.scale
         pose = self.line.at_time(own)
         if t > self.end:
@@ -64,7 +64,7 @@ class TimedTrack:
         return self.line.nearest(place.x, place.y) - here
 
     def skip(self, way: float) -> None:
-        """Do nothing: its times alone say where it is."""
+        """Does nothing: its times alone say where it is."""
 
     @property
     def v_end(self) -> float:
@@ -95,9 +95,9 @@ class PacedTrack:
         return -1.0 if v < 0.0 else 1.0
 
     def at(self, t: float) -> tuple[Pose, float, float]:
-        """Pose and speed at time t, for this step's speed; straight on from its end, not before its begin.
+        """Returns pose, speed and acceleration (0) at time t s, for this step's speed.
 
-        Both as in esmini.
+        Straight on from its end, not before its begin. Both as in esmini.
         """
         v = self.v
         s = self.s + self.sense * v * (t - self.t)
@@ -110,16 +110,19 @@ class PacedTrack:
         return (pose.moved(forward=self.sense * beyond) if beyond else pose), v, 0.0
 
     def way_to(self, place: Pose, t: float) -> float:
-        """Returns the way along the line from its place a step on to the point nearest to a place, m."""
+        """Returns the way along the line from its place at time t to the point nearest to a place, m."""
         way = self.line.nearest(place.x, place.y) - self.s - self.sense * self.v * (t - self.t)
         return way % self.line.length if self.closed else way
 
     def skip(self, way: float) -> None:
-        """Be `way` m further along the line."""
+        """Puts it `way` m further along the line."""
         self.s += way
 
     def step(self, t: float, v: float, dt: float) -> bool:
-        """Go on to time t, from there at v; True if the next step reaches an end, back at its begin too."""
+        """Goes on to time t s, from there at v m/s; True if the next step of dt s reaches an end.
+
+        Its begin is one, too, when it goes back; a closed line has none.
+        """
         if not self.moved and self.v * (t - self.t) == 0.0:  # a speed of the same event counts
             self.sense = self._sense_at(self.s, v)
         move = self.sense * self.v * (t - self.t)
@@ -135,7 +138,7 @@ class PacedTrack:
 
 
 def course(track: Track, t: float, dt: float) -> float:
-    """The way that it runs at time t, rad; where nothing moves, the heading that it asks for."""
+    """Returns the way that it runs at time t s, rad; where nothing moves, the heading that it asks for."""
     (a, _, _), (b, _, _) = track.at(t - 0.5 * dt), track.at(t + 0.5 * dt)
     if hypot(b.x - a.x, b.y - a.y) < NEAR:
         return track.at(t)[0].yaw
@@ -145,7 +148,10 @@ def course(track: Track, t: float, dt: float) -> float:
 def track_demand(
     track: Track, motion: Motion, t: float, dt: float, centre: Callable[[Pose], Pose]
 ) -> Demand:
-    """A driver's task to be at the track's place: the way to go enters as speed."""
+    """Returns a driver's task to be at the track's place: the way to go enters as speed.
+
+    centre: gives the pose of the box's centre for that of the reference point.
+    """
     pose, v, a = track.at(t)
     after, _, _ = track.at(t + dt)
     place = centre(pose)

@@ -44,7 +44,7 @@ class Orientation:
     frame: Frame
 
     def turned(self, base: float) -> float:
-        """The heading in the world, where `base` is that of what it may be relative to."""
+        """Returns the heading in the world in rad, where `base` is that of what it may be relative to."""
         if self.heading is None:
             return base
         return wrap_angle(self.heading + (base if self.frame is Frame.RELATIVE else 0.0))
@@ -107,7 +107,7 @@ def _road(node: Node, ctx: Context) -> Position:
 
 
 def _geo(node: Node, ctx: Context) -> Position:
-    """Degrees, by the projection of the map."""
+    """Compiles a position in degrees of latitude and longitude, by the projection of the map."""
     lat = node.number("latitudeDeg") if node.has("latitudeDeg") else node.number("latitude")
     lon = node.number("longitudeDeg") if node.has("longitudeDeg") else node.number("longitude")
     try:
@@ -139,7 +139,7 @@ class RelativeLane:
     facing: Orientation
 
     def place(self, scene: Scene) -> Place:
-        """Seen from the entity's lane now; on its own lane where there is no other."""
+        """Returns the place seen from the entity's lane now; on its own lane where there is no other."""
         network = scene.network
         at = scene.actors[self.other].place(network)
         pose, here = at.pose, at.lane

@@ -27,12 +27,12 @@ class ScenarioRoute:
     roads: tuple[int, ...]
 
     def at(self, network: Network, s: float) -> LanePoint:
-        """The place `s` m along the reference lines of its roads, at most its end."""
+        """Returns the place `s` m along the reference lines of its roads, at most its end."""
         return network.ahead_on_roads(self.start, s, self.roads)
 
 
 def compile_route(node: Node, ctx: Context) -> ScenarioRoute:
-    """A <Route> or a reference to one; waypoints must not depend on what moves."""
+    """Compiles a <Route> or a reference to one; waypoints must not depend on what moves."""
     node = ctx.catalogs.resolved(node, "Route")
     points = []
     for waypoint in node.children("Waypoint"):
@@ -48,7 +48,7 @@ def compile_route(node: Node, ctx: Context) -> ScenarioRoute:
 
 
 def roads_through(network: Network, points: Sequence[LanePoint]) -> tuple[int, ...]:
-    """The roads from point to point by the shortest way; where there is none, their own roads."""
+    """Returns the roads from point to point by the shortest way; where there is none, their own roads."""
     roads: list[int] = []
     for a, b in pairwise(points):
         route = shortest_route(network.map, a, b)
@@ -64,7 +64,10 @@ def roads_through(network: Network, points: Sequence[LanePoint]) -> tuple[int, .
 def random_roads(
     network: Network, start: LanePoint, forward: bool, choose: Callable[[Sequence[int]], int]
 ) -> tuple[int, ...]:
-    """Roads from lane to lane as `choose` has it, each once; ROADS_MAX at most."""
+    """Returns roads from lane to lane as `choose` has it, each once; ROADS_MAX at most.
+
+    forward: in the sense of the traffic, else against it.
+    """
     lanes, lane = network.map.lanes, start.lane
     roads = [start.road]
     while len(roads) < ROADS_MAX:

@@ -34,11 +34,11 @@ class Spots(NamedTuple):
     s: Array
 
     def where(self, mask: Flags) -> Spots:
-        """Returns the spots of a mask."""
+        """Returns the spots that a mask (N,) chooses."""
         return Spots(*(column[mask] for column in self))
 
     def free(self, actor: Actor, before: float, behind: float) -> Flags:
-        """Those with room in m, before and behind them, to an actor's centre in their lane."""
+        """Returns (N,) whether a spot has room to an actor's centre in its lane: m before and behind it."""
         dx, dy = actor.pose.x - self.x, actor.pose.y - self.y
         c, s = np.cos(self.heading), np.sin(self.heading)
         forward = dx * c + dy * s
@@ -48,7 +48,7 @@ class Spots(NamedTuple):
 
 
 def spots_of(map: RoadMap) -> Spots:
-    """Returns a spot every few metres of all driving lanes outside junctions."""
+    """Returns a spot at each SPACING-th sample of all driving lanes outside junctions."""
     lanes, samples = map.lanes, map.samples
     usable = (lanes.kind == LaneKind.DRIVING) & (lanes.junction < 0)
     k = np.flatnonzero(usable[samples.lane])[::SPACING]
@@ -106,7 +106,7 @@ class Oval:
     rim: float = 0.0
 
     def inside(self, scene: Scene, spots: Spots) -> Flags:
-        """Tells the spots between the inner disc, or the rim, and the ellipse."""
+        """Returns which spots lie between the inner disc, or the rim, and the ellipse."""
         centre = scene.actors[self.entity].pose.moved(forward=self.offset)
         forward, left = between(centre, spots.x, spots.y)
         share = np.hypot(forward / self.major, left / self.minor)
@@ -121,7 +121,7 @@ class Outline:
     corners: tuple[Position, ...]
 
     def inside(self, scene: Scene, spots: Spots) -> Flags:
-        """Tells the spots inside by the edges that a ray along x crosses (even and odd)."""
+        """Returns which spots lie inside, by the edges that a ray along x crosses (even and odd)."""
         poses = [corner.place(scene).pose for corner in self.corners]
         odd = np.zeros(len(spots.x), np.bool_)
         for a, b in zip(poses, [*poses[1:], poses[0]], strict=True):
@@ -148,7 +148,7 @@ class Stretches:
     parts: tuple[Stretch, ...]
 
     def inside(self, scene: Scene, spots: Spots) -> Flags:
-        """Tells the spots inside by road, lane and s."""
+        """Returns which spots lie inside, by road, lane and s."""
         del scene
         found = np.zeros(len(spots.x), np.bool_)
         for part in self.parts:
@@ -162,6 +162,6 @@ class Stretches:
 
 
 def along(pose: Pose, spots: Spots) -> Flags:
-    """Spots whose traffic runs as the pose looks."""
+    """Returns (N,) whether a spot's traffic runs as the pose looks."""
     same: Flags = np.cos(spots.heading - pose.yaw) > 0.0
     return same

@@ -35,7 +35,7 @@ class Trajectory:
     tangential: bool = False  # its headings are those of the line
 
     def traced(self, scene: Scene, here: Pose = ORIGIN) -> Line:
-        """The line as things are now, for an entity that is here."""
+        """Returns the line as things are now, for an entity that is here."""
         if self.line is not None or self.shape is None:
             return self.line or Line([Vertex(0.0, 0.0, 0.0)])
         poses = [p.place(scene).pose for p in self.places]
@@ -44,7 +44,7 @@ class Trajectory:
 
 
 def compile_trajectory(node: Node, ctx: Context) -> Trajectory:
-    """A <Trajectory>, or a reference to one."""
+    """Compiles a <Trajectory>, or a reference to one; its line at once where nothing in it moves."""
     node = ctx.catalogs.resolved(node, "Trajectory")
     closed = node.flag("closed", default=False)
     shape = node.child("Shape").only()
@@ -71,7 +71,7 @@ def compile_trajectory(node: Node, ctx: Context) -> Trajectory:
 
 
 def _check_times(shape: Node, times: Sequence[float | None]) -> None:
-    """Vertices or control points stand in the order of their times."""
+    """Raises a Fault unless vertices or control points stand in the order of their times."""
     if any(a is not None and b is not None and b < a for a, b in pairwise(times)):
         what = "control points" if shape.tag == "Nurbs" else "vertices"
         raise shape.error(f"the times of its {what} must not fall")
@@ -100,7 +100,10 @@ def _has_heading(place: Node) -> bool:
 
 
 def _plain_vertex(element: etree._Element) -> Vertex | None:
-    """A vertex in coordinates of the world without parameters: files have ten thousands of them."""
+    """Returns a vertex in coordinates of the world without parameters; None for any other.
+
+    A quick reader, as files have ten thousands of them.
+    """
     if len(element) != 1 or len(element[0]) != 1 or element[0][0].tag != "WorldPosition":
         return None
     place = element[0][0].attrib
@@ -160,7 +163,10 @@ def _spline(shape: Node) -> tuple[list[Node], Shape]:
 
 
 def _begins(segment: Node) -> bool:
-    """A piece has a place of its own; the first one else begins where the entity is, as in esmini."""
+    """Returns whether a piece has a place of its own; the first one else begins where the entity is.
+
+    As in esmini.
+    """
     return segment.find("PositionStart") is not None
 
 

@@ -10,7 +10,10 @@ from skidpad.scenarios.scene import Actor, Controlling, Scene
 
 
 def control(scene: Scene) -> None:
-    """Steps every active controller; an action of the file goes before it in its domain."""
+    """Steps every active controller; an action of the file goes before it in its domain.
+
+    Sets the pedals of an actor whose controller has them, else its demanded speed.
+    """
     for actor in scene.actors.values():
         actor.piloted, controller = None, actor.controller
         if controller is None or not actor.present:
@@ -24,7 +27,10 @@ def control(scene: Scene) -> None:
 
 
 def pilot(scene: Scene, actor: Actor, controller: Controlling) -> VehicleCommand | None:
-    """Return pedals by the controller, steer by the file, or the other way round, or both by one."""
+    """Returns pedals by the controller, steer by the file, or the other way round, or both by one.
+
+    None, with a notice, for an actor without pedals.
+    """
     if actor.driver is None:
         scene.notice(f"{actor.name} has no pedals: its controller does nothing")
         return None

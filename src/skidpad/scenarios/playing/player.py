@@ -51,7 +51,7 @@ class Played:
 
 
 def setups(scenario: Scenario) -> tuple[ActorSetup, tuple[ActorSetup, ...]]:
-    """The ego and the other actors, for a backend's set-up."""
+    """Returns the ego and the other actors, for a backend's set-up."""
     made = {}
     for entity in scenario.entities.values():
         begin = scenario.start.entities[entity.name]
@@ -106,12 +106,12 @@ class Player:
 
     @property
     def triggered(self) -> bool:
-        """Whether every event of the scenario has begun."""
+        """Returns whether every event of the scenario has begun."""
         return all(event.happened_at is not None for event in self.telling.events)
 
     @property
     def events(self) -> list[Begun]:
-        """All events, with the times of their first begin."""
+        """Returns all events, with the times of their first begin."""
         return [Begun("::".join(e.path), e.happened_at) for e in self.telling.events]
 
     @property
@@ -124,7 +124,11 @@ class Player:
         return Played(story, boxes, staging, tuple(self.scene.lamps))
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
-        """Look at the moment, go on with the story, say what actors do until the next."""
+        """Takes in the moment, goes on with the story and returns what actors do until the next.
+
+        The first call makes the actors and begins the actions of <Init>. `ended` is set at the end of the
+        scenario, of `duration`, or at a contact of the ego where that ends it.
+        """
         first = not self.actors
         if first:
             self._cast(truth)
@@ -149,7 +153,10 @@ class Player:
         return [c for c in commands if c is not None]
 
     def _command(self, actor: Actor, t: float) -> ActorCommand | None:
-        """Return what an actor does from t on; a trailer follows the vehicle that tows it."""
+        """Returns what an actor does from t s on; a trailer follows the vehicle that tows it.
+
+        None where the file says nothing to it.
+        """
         if actor.towed_by is not None and actor.word is None:
             return tow_command(actor, actor.towed_by, self.scene.dt)
         if actor.piloted is not None and actor.word is None:
@@ -157,7 +164,10 @@ class Player:
         return actor.command(t, self.scene.dt)
 
     def _cast(self, truth: WorldTruth) -> None:
-        """Makes the scenario actor of every entity, at its first place and speed."""
+        """Makes the scenario actor of every entity, at its first place and speed.
+
+        One without a place is told to be absent.
+        """
         names, network = truth.table.names, self.scenario.network
         for entity in self.scenario.entities.values():
             begin = self.scenario.start.entities[entity.name]

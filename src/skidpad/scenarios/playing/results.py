@@ -21,7 +21,7 @@ TRAJECTORIES, STORY = "trajectories.csv", "storyboard.csv"
 
 
 def write_results(folder: Path, log: RunLog, played: Played) -> None:
-    """Writes staging, story and trajectories of a run."""
+    """Writes staging, lamps, story and trajectories of a run into the folder."""
     write_staging(folder, played.staging)
     write_lamps(folder, played.lamps)
     rows = rows_csv(log_rows(log, played.boxes))
@@ -30,7 +30,7 @@ def write_results(folder: Path, log: RunLog, played: Played) -> None:
 
 
 def log_rows(log: RunLog, boxes: Mapping[str, Box]) -> Iterator[Row]:
-    """Places of reference points, as the file means them, of whoever is there."""
+    """Yields the places of reference points, as the file means them, of all that is there at each time."""
     a, times = log.actors, log.t.tolist()
     columns = [v.tolist() for v in (a.x, a.y, a.z, a.yaw, a.vx, a.vy, log.present)]
     for k, t in enumerate(times):

@@ -112,7 +112,7 @@ class IdealWorld:
         s.present[i] = True
 
     def step(self, words: Sequence[ActorCommand]) -> None:
-        """Moves the actors on by one tick."""
+        """Moves the actors on by one tick, exactly as commanded."""
         self.tick += 1
         for word in words:
             self._apply_command(word)
@@ -125,7 +125,10 @@ class IdealWorld:
 def play_ideal(
     scenario: Scenario, duration: float, dt: float = DT, seed: int = 0
 ) -> PlayedScenario:
-    """Plays a scenario with every entity exactly where the file puts it, for `duration` s at most."""
+    """Plays a scenario with every entity exactly where the file puts it, for `duration` s at most.
+
+    Earlier when the scenario ends; dt: s per step; seed: of the traffic that actions bring.
+    """
     stage = IdealWorld(scenario)
     modes = dict.fromkeys(scenario.entities, ActorMode.IDEAL)
     player = Player(scenario, modes=modes, dt=dt, seed=seed)

@@ -19,9 +19,9 @@ from skidpad.scenarios.triggers import AnyEntity, Trigger
 def staging_of(
     scenario: Scenario, story: Iterable[Happening], driven_by_file: bool, went_back: bool = False
 ) -> Staging:
-    """Return what the file stages, with the times at which its events began in this story.
+    """Returns what the file stages, with the times at which its events began in this story.
 
-    went_back: the ego has gone backwards.
+    driven_by_file: the ego is no stack's; went_back: the ego has gone backwards.
     """
     began: dict[tuple[str, ...], float] = {}
     for happening in story:
@@ -67,7 +67,7 @@ def _lets_ego_reverse(scenario: Scenario) -> bool:
 
 
 def _events(scenario: Scenario) -> Iterator[tuple[Group, Event]]:
-    """Yield the events that can begin with the run's parameters, each with its group."""
+    """Yields the events that can begin with the run's parameters, each with its group."""
     fixed = _fixed_parameters(scenario)
     acts = (act for story in scenario.storyboard.stories for act in story.acts)
     acts = (act for act in acts if not _is_ruled_out(act.start, fixed))
@@ -78,7 +78,7 @@ def _events(scenario: Scenario) -> Iterator[tuple[Group, Event]]:
 
 
 def _fixed_parameters(scenario: Scenario) -> Mapping[str, str]:
-    """Return the parameters that no action changes, with their values."""
+    """Returns the parameters that no action changes, with their values."""
     actions = [a.worldwide for event in scenario.storyboard.events for a in event.actions]
     changed = {
         action.name
@@ -89,7 +89,7 @@ def _fixed_parameters(scenario: Scenario) -> Mapping[str, str]:
 
 
 def _is_ruled_out(trigger: Trigger, fixed: Mapping[str, str]) -> bool:
-    """Tell whether parameters keep a trigger from ever firing, as that of a variant not chosen."""
+    """Tells whether parameters keep a trigger from ever firing, as that of a variant not chosen."""
     never = (
         any(
             isinstance(c, Value) and not c.variable and c.name in fixed and not c.holds_among(fixed)
@@ -101,7 +101,7 @@ def _is_ruled_out(trigger: Trigger, fixed: Mapping[str, str]) -> bool:
 
 
 def _others(event: Event, group: Group, ego: str) -> tuple[str, ...]:
-    """Return the actors that an event moves, without the ego; none where it only sets values."""
+    """Returns the actors that an event moves, without the ego; () where it only sets values."""
     private = (action.private for action in event.actions)
     if all(action is None or isinstance(action, NoEffect) for action in private):
         return ()

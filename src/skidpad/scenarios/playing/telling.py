@@ -56,12 +56,18 @@ class ToldEvent(StatefulElement):
         self.happened_at: float | None = None  # s, the first time
 
     def due(self, scene: Scene) -> bool:
-        """Tells whether the trigger fires, executions are left and it is not running."""
+        """Tells whether the trigger fires, executions are left and it is not running.
+
+        Without a start trigger it fires always.
+        """
         fires = not self.watch or self.watch.fires(scene)
         return fires and self.left > 0 and not self.running
 
     def launch(self, scene: Scene, others: Iterable[ToldEvent]) -> None:
-        """Begin, as the priority has it with other events under way."""
+        """Begins, as the priority has it with other events under way; uses up one execution.
+
+        With priority skip it does not begin beside others; with override it stops them.
+        """
         under_way = [e for e in others if e.running]
         if under_way and self.event.priority is Priority.SKIP:
             self.left -= 1
@@ -84,7 +90,7 @@ class ToldEvent(StatefulElement):
             self.going.append((action.path, list(_begin_action(action, actors, scene))))
 
     def step(self, scene: Scene) -> None:
-        """Go on with the actions under way."""
+        """Goes on with the actions under way; the event ends with the last of them."""
         if not self.running:
             return
         still = []
@@ -135,7 +141,7 @@ class ToldParent(StatefulElement):
         self.children = children
 
     def start(self, scene: Scene) -> None:
-        """Starts with its children, which have no triggers of their own."""
+        """Sets it running, and its children, which have no triggers of their own."""
         self.turn(scene, State.RUNNING, Move.START)
         for child in self.children:
             if isinstance(child, ToldParent):
@@ -217,7 +223,7 @@ class ToldAct(ToldParent):
         self.begin, self.halt = Watch(act.start, act.path), Watch(act.stop, act.path)
 
     def look(self, scene: Scene) -> None:
-        """Begin or stop by its triggers, then look inside."""
+        """Begins or stops by its triggers, then looks inside."""
         if self.running and self.halt and self.halt.fires(scene):
             self.stop(scene)
         if self.state is State.STANDBY and (not self.begin or self.begin.fires(scene)):
@@ -254,7 +260,7 @@ class Telling:
         return [e for a in self.acts for g in a.groups for m in g.manoeuvres for e in m.events]
 
     def look(self, scene: Scene) -> None:
-        """Looks at the triggers of all stories."""
+        """Looks at the triggers of all stories, which the first call starts; `ended` by the stop trigger."""
         if not self.begun:
             self.begun = True
             for story in self.stories:
@@ -265,7 +271,7 @@ class Telling:
             story.look(scene)
 
     def step(self, scene: Scene) -> None:
-        """Go on with what is under way."""
+        """Goes on with what is under way; `ended` when all acts are complete and no stop trigger exists."""
         for story in self.stories:
             story.step(scene)
         if not self.halt and self.acts and all(a.complete for a in self.acts):

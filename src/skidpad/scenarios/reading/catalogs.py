@@ -33,7 +33,10 @@ class Catalogs:
                 self.folders.append(self._folder(root, folder))
 
     def _folder(self, root: Node, folder: Node) -> Path:
-        """The folder of a <Directory>: from the file's own, else from one above it."""
+        """Returns the folder of a <Directory>: from the file's own, else from one above it.
+
+        A note says where neither is; for a .xosc file it is that file's folder.
+        """
         name = folder.text("path").replace("\\", "/")
         path = (root.file.parent / name).resolve()
         if not path.exists() and not Path(name).is_absolute():
@@ -48,7 +51,7 @@ class Catalogs:
         return path.parent if path.suffix == ".xosc" else path
 
     def _looked_at(self, root: Node) -> None:
-        """Note once what the schema has against a catalog that is used."""
+        """Adds once to the findings what the schema has against a catalog that is used."""
         if root.file in self._seen:
             return
         self._seen.add(root.file)
@@ -58,7 +61,10 @@ class Catalogs:
             self.findings += violations(root.element, root.file.name, minor)
 
     def entry(self, reference: Node, depth: int = 0) -> Node:
-        """The entry that a <CatalogReference> means, with its parameters in scope."""
+        """Returns the entry that a <CatalogReference> means, with its parameters in scope.
+
+        A Fault where there is no such catalog or entry. depth: how many references led here.
+        """
         catalog, name = reference.text("catalogName"), reference.text("entryName")
         if depth > DEPTH_MAX:
             raise reference.error(f"the references of catalog {catalog!r} run in a circle")
@@ -79,9 +85,9 @@ class Catalogs:
         return found.scoped(values | given)
 
     def resolved(self, node: Node, kind: str | None = None) -> Node:
-        """The node itself, or the entry where it is a reference; its own parameters are in scope.
+        """Returns the node itself, or the entry where it is a reference; its own parameters are in scope.
 
-        kind: the element it must be, else a fault; None for any.
+        kind: the element it must be, else a Fault; None for any.
         """
         found, depth = node, 0
         while found.tag == "CatalogReference":
@@ -93,7 +99,10 @@ class Catalogs:
 
 
 def _catalog(folder: Path, name: str) -> Node | None:
-    """The file of this name, else the one whose <Catalog> has it; as esmini looks for them."""
+    """Returns the file of this name, else the one whose <Catalog> has it; None where neither is there.
+
+    As esmini looks for them.
+    """
     if not folder.is_dir():
         return None
     files = sorted(folder.glob("*.xosc"), key=lambda p: (p.stem != name, p.name))

@@ -29,12 +29,15 @@ class Choice:
 
 
 def is_distribution(file: Path) -> bool:
-    """Whether the file holds choices instead of a scenario; False for what cannot be read."""
+    """Returns whether the file holds choices instead of a scenario; False for what cannot be read."""
     return holds(file, "ParameterValueDistribution")
 
 
 def choices(file: Path) -> list[Choice]:
-    """All choices that a file makes: every combination of sets and ranges, or as many draws."""
+    """Returns all choices that a file makes: every combination of sets and ranges, or as many draws.
+
+    The same file gives the same draws. A Fault where it makes more than CHOICES_MAX.
+    """
     node = inner(parse(file)).child("ParameterValueDistribution")
     scenario = scenario_of_choices(file, node)
     drawn = node.find("Stochastic")
@@ -43,7 +46,7 @@ def choices(file: Path) -> list[Choice]:
 
 
 def scenario_of_choices(file: Path, node: Node) -> Path:
-    """Return the scenario that a file of distributions names; FileError where it is not there."""
+    """Returns the scenario that a file of distributions names; FileError where it is not there."""
     named = node.child("ScenarioFile")
     scenario = file.parent / named.text("filepath").replace("\\", "/")
     if not scenario.is_file():

@@ -49,35 +49,35 @@ class Node:
         return Fault(self.finding(what))
 
     def unsupported(self, what: str = "") -> Fault:
-        """The element is sound, but unknown here."""
+        """Returns the fault to raise about an element that is sound, but unknown here."""
         text = what or f"<{self.tag}> is not supported"
         return Fault(self.finding(text, Kind.UNSUPPORTED))
 
     def scoped(self, values: Mapping[str, str]) -> Node:
-        """The same element with other parameters in scope."""
+        """Returns the same element with other parameters in scope."""
         return replace(self, values=values)
 
     def children(self, *tags: str) -> Iterator[Node]:
-        """Child elements, all or those with one of these names."""
+        """Yields the child elements, all or those with one of these names."""
         for child in self.element.iterchildren(*(tags or ("*",))):
             yield Node(child, self.file, self.values)
 
     def find(self, *path: str) -> Node | None:
-        """The first descendant along a path of names."""
+        """Returns the first descendant along a path of names; None where there is none."""
         found: etree._Element | None = self.element
         for tag in path:
             found = None if found is None else found.find(tag)
         return None if found is None else Node(found, self.file, self.values)
 
     def child(self, *path: str) -> Node:
-        """The same; a fault when it is missing."""
+        """Returns the first descendant along a path of names; raises a Fault where there is none."""
         found = self.find(*path)
         if found is None:
             raise self.error(f"needs <{'/'.join(path)}>")
         return found
 
     def only(self) -> Node:
-        """The single child of a choice such as <Position>."""
+        """Returns the single child of a choice such as <Position>; raises a Fault for none or more."""
         children = list(self.children())
         if len(children) != 1:
             raise self.error(f"needs exactly one child element, has {len(children)}")
@@ -88,7 +88,7 @@ class Node:
         return self.element.get(name) is not None
 
     def label(self) -> str:
-        """The attribute `name` as it is shown to people; what cannot be worked out stays as it is."""
+        """Returns the attribute `name` as it is shown to people; what cannot be worked out stays as it is."""
         raw = self.element.get("name", "")
         try:
             return self.text("name", "")
@@ -96,14 +96,17 @@ class Node:
             return raw
 
     def plain(self, name: str) -> str:
-        """An attribute that names a parameter, with or without its `$`."""
+        """Returns an attribute that names a parameter, without its `$`; a Fault where it is missing."""
         value = self.element.get(name)
         if value is None:
             raise self.error(f"needs the attribute {name}")
         return value.removeprefix("$")
 
     def text(self, name: str, default: str | None = None) -> str:
-        """An attribute; a fault when it is missing and there is no default."""
+        """Returns an attribute, its parameter or expression filled in.
+
+        A Fault when it is missing and there is no default.
+        """
         value = self.element.get(name)
         if value is None:
             if default is None:
@@ -112,7 +115,7 @@ class Node:
         return self.filled(value, name) if "$" in value else value
 
     def filled(self, value: str, name: str) -> str:
-        """A text with its parameter or expression replaced; name: of the attribute."""
+        """Returns a text with its parameter or expression replaced; name: of the attribute, for faults."""
         if value.startswith("${") and value.endswith("}"):
             try:
                 return evaluate(value[2:-1], self.values)
@@ -125,14 +128,14 @@ class Node:
         return self.values[value[1:]]
 
     def number(self, name: str, default: float | None = None) -> float:
-        """Returns an attribute as a finite number."""
+        """Returns an attribute as a finite number; raises a Fault for anything else."""
         value = self.limit(name, default)
         if not isfinite(value):
             raise self.error(f"{name} must be finite, got {value!r}")
         return value
 
     def limit(self, name: str, default: float | None = None) -> float:
-        """Returns a number that may be infinite; raises a fault for any other text."""
+        """Returns an attribute as a number that may be infinite; raises a Fault for any other text."""
         text = self.text(name, None if default is None else repr(default))
         try:
             value = float(text)
@@ -143,14 +146,14 @@ class Node:
         return value
 
     def whole(self, name: str, default: int | None = None) -> int:
-        """Returns an attribute as a whole number."""
+        """Returns an attribute as a whole number; raises a Fault for anything else."""
         value = self.number(name, None if default is None else float(default))
         if value != int(value):
             raise self.error(f"{name} must be a whole number, got {value:g}")
         return int(value)
 
     def choice(self, name: str, allowed: type[Choice], default: Choice | None = None) -> Choice:
-        """One of the values that are known."""
+        """Returns an attribute as one of the values that are known; a Fault "not supported" for others."""
         text = self.text(name, None if default is None else default.value)
         try:
             return allowed(text)
@@ -159,7 +162,7 @@ class Node:
             raise self.unsupported(f"{name}={text!r} is not supported, only {known}") from None
 
     def flag(self, name: str, default: bool) -> bool:
-        """Returns an attribute that is `true` or `false`."""
+        """Returns an attribute that is `true` or `false`, or 1 or 0; raises a Fault for anything else."""
         value = self.text(name, "true" if default else "false").lower()
         if value not in TRUE + FALSE:
             raise self.error(f"{name} must be true or false, got {value!r}")
@@ -167,7 +170,7 @@ class Node:
 
 
 def _plain(info: Any) -> bool:
-    """A document type with nothing in it but short texts, which name no others."""
+    """Returns whether a document type holds nothing but short texts, which name no others."""
     if info.public_id or info.system_url or info.internalDTD is None:
         return False
     texts = [e.content for e in info.internalDTD.iterentities()]
@@ -175,7 +178,10 @@ def _plain(info: Any) -> bool:
 
 
 def parse(path: Path) -> Node:
-    """The root element of a file, without parameters; FileError when it is no OpenSCENARIO XML."""
+    """Returns the root element of a file, without parameters; FileError when it is no OpenSCENARIO XML.
+
+    A file of 0.9 gets the names of 1.0.
+    """
     if path.suffix == ".osc":
         raise FileError(
             f"scenario {path}: OpenSCENARIO DSL (2.x, .osc) is not supported; "
@@ -207,7 +213,7 @@ def parse(path: Path) -> Node:
 
 
 def holds(file: Path, tag: str) -> bool:
-    """Whether a file is one of this kind, by the element under its root; False for what cannot be read."""
+    """Returns whether a file has this element under its root; False for what cannot be read."""
     try:
         return parse(file).find(tag) is not None
     except FileError:

@@ -111,7 +111,7 @@ class Entity:
 
     @property
     def is_marked_ego(self) -> bool:
-        """The file says that this is the ego, as ScenarioRunner wants it said."""
+        """Returns whether the file says that this is the ego, as ScenarioRunner wants it said."""
         return self.properties.get("type") == "ego_vehicle"
 
     @property
@@ -195,7 +195,10 @@ def _members(node: Node, known: Mapping[str, Entity]) -> Iterator[str]:
 
 
 def compile_entity_object(node: Node, name: str, catalogs: Catalogs) -> Entity:
-    """The vehicle, pedestrian or object inside an element, or that it refers to."""
+    """Returns the vehicle, pedestrian or object inside an element, or that it refers to.
+
+    A Fault where there is none, or one of an unknown kind.
+    """
     found = next((n for n in node.children() if n.tag != "ObjectController"), None)
     if found is None:
         raise node.error("needs a <Vehicle>, <Pedestrian>, <MiscObject> or a reference to one")
@@ -215,7 +218,10 @@ def compile_entity_object(node: Node, name: str, catalogs: Catalogs) -> Entity:
 
 
 def _controllers(node: Node, catalogs: Catalogs) -> Iterator[Finding]:
-    """Those that are nowhere: who drives is chosen by option, so that they are only noted."""
+    """Yields a note on each controller that is nowhere.
+
+    No more than a note, as an option says which stack drives.
+    """
     for controller in node.children("ObjectController"):
         for reference in controller.children("CatalogReference"):
             try:
@@ -225,7 +231,7 @@ def _controllers(node: Node, catalogs: Catalogs) -> Iterator[Finding]:
 
 
 def _sizes(node: Node, catalogs: Catalogs) -> Iterator[Finding]:
-    """A note on a box without volume."""
+    """Yields a note on a box without volume."""
     body = next((n for n in node.children() if n.tag != "ObjectController"), None)
     size = None if body is None else catalogs.resolved(body).find("BoundingBox", "Dimensions")
     flat = [n for n in SIZES if size is not None and size.number(n) <= 0.0]
@@ -268,7 +274,7 @@ def _axles(node: Node, usual: Axles) -> Axles:
 
 
 def of_category(node: Node, name: str, category: str) -> Entity:
-    """A vehicle of which no more is said."""
+    """Returns a vehicle of which only the category is known, with the usual size."""
     if category in TWO_WHEELED:
         return Entity(name, Body.VEHICLE, "bicycle", False, BICYCLE)
     if category not in WHEELED:
@@ -320,7 +326,7 @@ def _properties(node: Node) -> dict[str, str]:
 
 
 def spectator(entities: Mapping[str, Entity]) -> Entity | None:
-    """Where a file has no vehicle that can be the ego: a parked car that nobody can touch."""
+    """Returns a parked car that nothing touches, to be the ego; None where a vehicle can be the ego."""
     if any(e.wheels for e in entities.values()):
         return None
     name = "spectator"
@@ -331,7 +337,10 @@ def spectator(entities: Mapping[str, Entity]) -> Entity | None:
 
 
 def choose_ego(root: Node, entities: Mapping[str, Entity], wanted: str | None) -> str:
-    """The ego: as asked for, as marked, by name, else the first vehicle."""
+    """Returns the name of the ego: as asked for, as marked, by name, else the first vehicle.
+
+    A Fault where the one asked for, or any vehicle, is not there.
+    """
     node = root.child("Entities")
     if wanted is not None:
         if wanted not in entities:

@@ -61,7 +61,7 @@ class Environment:
 
     @property
     def says_weather(self) -> bool:
-        """It names something of the sky or the water on the road."""
+        """Returns whether it names something of the sky or the water on the road."""
         return any(
             value is not None
             for value in (
@@ -98,7 +98,7 @@ def compile_environment(node: Node) -> Environment:
 
 
 def moment_of(node: Node) -> float | None:
-    """The attribute dateTime in s since 1970, without a zone as that of Greenwich; None without it."""
+    """Returns the attribute dateTime in s since 1970, as of Greenwich without a zone; None without it."""
     text = node.text("dateTime", "")
     if not text:
         return None
@@ -132,7 +132,7 @@ def _weather(node: Node) -> dict[str, Any]:
 
 
 def _wind(node: Node) -> tuple[float, float]:
-    """Speed and direction of a <Wind>: its target direction, as a heading in the world."""
+    """Returns the speed in m/s and the direction of a <Wind>, to which it blows, as a heading in rad."""
     speed = node.number("speed")
     if not 0.0 <= speed <= WIND_MOST:
         raise node.error(f"speed must be in [0, {WIND_MOST:g}] m/s, got {speed:g}")
@@ -148,5 +148,5 @@ class Clock:
     runs: bool
 
     def now(self, t: float) -> float:
-        """Returns the time of day at t s."""
+        """Returns the time of day, s since 1970, at t s of the scenario."""
         return self.moment + (t - self.since if self.runs else 0.0)

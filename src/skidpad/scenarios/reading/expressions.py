@@ -85,7 +85,7 @@ def _tokens(text: str) -> tuple[tuple[str, str], ...]:
 
 
 def literal(text: str) -> Value:
-    """A parameter's text as a number or truth value where it is one."""
+    """Returns a parameter's text as a number or truth value where it is one, else as it is."""
     if text in ("true", "false"):
         return text == "true"
     try:
@@ -95,7 +95,7 @@ def literal(text: str) -> Value:
 
 
 def evaluate(text: str, scope: Scope) -> str:
-    """The value of an expression as an attribute's text; ExpressionError says what is wrong."""
+    """Returns the value of an expression as an attribute's text; ExpressionError says what is wrong."""
     words = [part.strip() for part in text.split("+")]
     if any(_is_text(word, scope) for word in words) and all(PIECE.fullmatch(w) for w in words):
         return "".join(_word(word, scope) for word in words)
@@ -109,13 +109,13 @@ def evaluate(text: str, scope: Scope) -> str:
 
 
 def _is_text(part: str, scope: Scope) -> bool:
-    """Several words, or a parameter whose value is no number."""
+    """Returns whether a part is several words, or a parameter whose value is no number."""
     value = scope.get(part.removeprefix("$"), 0.0)
     return " " in part or isinstance(literal(str(value)), str)
 
 
 def _word(part: str, scope: Scope) -> str:
-    """A piece of a text that is put together by `+`, as esmini does it."""
+    """Returns a piece of a text that is put together by `+`, as esmini does it."""
     if not part.startswith("$"):
         return scope.get(part, part)
     if part[1:] not in scope:
@@ -124,7 +124,7 @@ def _word(part: str, scope: Scope) -> str:
 
 
 def as_text(value: Value) -> str:
-    """A value as an attribute would have it."""
+    """Returns a value as an attribute would have it: true, false, whole numbers without a point."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
@@ -140,11 +140,11 @@ class _Reader:
         self.tokens, self.scope, self.at, self.depth = tokens, scope, 0, 0
 
     def peek(self) -> str:
-        """The next token, "" at the end."""
+        """Returns the text of the next token, "" at the end."""
         return self.tokens[self.at][1] if self.at < len(self.tokens) else ""
 
     def take(self, wanted: str | None = None) -> tuple[str, str]:
-        """The next token, which must be `wanted` if that is given."""
+        """Returns the next token and goes past it; ExpressionError unless it is `wanted`, if given."""
         if self.at >= len(self.tokens):
             raise ExpressionError(f"{wanted or 'a value'} is missing at the end")
         token = self.tokens[self.at]
@@ -176,7 +176,7 @@ class _Reader:
         return left
 
     def operand(self) -> Value:
-        """A literal, parameter, call, bracket, or one of these with a sign."""
+        """Returns the value of a literal, parameter, call, bracket, or of one of these with a sign."""
         kind, text = self.take()
         if kind == "number":
             return float(text)

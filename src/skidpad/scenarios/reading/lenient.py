@@ -18,7 +18,7 @@ ZERO: Mapping[str, tuple[str, ...]] = {  # attributes whose absence can only mea
 
 
 def fill_in(root: Node) -> Iterator[Finding]:
-    """Add what is missing to the tree; returns a warning for each."""
+    """Adds what is missing to the tree, and yields a warning for each; only as far as it is iterated."""
     for element in root.element.iter("ManeuverGroup", *ZERO):
         node = Node(element, root.file, root.values)
         if node.tag == "ManeuverGroup":

@@ -11,7 +11,7 @@ MOMENT = re.compile(
 
 
 def moment(text: str) -> float:
-    """Seconds since 1970, without a zone as that of Greenwich; ValueError where it is none."""
+    """Returns a time in s since 1970, without a zone as that of Greenwich; ValueError where it is none."""
     found = MOMENT.fullmatch(text.strip())
     if found is None:
         raise ValueError(f"{text!r} is no ISO 8601 time")

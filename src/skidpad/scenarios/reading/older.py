@@ -122,7 +122,7 @@ A_MAX = "200"  # m/s^2, as in ASAM's migration; 0.9.1 knows no largest accelerat
 
 
 def renew(root: Element) -> None:
-    """Gives everything under the root its newer name."""
+    """Gives everything under the root, in place, the name that it has since 1.0."""
     for element in list(root.iter("*")):
         parent = element.getparent()
         inside = "" if parent is None else str(parent.tag)
@@ -155,7 +155,7 @@ def _rename(element: Element, old: str) -> None:
 
 
 def _lift(element: Element) -> None:
-    """The triggers of an act stand in the act itself since."""
+    """Moves the triggers in <Conditions> of an act into the act itself, in place."""
     parent = element.getparent()
     assert parent is not None
     for child in list(element):
@@ -183,7 +183,7 @@ def _performance(element: Element) -> None:
 
 
 def _private(element: Element) -> None:
-    """A position as an action is a teleport."""
+    """Puts the position of a private action, in place, into a teleport."""
     place = element.find("Position")
     if place is not None:
         teleport = etree.SubElement(element, "TeleportAction")
@@ -209,7 +209,7 @@ def _time(element: Element) -> None:
 
 
 def _trajectory(element: Element) -> None:
-    """Puts the shape around the vertices, as today; only lines from point to point are taken over."""
+    """Puts the shape around the vertices, in place; only lines from point to point are taken over."""
     vertices = element.findall("Vertex")
     if not vertices or any(v.find("Shape/Polyline") is None for v in vertices):
         return

@@ -21,7 +21,7 @@ RULES: Mapping[str, Callable[[float | str, float | str], bool]] = {
 
 
 def holds_between(rule: str, left: str, right: str) -> bool:
-    """Texts by a rule: as numbers or moments where both are, else letter by letter."""
+    """Returns whether texts compare by a rule: as numbers or moments where both are, else by letters."""
     for read in (float, moment):
         try:
             return RULES[rule](read(left), read(right))
@@ -31,7 +31,10 @@ def holds_between(rule: str, left: str, right: str) -> bool:
 
 
 def root_values(root: Node, given: Mapping[str, float | str]) -> dict[str, str]:
-    """The parameters of a file, some of them overridden from outside."""
+    """Returns the parameters of a file, some of them overridden from outside.
+
+    FileError for a given one that the file does not declare.
+    """
     values = read_declarations(root, {}, given)
     for name in given:
         if name not in values:
@@ -43,7 +46,10 @@ def root_values(root: Node, given: Mapping[str, float | str]) -> dict[str, str]:
 def read_declarations(
     node: Node, outer: Mapping[str, str], given: Mapping[str, float | str]
 ) -> dict[str, str]:
-    """Parameters in scope inside an element that may declare some; given: assigned values."""
+    """Returns the parameters in scope inside an element that may declare some; given: assigned values.
+
+    A Fault where a value does not fit its type or constraints.
+    """
     values = dict(outer)
     declarations = node.find("ParameterDeclarations")
     if declarations is None:
@@ -61,14 +67,14 @@ def read_declarations(
 
 
 def inner(node: Node) -> Node:
-    """An element with its own declarations in scope."""
+    """Returns an element with its own declarations in scope."""
     if node.find("ParameterDeclarations") is None:
         return node
     return node.scoped(read_declarations(node, node.values, {}))
 
 
 def assignments(node: Node) -> dict[str, str]:
-    """The values that a catalog reference or a distribution assigns, by parameter."""
+    """Returns the values that a catalog reference or a distribution assigns, by parameter."""
     found = node.find("ParameterAssignments")
     if found is None:
         return {}
@@ -79,7 +85,7 @@ def assignments(node: Node) -> dict[str, str]:
 
 
 def variables(root: Node) -> dict[str, str]:
-    """The variables of a file with their first values."""
+    """Returns the variables of a file with their first values."""
     declarations = root.find("VariableDeclarations")
     if declarations is None:
         return {}

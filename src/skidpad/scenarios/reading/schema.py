@@ -29,12 +29,15 @@ def schema_file(minor: str) -> Path:
 
 @cache
 def schema(minor: str) -> etree.XMLSchema | None:
-    """The same, ready to validate; None where there is none."""
+    """Returns the schema of OpenSCENARIO 1.`minor`, ready to validate; None where there is none."""
     return etree.XMLSchema(etree.parse(str(schema_file(minor)))) if minor in FILES else None
 
 
 def violations(root: etree._Element, file: str, minor: str) -> list[Finding]:
-    """What the schema has against a document."""
+    """Returns what the schema has against a document; [] where there is no schema.
+
+    file: its name, for the findings.
+    """
     rules = schema(minor)
     if rules is None or rules.validate(root):
         return []
@@ -45,6 +48,6 @@ def violations(root: etree._Element, file: str, minor: str) -> list[Finding]:
 
 
 def _element(message: str) -> str:
-    """The element that a message begins with: "Element 'X', attribute ..."."""
+    """Returns the first quoted word of a message, its element; "OpenSCENARIO" where there is none."""
     parts = message.split("'")
     return parts[1] if len(parts) > 1 else "OpenSCENARIO"

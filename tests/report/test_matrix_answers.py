@@ -102,9 +102,39 @@ def test_where_chance_may_explain_every_difference_the_first_sentence_says_so(tm
     first = told(campaign(tmp_path, lambda config, kind: metrics(barriers=2)))[0]
     assert first.sentence.startswith(
         "10 seeds are too few to rank the configurations: every difference between two of them may be "
-        "chance. Of the configurations, fewest crashes: in clear sky configuration 1 (ACC), "
+        "chance. Of the configurations, fewest crashes: in clear sky configurations 1 to 4 alike with "
+        "2.00 per run; "
     )
     assert list(first.lines) == []
+
+
+@pytest.mark.req("R-7")
+@pytest.mark.parametrize(("seeds", "share", "lines"), [(10, 26, 1), (2, 78, 2)])
+def test_where_nobody_crashed_one_sentence_says_so_and_what_that_still_allows(
+    tmp_path, seeds, share, lines
+):
+    matrix = campaign(tmp_path, lambda config, kind: metrics(hit=30 * (config == "0")), seeds)
+    first, second, _ = told(matrix)
+    assert first.sentence == "Configurations 1 to 4 had no crash in clear sky or heavy rain."
+    assert first.lines[0] == (
+        f"No crash in {seeds} seeds still allows one in up to {share} % of seeds (95 % confidence)."
+    )
+    assert len(first.lines) == lines, "two seeds cannot tell configurations apart"
+    captions = [first.figure.caption, second.figure.caption]
+    assert ("an interval takes 8 seeds" in captions[0]) is (seeds < 8)
+    assert ("is corrected for judging 4 of them" in captions[1]) is (seeds == 10)
+
+
+def test_a_claim_that_every_case_shows_is_not_said_to_be_beyond_chance(tmp_path):
+    """Two seeds of a minute show no chance: they show two seeds of a minute."""
+    campaign(tmp_path, lambda config, kind: metrics(hit=30 * (config == "0")), seeds=2)
+    page = write_report(tmp_path).read_text(encoding="utf-8")
+    assert "Supported by every case of these runs: claim A-276, “Without assistance" in page
+    card = page[page.index(">A-276<") :].split("</details>")[0]
+    assert "more runs may bring one that does not" in card
+    assert "chance" not in card
+    assert "p &lt;" not in card
+    assert "p =" not in card
 
 
 @pytest.mark.req("R-7", "T-5")

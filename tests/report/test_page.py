@@ -121,3 +121,5 @@ def test_a_report_is_replaced_only_by_a_complete_one(tmp_path, monkeypatch):
 def test_backticks_make_code_and_nothing_else_does():
     page = Page(title="t", subtitle="", sections=[Section("s", [Text("run `a <b>`, not <i>")])])
     assert "<p>run <code>a &lt;b&gt;</code>, not &lt;i&gt;</p>" in render(page)
+    option = Page(title="t", subtitle="", sections=[Section("s", [Text("ask `--seeds 10`")])])
+    assert '<code class="option">--seeds 10</code>' in render(option), "not broken after its dashes"

@@ -1,6 +1,9 @@
+from dataclasses import replace
+
 import polars as pl
 import pytest
 
+from skidpad.evidence.contrasts import Never
 from skidpad.evidence.drive.findings import FINDINGS, astray
 from skidpad.evidence.verdicts import Judgement, Verdict, judge
 from skidpad.report.elements.verdicts import plain, tally_text
@@ -24,6 +27,14 @@ def judged(verdict, seeds=None):
 )
 def test_every_verdict_has_its_plain_sentence(verdict, said):
     assert said in plain(judged(verdict, 40))
+
+
+@pytest.mark.parametrize(("broken", "said"), [(0, "more runs may bring one"), (1, "one is enough")])
+def test_claims_that_cases_decide_say_nothing_of_chance(broken, said):
+    claim = replace(FINDINGS[0], criteria=(Never("cases", lambda table: (broken, 4)),))
+    (one,) = judge([claim], [pl.DataFrame({"seed": [1, 2]})])
+    assert said in plain(one)
+    assert "chance" not in plain(one)
 
 
 def test_the_tally_counts_every_claim_once():

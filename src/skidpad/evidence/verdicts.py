@@ -80,6 +80,11 @@ class Judgement:
     seeds_needed: int | None
     text: str
 
+    @property
+    def is_counted(self) -> bool:
+        """Returns whether single cases decide the claim, so that nothing is said of chance."""
+        return any(contrast.words for contrast in self.contrasts)
+
 
 def judge(
     findings: Sequence[Finding], results: Sequence[pl.DataFrame | None], refused: str = ""
@@ -171,7 +176,7 @@ def _text(
     few = min(c.units for c in contrasts)
     if verdict is Verdict.UNDECIDED and few < EVER_SIGNIFICANT:
         text += f" {count_text(few, 'unit')} cannot be tested."
-    elif p is not None:
+    elif p is not None and not any(c.words for c in contrasts):
         text += f" {p_text(p)} after correction for all findings of this report."
     if verdict is Verdict.CONTRADICTED:
         small = [c.label for c in contrasts if c.small and c.margin]

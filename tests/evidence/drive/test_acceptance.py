@@ -53,6 +53,10 @@ def test_a_claim_that_one_case_decides_counts_cases_in_words():
     (judged,) = judge([BY_ID["A-276"]], [matrix(once, FEW)])
     assert "cells that break it over all seeds: 2 of 4; one is enough" in judged.text
     assert "0.5" not in judged.text
+    assert "p " not in judged.text, "nothing is tested"
+    assert judged.is_counted
+    (shown,) = judge([BY_ID["A-277"]], [matrix(dict.fromkeys("01234", 1), FEW)])
+    assert not shown.is_counted
 
 
 @pytest.mark.req("A-276")

@@ -333,7 +333,8 @@ def _asset(name: str) -> str:
 
 def _prose(text: str) -> Markup:
     """Text of a page; what stands between backticks is code."""
-    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+    found = re.sub(r"`(--[^`]{,20})`", r'<code class="option">\1</code>', str(escape(text)))
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", found))
 
 
 @cache

@@ -11,7 +11,7 @@ from skidpad.evidence.verdicts import Judgement
 from skidpad.evidence.verdicts import Verdict as Outcome
 from skidpad.report.elements.page import Verdict
 
-TALLIED = {Outcome.BY_CONSTRUCTION: "not measured, as both sides are the same drive"}
+TALLIED = {Outcome.BY_CONSTRUCTION: "not measured (both sides are the same drive)"}
 
 
 def verdict_blocks(judged: Iterable[Judgement]) -> list[Verdict]:
@@ -33,6 +33,10 @@ def verdict_blocks(judged: Iterable[Judgement]) -> list[Verdict]:
 def plain(j: Judgement) -> str:
     """What the runs say about a claim, without numbers of statistics."""
     match j.verdict:
+        case Outcome.SUPPORTED if j.is_counted:
+            return "Every case of these runs shows it; more runs may bring one that does not."
+        case Outcome.CONTRADICTED if j.is_counted:
+            return "These runs have a case that breaks it, and one is enough."
         case Outcome.SUPPORTED:
             return "These runs show it, beyond what chance explains."
         case Outcome.CONTRADICTED:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import polars as pl
 
 from skidpad.core.wording import capitalize_first, count_text, list_text
-from skidpad.evidence.statistics import Interval, Rate, p_text, seeds_for_verdict
+from skidpad.evidence.statistics import UNITS_FROM, Interval, Rate, p_text, seeds_for_verdict
 from skidpad.evidence.verdicts import Judgement
 from skidpad.report.crashes.cards import Found
 from skidpad.report.elements.figures import (
@@ -78,15 +78,16 @@ def _functions(matrix: Matrix) -> Answer:
     judged = {g: {c: r[c] for c in r if c != REFERENCE} or r for g, r in rates.items()}
     best = {g: min(r, key=lambda c: r[c].rate) for g, r in judged.items() if r}
     parts = [_fewest(g, judged[g], judged[g][c].rate) for g, c in best.items()]
-    sentence = (
-        f"Of the configurations, fewest {EVENTS}: {'; '.join(parts)}."
-        f"{_beside_reference(rates, judged)}"
-    )
+    without = _without_crashes(judged)
+    fewest = without or [f"Of the configurations, fewest {EVENTS}: {'; '.join(parts)}."]
+    sentence = f"{fewest[0]}{_beside_reference(rates, judged)}"
     least = seeds_for_verdict(len(differences))
     if len(matrix.comparison_configs) < 2:
-        lines = []
+        lines = without[1:]
     elif matrix.seeds < least:
-        lines = [_too_few_seeds(matrix.seeds, least)]
+        lines = [*without[1:], _too_few_seeds(matrix.seeds, least)]
+    elif without:
+        lines = without[1:]
     else:
         if not any(d.is_sure for d in differences.values()):
             sentence = (
@@ -103,10 +104,28 @@ def _functions(matrix: Matrix) -> Answer:
     )
 
 
+def _without_crashes(judged: dict[WeatherGroup, dict[str, Rate]]) -> list[str]:
+    """A sentence where no configuration had a crash in any weather, and what that still allows."""
+    rates = [rate for by_config in judged.values() for rate in by_config.values()]
+    if not rates or any(rate.events for rate in rates):
+        return []
+    configs = list(dict.fromkeys(c for by_config in judged.values() for c in by_config))
+    weathers = " or ".join(group.name for group in judged)
+    fewest = min(rate.runs for rate in rates)
+    share = 100 * max(rate.most_runs for rate in rates)
+    allowed = f"still allows one in up to {share:.0f} % of seeds (95 % confidence)"
+    return [
+        f"{capitalize_first(config_list(configs))} had no {EVENT} in {weathers}.",
+        f"No {EVENT} in {count_text(fewest, 'seed')} {allowed}.",
+    ]
+
+
 def _fewest(group: WeatherGroup, rates: dict[str, Rate], least: float) -> str:
-    """All configurations that share the least rate of a group."""
+    """All configurations that share the least rate of a group; without their functions where all do."""
     found = [c for c, rate in rates.items() if rate.rate == least]
-    return f"in {group.name} {functions_list(found)} with {least:.2f} per run"
+    all_alike = len(found) == len(rates) > 1
+    named = f"{config_list(found)} alike" if all_alike else functions_list(found)
+    return f"in {group.name} {named} with {least:.2f} per run"
 
 
 def _beside_reference(
@@ -197,9 +216,12 @@ def _rate_figure(matrix: Matrix, rates: dict[WeatherGroup, dict[str, Rate]]) -> 
     rows = [config_title(c) for c in matrix.comparison_configs]
     caption = (
         f"{EVENTS.capitalize()} per run of {matrix.duration:g} s; a run goes on after one. Lines are "
-        f"95 % intervals. A hollow point has none: at most one seed had a {EVENT}, and one seed does not "
-        "say how others vary."
+        f"95 % intervals. A hollow point has none: "
     )
+    if matrix.seeds < UNITS_FROM:
+        caption += f"an interval takes {UNITS_FROM} seeds."
+    else:
+        caption += f"at most one seed had a {EVENT}, and one seed does not say how others vary."
     caption += cut_note(series, POINTS_REACH)
     return Figure(points_with_intervals(rows, series, f"{EVENTS} per run"), caption)
 
@@ -314,8 +336,9 @@ def _change_figure(
     label = f"{EVENTS} per run, minus those in {base}"
     caption = (
         f"What each weather adds to the {EVENTS} per run in {base}, paired by seed; to the right of "
-        "the rule is worse. Lines are 95 % intervals of each difference alone, from the differences within "
-        "seeds, so they need not agree with those of the rates; the sentence above is corrected for all "
-        f"{len(changes)}.{cut_note(series, POINTS_REACH)}"
+        "the rule is worse. Lines are 95 % intervals of each difference by itself."
     )
+    if matrix.seeds >= seeds_for_verdict(len(changes)):
+        caption += f" The sentence above is corrected for judging {len(changes)} of them at once."
+    caption += cut_note(series, POINTS_REACH)
     return Figure(points_with_intervals(rows, series, label, origin=0.0), caption)

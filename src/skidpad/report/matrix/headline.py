@@ -100,8 +100,9 @@ def _per_run(matrix: Matrix) -> Table:
     )
     columns = [Column[str]("configuration", partial(_name, matrix)), *crashes, first, put_back]
     note = (
-        f"Every drive once. Small: 95 % interval {ASSUMED}, or the largest share of seeds that have one "
-        "(95 %); of the median exact by order statistics, from six runs on."
+        f"Every drive once. Below a rate stands its 95 % interval, {ASSUMED}; where fewer than two seeds "
+        "had an event, the largest share of seeds with one (95 %). Below a median stands its exact 95 % "
+        "interval, from six runs on."
         f"{few_seeds_note(matrix)}"
     )
     return table(columns, matrix.configs, "What happened, by configuration", note)
@@ -209,7 +210,7 @@ def baseline_text(matrix: Matrix) -> list[Block]:
             f"{float(first.median()):.0f} s in the median of {count_text(len(runs), 'drive')}. "  # type: ignore[arg-type]
         )
     text += (
-        "Its counts measure this cycle and not the weather. They stand in the tables as they were, "
-        "and in no total, and in no comparison or figure but those of the sources' own claims and numbers."
+        "Its counts measure this cycle and not the weather. They stand in the tables, but in no total. "
+        "Comparisons and figures leave them out, except where the sources' own claims and numbers are judged."
     )
     return [Text(text, tone="note")]

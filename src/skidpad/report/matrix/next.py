@@ -97,10 +97,20 @@ def _claims(matrix: Matrix, judged: Sequence[Judgement]) -> list[str]:
         return [unjudged_text(judged)]
     decided = [j for verdict in DECIDED for j in judged if j.verdict is verdict]
     named = [
-        f"{j.verdict.value.capitalize()}: claim {j.finding.id}, “{j.finding.claim.rstrip('.')}”."
+        f"{j.verdict.value.capitalize()}{_by_cases(j)}: claim {j.finding.id}, "
+        f"“{j.finding.claim.rstrip('.')}”."
         for j in decided[:DECIDED_MAX]
     ]
     return [tally_text(judged), *named]
+
+
+def _by_cases(judged: Judgement) -> str:
+    """Says of a claim that cases decide that these runs are all that is known."""
+    return (
+        " by every case of these runs"
+        if judged.is_counted and judged.verdict is Verdict.SUPPORTED
+        else ""
+    )
 
 
 def _hardest(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[str]:

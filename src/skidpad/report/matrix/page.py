@@ -30,10 +30,10 @@ from skidpad.report.matrix.ways import way_blocks
 
 CLAIMS = (*FINDINGS, *ACCEPTANCE)
 GRADED = """A crash is a serious contact or a departure. A contact is serious when it changes the speed of \
-either side by 5 km/h or more; with a pedestrian or a two-wheeler every contact is. A departure ends in a \
-barrier, with all wheels off every lane for 1 s, with the car more than 3 m beyond the edge, or facing the \
-wrong way. An intervention puts the car back on its lane, after a light contact, too; the published study \
-counts interventions as collisions."""
+either side by 5 km/h or more; with a pedestrian or a two-wheeler every contact is. In a departure \
+the car hits a barrier, has all wheels off every lane for 1 s, is more than 3 m beyond the edge, or faces \
+the wrong way. In an intervention the car is put back on its lane, also after a light contact; the published \
+study counts interventions as collisions."""
 UNGRADED = """These results are older than the grading of contacts. A crash is every intervention: what puts \
 the car back on its lane after a contact, a departure from the road, or because it faces the wrong way."""
 LEAD = f"""\
@@ -135,11 +135,12 @@ def _verdicts(matrix: Matrix, judged: Sequence[Judgement]) -> list[Block]:
         return [Text(unjudged_text(judged))]
     intro = Text(
         "Each claim, its test and its margin were written down before results of the matrix were "
-        "seen. One rule is not blind: that a margin comes before significance, so that a difference "
-        "below its margin supports nothing, is shared by all reports and was settled after results "
+        "seen. One rule is not blind: that a margin comes before significance. It means that a difference "
+        "below its margin supports nothing. All reports share it, and it was settled after results "
         "of the friction campaign had been seen. "
-        "By construction: both sides must be the same drive. Same drives: they happened to be, what "
-        "differs never came into play. A v behind an id: the same claim for crashes with vehicles alone. "
+        "“By construction” says that both sides must be the same drive, “same drives” that they were, "
+        "since what differs never came into play. An id that ends in v is the same claim for crashes with "
+        "vehicles alone. "
         "The sources call an intervention a fatal collision, so claims and columns carry that name."
     )
     own = ", ".join(f.id for f in CLAIMS if f.study)

@@ -121,7 +121,7 @@ def collisions(matrix: Matrix) -> list[Block]:
         count_table(matrix, "road_departures", "Departures from the road per run"),
         count_table(matrix, INTERVENTIONS, "Interventions per run (published as collisions)"),
         count_table(
-            matrix, "fatal_first", "Interventions per run that are the first of their chain"
+            matrix, "fatal_first", "Interventions per run, without those soon after another one"
         ),
         kinds_table(matrix),
         grades_table(matrix),

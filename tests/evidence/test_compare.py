@@ -179,7 +179,9 @@ def test_the_command_says_whether_hashes_may_be_compared(tmp_path, place, told):
     MATRIX.write(tmp_path / "a", rows(), fingerprints=["x"] * 16)
     MATRIX.write(tmp_path / "b", rows(), fingerprints=[place] * 16)
     call = ["compare", str(tmp_path / "a"), str(tmp_path / "b")]
-    assert f"hashes {told}" in CliRunner().invoke(app, call).stdout
+    lines = CliRunner().invoke(app, call).stdout
+    assert f"hashes {told}" in lines
+    assert lines.splitlines()[-1].startswith(f"Next: skidpad report {tmp_path / 'b'}")
 
 
 @pytest.mark.req("T-6")

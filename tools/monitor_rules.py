@@ -41,9 +41,8 @@ from skidpad.evidence.channels.hazards import SCORED_HAZARDS
 from skidpad.evidence.channels.judging.curves import SIDES, Looked, look, spans
 from skidpad.evidence.channels.judging.kept import code_hash
 from skidpad.evidence.channels.judging.reference import FACTORS, SPARES, TAILS, reference
-from skidpad.evidence.channels.judging.segments import evaluated_from, grip_of
+from skidpad.evidence.channels.judging.segments import evaluated_from, grip_of, weights_from
 from skidpad.evidence.channels.judging.truth.simulator import simulator_truth
-from skidpad.evidence.channels.judging.weights import weights_from
 from skidpad.evidence.channels.matching import Span, Tally, Weighed, score, tally
 from skidpad.evidence.channels.tracked.distance import SafeDistance
 from skidpad.evidence.channels.tracked.vote import CHI2_LIMIT, Tracked

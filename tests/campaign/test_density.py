@@ -8,8 +8,7 @@ from typer.testing import CliRunner
 from runs import adas_run
 from skidpad.campaign.runs.desk_run import drive_at_desk
 from skidpad.campaign.runs.run import run
-from skidpad.campaign.takeover.density import FROM_EGO, Density
-from skidpad.campaign.takeover.desk import Desk, Recorded
+from skidpad.campaign.takeover.desk import FROM_EGO, Density, Desk, Recorded
 from skidpad.cli.main import app
 from skidpad.cli.runs.cockpit import with_reserve as with_more
 from skidpad.core.errors import ConfigError

@@ -12,8 +12,14 @@ from runs import adas_run
 from skidpad.campaign.runs.desk_run import drive_at_desk
 from skidpad.campaign.runs.run import run
 from skidpad.campaign.runs.stored import read_run
-from skidpad.campaign.takeover.desk import LOW_VISIBILITY, Desk, Recorded, beam_of
-from skidpad.campaign.takeover.hands import HOLD_TO_REVERSE, Hands
+from skidpad.campaign.takeover.desk import (
+    HOLD_TO_REVERSE,
+    LOW_VISIBILITY,
+    Desk,
+    Hands,
+    Recorded,
+    beam_of,
+)
 from skidpad.cli.main import app
 from skidpad.core.errors import FileError, OutputError
 from skidpad.core.inputs import (

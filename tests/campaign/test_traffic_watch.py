@@ -8,7 +8,6 @@ import pytest
 from skidpad.campaign.bench.headways import headways_of
 from skidpad.campaign.bench.traffic import background_world
 from skidpad.campaign.bench.traffic_options import TrafficBench
-from skidpad.campaign.bench.traffic_waits import root_of, wait_circles
 from skidpad.campaign.bench.traffic_watch import (
     CIRCLE,
     LONG,
@@ -16,7 +15,9 @@ from skidpad.campaign.bench.traffic_watch import (
     Watch,
     leaders,
     overlaps,
+    root_of,
     times_to_neighbours,
+    wait_circles,
 )
 from skidpad.simulation.world.traffic.state import Held
 from skidpad.simulation.world.world import World

@@ -20,8 +20,8 @@ from skidpad.campaign.runs.run import run
 from skidpad.campaign.runs.stored import read_run
 from skidpad.campaign.takeover.desk import Desk, Recorded
 from skidpad.campaign.workers.pool import local
+from skidpad.cockpit.bridge import ASLEEP_AFTER
 from skidpad.cockpit.hud import TIERS
-from skidpad.cockpit.tabs import ASLEEP_AFTER
 from skidpad.core.inputs import Functions, Lamps, Method, Pedals, Sky, Timed, Wheel
 from skidpad.core.run import Function
 from skidpad.core.vocabulary import GripModel, RangeModel

@@ -22,7 +22,7 @@ from skidpad.campaign.takeover.desk import Desk, Recorded
 from skidpad.cli.main import app
 from skidpad.cockpit import producer as producer_module
 from skidpad.cockpit import serving
-from skidpad.cockpit.bridge import Bridge
+from skidpad.cockpit.bridge import ASLEEP_AFTER, RELEASE_AFTER, Bridge, DeadMan, Tabs
 from skidpad.cockpit.driving import CockpitPacer
 from skidpad.cockpit.feed import SLOT_BYTES, SLOTS, Feed
 from skidpad.cockpit.hud import TIERS
@@ -31,7 +31,6 @@ from skidpad.cockpit.pictures import LIGHTS, Encoder, colours, views_of
 from skidpad.cockpit.producer import Producer
 from skidpad.cockpit.screen import Screen, Shown
 from skidpad.cockpit.studio import View, cameras
-from skidpad.cockpit.tabs import ASLEEP_AFTER, RELEASE_AFTER, DeadMan, Tabs
 from skidpad.cockpit.words import (
     Do,
     End,

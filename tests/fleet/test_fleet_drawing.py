@@ -10,7 +10,7 @@ from fleet_world import record
 from skidpad.evidence.statistics import Interval
 from skidpad.fleet.alerting.keeping import Body
 from skidpad.fleet.insight.trends import Trend
-from skidpad.fleet.site.charts import trend_svg
+from skidpad.fleet.site.dashboard import trend_svg
 from skidpad.fleet.site.drawing import (
     KINDS,
     Dot,

@@ -12,8 +12,7 @@ from skidpad.cli.fleet.links import open_maps, place_finder
 from skidpad.core.vocabulary import HazardType
 from skidpad.fleet.insight.worklist import rank_work
 from skidpad.fleet.patterns import analysis
-from skidpad.fleet.patterns.analysis import newest_clusters
-from skidpad.fleet.patterns.recurrence import name_subjects
+from skidpad.fleet.patterns.analysis import name_subjects, newest_clusters
 from skidpad.fleet.site.work import work_text, work_title
 
 

@@ -13,8 +13,12 @@ from skidpad.evidence.channels.judging.reference import NAME as REFERENCE
 from skidpad.evidence.channels.judging.segments import judge
 from skidpad.recording.channels.cycles import cycles
 from skidpad.recording.channels.drives import DriveOutcome, DriveRecord
-from skidpad.report.channels.evaluation.page import _curve, evaluation_page, write_evaluation_report
-from skidpad.report.channels.evaluation.redundancy import redundancy
+from skidpad.report.channels.evaluation.page import (
+    _curve,
+    evaluation_page,
+    redundancy,
+    write_evaluation_report,
+)
 from skidpad.report.channels.evaluation.strata import precision_recall
 from skidpad.report.elements.figures import PALETTE
 

@@ -11,7 +11,7 @@ from skidpad.recording.run.readings import (
     tabulate_readings,
     write_readings,
 )
-from skidpad.report.matrix.envelope import envelope_blocks
+from skidpad.report.matrix.readings import envelope_blocks
 
 SENSOR = RecordedSensor("envelope", "envelope", "Speed envelope", "m/s; binding: 0 none, 1 sight")
 RAIN = RecordedSensor("rain", "rain_sensor", "Rain", "stage")

@@ -20,11 +20,16 @@ from skidpad.roads.opendrive.bake import bake
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.roadside import Shape
 from skidpad.roads.walkable import walk_mesh
-from skidpad.scenery.dressing import count_things, dress_map, name_kerbs, things_of
-from skidpad.scenery.free_ground import outlines_of
+from skidpad.scenery.dressing import (
+    LOWER_EDGE,
+    count_things,
+    dress_map,
+    name_kerbs,
+    signs_of,
+    things_of,
+)
+from skidpad.scenery.free_ground import outlines_of, sight_triangles
 from skidpad.scenery.sides import RoadKind, sides_of
-from skidpad.scenery.sight import sight_triangles
-from skidpad.scenery.signs import LOWER_EDGE, signs_of
 from skidpad.simulation.carla_server.maps.maps import spawn_points
 from skidpad.simulation.world.actors import PAINT_SHARES, PALETTE, Role, draw_paint
 

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from skidpad.sensors.scene.clusters import SIZE, cluster
+from skidpad.sensors.scene.static import SIZE, cluster
 
 
 @given(st.lists(st.integers(0, 3 * SIZE), min_size=1, max_size=5), st.integers(0, 2**32 - 1))

@@ -19,8 +19,7 @@ from skidpad.core.vocabulary import DetectionStatus, RelocationReason, Supervisi
 from skidpad.evidence.drive.collisions import CrashKind, Striker, find_crashes
 from skidpad.evidence.drive.conflict import deceleration_to_avoid_crash, time_to_collision
 from skidpad.evidence.drive.lanematch import LaneIndex
-from skidpad.evidence.drive.lateral import count_invasions
-from skidpad.evidence.drive.metrics import run_metrics, weather_metrics
+from skidpad.evidence.drive.metrics import count_invasions, run_metrics, weather_metrics
 from skidpad.evidence.drive.prepared import LeadDefinition, MetricSettings, prepare
 from skidpad.evidence.drive.story import tell_story
 from skidpad.recording.campaign.matrix import Metrics

@@ -13,8 +13,7 @@ from makemap import ring_map, straight_map
 from skidpad.core.states import ContactEvent, LaneInvasion, StackReport
 from skidpad.core.vocabulary import DetectionStatus, Supervision, Tier
 from skidpad.evidence.drive.collisions import Crash, find_crashes
-from skidpad.evidence.drive.lateral import count_invasions
-from skidpad.evidence.drive.metrics import run_metrics
+from skidpad.evidence.drive.metrics import count_invasions, run_metrics
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.recording.campaign.matrix import Metrics
 

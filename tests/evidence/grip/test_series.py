@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from skidpad.evidence.grip.series import (
+from skidpad.evidence.grip.study import (
+    Cost,
     median_series,
     median_warping,
     noise_floor,
     stack_runs,
     warping_interval,
 )
-from skidpad.evidence.grip.warping import Cost
 
 
 @pytest.mark.req("B-123")

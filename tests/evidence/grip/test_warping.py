@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from skidpad.evidence.grip.warping import Cost, warping_distance
+from skidpad.evidence.grip.study import Cost, warping_distance
 
 SERIES = st.lists(st.floats(-5.0, 5.0), min_size=1, max_size=9).map(np.array)
 

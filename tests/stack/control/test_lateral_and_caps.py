@@ -15,9 +15,8 @@ from skidpad.core.geometry import Pose
 from skidpad.core.settings import Settings
 from skidpad.core.stack_settings import CapScope, Lookahead, ResumeEnd, StackSettings
 from skidpad.core.vocabulary import Tier
-from skidpad.stack.adas import AdasStack
+from skidpad.stack.adas import AdasStack, ResumeProtocol, SpeedCaps
 from skidpad.stack.configurations import functions_of
-from skidpad.stack.control.resume import ResumeProtocol, SpeedCaps
 from skidpad.stack.control.steering import (
     LaneCentring,
     LazyDriver,

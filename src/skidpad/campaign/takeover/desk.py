@@ -10,11 +10,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Protocol
 
+import numpy as np
+
 from skidpad.campaign.driving.loop import Script, Supervising
 from skidpad.campaign.driving.outdoors import ChangedBackend
 from skidpad.campaign.driving.run_setup import StackAtWheel
-from skidpad.campaign.takeover.density import Density
-from skidpad.campaign.takeover.hands import Hands
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import SensorFrame
 from skidpad.core.inputs import (
@@ -24,6 +24,7 @@ from skidpad.core.inputs import (
     Input,
     Lamps,
     LampSwitch,
+    Method,
     Outside,
     Pedals,
     Sky,
@@ -31,7 +32,7 @@ from skidpad.core.inputs import (
     Wheel,
 )
 from skidpad.core.run import Function, Roads, RunSpec
-from skidpad.core.setup import DT, ActorCommand
+from skidpad.core.setup import DT, RESERVE_NAME, ActorCommand
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import Supervision
 from skidpad.core.weather import Weather
@@ -39,6 +40,15 @@ from skidpad.physics.optics import visibility
 from skidpad.simulation.backend import Backend
 from skidpad.simulation.recovery import Action, Supervisor
 
+STANDSTILL = 0.3  # m/s
+HOLD_TO_REVERSE = 0.5  # s of braking at standstill (A-274 leaves the time open)
+PRESSED = 0.5  # pedal
+TURN, RETURN = 1.6, 3.2  # 1/s of full lock by keys, our choice: lock to lock in 1.25 s
+# Keys know all or nothing, so at speed they ask for no more than this lateral acceleration.
+KEY_A_LAT = 6.0  # m/s^2, our choice: below what a dry road carries, above what a wet one does
+WHEELBASE, MAX_STEER = 2.9, 1.22  # m, rad: of a sedan with CARLA's 70 degrees, for that limit only
+ROOM = 25.0  # m to everybody, which a vehicle needs to come back
+FROM_EGO = 60.0  # m to the ego, so that nobody appears before its bumper
 LOW_VISIBILITY = 200.0  # m (A-220)
 
 
@@ -216,3 +226,106 @@ class DeskScript:
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
         """Words to actors for the coming step."""
         return [*self.inner.step(truth), *self.desk.density.words(truth)]
+
+
+# How many background vehicles are on the road, changed while a run is driven.
+#
+# Who leaves and who comes back follows from the moment alone, so the same inputs at the same ticks
+# give the same run. Vehicles come back where they left, as soon as there is room; if more are wanted
+# than the run began with, its reserve is called in, and enters where traffic lets in those who are late.
+
+
+class Density:
+    """State: how many vehicles are wanted (None: as the run has them), which were sent away or called."""
+
+    def __init__(self, vehicles: int = 0) -> None:
+        """vehicles: that the run begins with."""
+        self.vehicles = vehicles
+        self.wanted: int | None = None
+        self.away: set[int] = set()
+        self.called = 0  # of the reserve
+
+    def words(self, truth: WorldTruth) -> list[ActorCommand]:
+        """What actors are told in this tick: the farthest leave first, the nearest come first."""
+        if self.wanted is None:
+            return []
+        return [*self._call(truth), *self._leave_or_come(truth, self.wanted)]
+
+    def _call(self, truth: WorldTruth) -> list[ActorCommand]:
+        """Calls vehicles of the reserve that are wanted for the first time; all they need is room."""
+        assert self.wanted is not None
+        reserve = [name for name in truth.table.names if name.startswith(RESERVE_NAME)]
+        first, self.called = self.called, max(self.called, self.wanted - self.vehicles)
+        return [ActorCommand(name, present=True) for name in reserve[first : self.called]]
+
+    def _leave_or_come(self, truth: WorldTruth, wanted: int) -> list[ActorCommand]:
+        """Sends vehicles away, or calls back those that were there."""
+        states, names = truth.states, truth.table.names
+        here = [i for i in np.flatnonzero(states.present).tolist() if i > 0]
+        from_ego = np.hypot(states.x - states.x[0], states.y - states.y[0])
+        if len(here) > wanted:
+            leaving = sorted(here, key=lambda i: (-from_ego[i], i))[: len(here) - wanted]
+            self.away.update(leaving)
+            return [ActorCommand(names[i], present=False) for i in leaving]
+        coming: list[int] = []
+        for i in sorted(self.away, key=lambda i: (from_ego[i], i)):
+            if len(here) == wanted:
+                break
+            others = [0, *here]
+            near = np.hypot(states.x[others] - states.x[i], states.y[others] - states.y[i])
+            if near.min() > ROOM and from_ego[i] > FROM_EGO:
+                coming.append(i)
+                here.append(i)
+        self.away.difference_update(coming)
+        return [ActorCommand(names[i], present=True) for i in coming]
+
+
+# From the pedals and the wheel of a person to a command: reverse, and a wheel that keys can turn.
+
+
+class Hands:
+    """One person's hands and feet; `reset` when the person takes over."""
+
+    def __init__(self, dt: float) -> None:
+        self.dt = dt
+        self.reset()
+
+    def reset(self, steer: float = 0.0) -> None:
+        """Begin, with the wheel turned to `steer`."""
+        self.reverse = False
+        self.pressed = 0.0  # s for which the brake has been held at standstill
+        self.steer = steer
+
+    def update(self, pedals: Pedals, v: float) -> VehicleCommand:
+        """The command of this tick. v: m/s along the body, negative in reverse."""
+        self._select_gear(pedals, v)
+        self._turn(pedals, v)
+        throttle, brake = pedals.throttle, pedals.brake
+        if self.reverse:
+            throttle, brake = brake, throttle
+        return VehicleCommand(throttle, brake, self.steer, pedals.handbrake, self.reverse)
+
+    def _select_gear(self, pedals: Pedals, v: float) -> None:
+        """Reverse by holding the brake at standstill; forward again by the throttle."""
+        standing = abs(v) < STANDSTILL
+        if self.reverse:
+            if standing and pedals.throttle >= PRESSED > pedals.brake:
+                self.reverse = False
+            return
+        if not standing or pedals.brake < PRESSED or pedals.throttle > 0.0:
+            self.pressed = 0.0
+            return
+        self.pressed += self.dt
+        if self.pressed >= HOLD_TO_REVERSE - 1e-9:
+            self.reverse, self.pressed = True, 0.0
+
+    def _turn(self, pedals: Pedals, v: float) -> None:
+        """Turns the wheel by the pedals at `v` m/s: directly, or by keys at a limited rate."""
+        if pedals.method is not Method.KEYBOARD:
+            self.steer = pedals.steer
+            return
+        limit = min(1.0, KEY_A_LAT * WHEELBASE / max(v * v, 1e-6) / MAX_STEER)
+        wanted = pedals.steer * limit
+        back = abs(wanted) < abs(self.steer) or wanted * self.steer < 0.0
+        most = (RETURN if back else TURN) * self.dt * max(limit, 0.05)
+        self.steer += min(max(wanted - self.steer, -most), most)

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
+from typing import NamedTuple
 
 import numpy as np
 
 from skidpad.core.arrays import Flags, Floats
+from skidpad.core.states import LaneInvasion
 from skidpad.core.vocabulary import RelocationReason, Supervision
 from skidpad.evidence.drive.background import background
 from skidpad.evidence.drive.collisions import BEND_RADIUS, Crash, CrashKind, find_crashes
 from skidpad.evidence.drive.conflict import conflicts, true_conflicts
-from skidpad.evidence.drive.lateral import count_invasions, lateral_offset
 from skidpad.evidence.drive.perception import (
     distance_errors,
     dropout_pct,
@@ -32,6 +33,8 @@ from skidpad.recording.run.events import Event
 from skidpad.recording.run.log import RunLog
 from skidpad.roads.queries import RoadMap
 
+V_MIN = 5.0 / 3.6  # m/s, slower the offset says nothing (A-245)
+CHANGE_COOL_DOWN = 12.0  # s (A-031)
 KMH = 3.6
 
 
@@ -302,3 +305,56 @@ def _is_intervention(drive: Drive, begin: int) -> bool:
     end = begin + int(later[0]) if later.size else len(drive.log)
     reasons = [r.reason for r in drive.log.relocations if begin <= drive.row(r.tick) < end]
     return bool(reasons) and reasons[0] not in NO_INTERVENTION
+
+
+# Lane keeping: distance from the lane centre, markings crossed, lane changes.
+
+
+class Offsets(NamedTuple):
+    """Distance from the lane centre in m; None when the ego never drove."""
+
+    mean: float | None
+    max: float | None
+    std: float | None
+
+
+class Invasions(NamedTuple):
+    """Markings that the ego's outline crossed (A-030 to A-032, A-248)."""
+
+    solid: int  # infractions
+    any: int
+    solid_on_highway: int
+    lane_changes: int
+
+
+def lateral_offset(drive: Drive, where: Flags) -> Offsets:
+    """Returns statistics of |offset| above V_MIN in `where`, outside recovery and warm-up (A-245)."""
+    offset = np.abs(drive.place.offset)
+    use = where & drive.free & (drive.v > V_MIN) & ~np.isnan(offset)
+    values = offset[use]
+    if not values.size:
+        return Offsets(None, None, None)
+    return Offsets(float(values.mean()), float(values.max()), float(values.std()))
+
+
+def count_invasions(
+    invasions: Iterable[LaneInvasion], highway: frozenset[int], dt: float
+) -> Invasions:
+    """Counts solid markings as infractions and broken ones as lane changes, at most one per 12 s.
+
+    highway: ids of roads; dt: s per tick.
+    """
+    solid = total = on_highway = changes = 0
+    last_change = -np.inf
+    for invasion in sorted(invasions, key=lambda i: i.tick):
+        total += 1
+        if invasion.marking.startswith("solid"):
+            solid += 1
+            on_highway += invasion.road in highway
+        elif (
+            invasion.marking.startswith("broken")
+            and (invasion.tick - last_change) * dt >= CHANGE_COOL_DOWN
+        ):
+            changes += 1
+            last_change = invasion.tick
+    return Invasions(solid, total, on_highway, changes)

@@ -8,20 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 import polars as pl
+from dtaidistance import dtw
 
 from skidpad.core.arrays import Floats
+from skidpad.core.randomness import stream
 from skidpad.core.setup import DT
 from skidpad.evidence.contrasts import NOT_RUN
-from skidpad.evidence.grip.series import (
-    median_series,
-    median_warping,
-    noise_floor,
-    stack_runs,
-    warping_interval,
-)
+from skidpad.evidence.limits import CONFIDENCE
 from skidpad.evidence.statistics import (
     Comparison,
     Interval,
@@ -31,6 +28,100 @@ from skidpad.evidence.statistics import (
     mean_limits,
 )
 from skidpad.recording.campaign.grip import COLUMNS
+
+RESAMPLES = 200  # decision G-4
+STRIDE = 4  # 20 Hz to 5 Hz, for resamples only (decision G-4)
+
+
+# One representative series from many runs, and how sure its distance to another is (B-123, G-4).
+
+
+# Dynamic time warping between two series of one quantity (B-107, decision G-4).
+
+
+class Cost(str, Enum):
+    """What one pair of values costs."""
+
+    SQUARED = "squared"  # root of the sum of squared differences: what the published values show
+    ABSOLUTE = "absolute"  # sum of absolute differences
+
+
+INNER = {Cost.SQUARED: "squared euclidean", Cost.ABSOLUTE: "euclidean"}
+
+
+def warping_distance(
+    a: Floats, b: Floats, cost: Cost = Cost.SQUARED, max_shift: int | None = None
+) -> float:
+    """Returns the least cost of aligning a (n,) with b (m,) by steps (1,0), (0,1), (1,1); not normalised.
+
+    max_shift: samples by which an alignment may leave the band between the diagonals through the
+    two ends (for n = m this is Sakoe and Chiba's |i - j| <= max_shift); None: no limit. The
+    library counts one more in its `window`, where 1 is the diagonal alone. ValueError for an empty
+    series.
+    """
+    a, b = (np.ascontiguousarray(x, dtype=np.float64) for x in (a, b))
+    if not (a.size and b.size):
+        raise ValueError("warping needs at least one value in each series")
+    window = None if max_shift is None else max_shift + 1
+    # Pruning by the library's Euclidean bound loses alignments that equal the bound: it says inf.
+    return float(dtw.distance_fast(a, b, window=window, inner_dist=INNER[cost], use_pruning=False))
+
+
+def stack_runs(runs: list[Floats]) -> Floats:
+    """Returns (n, T) from n series of their own lengths; NaN after the end of each."""
+    out = np.full((len(runs), max((len(r) for r in runs), default=0)), np.nan)
+    for row, run in zip(out, runs, strict=True):
+        row[: len(run)] = run
+    return out
+
+
+def median_series(runs: Floats) -> Floats:
+    """Returns the median per tick over the runs still alive, until fewer than half are (B-123).
+
+    runs: (n, T), NaN after the end of a run. Returns (T',), T' <= T.
+    """
+    alive = np.count_nonzero(~np.isnan(runs), axis=0)
+    enough = 2 * alive >= len(runs)
+    end = int(np.argmin(enough)) if not enough.all() else runs.shape[1]
+    order, tick = np.sort(runs[:, :end], axis=0), np.arange(end)  # what is absent comes last
+    lower, upper = order[(alive[:end] - 1) // 2, tick], order[alive[:end] // 2, tick]
+    median: Floats = 0.5 * (lower + upper)
+    return median
+
+
+def median_warping(a: Floats, b: Floats, cost: Cost = Cost.SQUARED) -> float:
+    """Returns the warping distance between the medians of two sets of runs (n, T), (m, U) (B-108)."""
+    return warping_distance(median_series(a), median_series(b), cost)
+
+
+def warping_interval(a: Floats, b: Floats, cost: Cost = Cost.SQUARED) -> Interval:
+    """Returns limits of `median_warping` over resampled runs, paired where both sets are equally many.
+
+    Resamples run at 5 Hz; the squared cost grows with the number of ticks, so they are scaled back
+    to full rate.
+    """
+    draw = stream(0, "warping", len(a), len(b))
+    scale = np.sqrt(STRIDE) if cost is Cost.SQUARED else STRIDE
+    slow_a, slow_b = a[:, ::STRIDE], b[:, ::STRIDE]
+    distances = []
+    for _ in range(RESAMPLES):
+        pick_a = draw.integers(0, len(a), len(a))
+        pick_b = pick_a if len(a) == len(b) else draw.integers(0, len(b), len(b))
+        distances.append(scale * median_warping(slow_a[pick_a], slow_b[pick_b], cost))
+    tail = 100.0 * (1.0 - CONFIDENCE) / 2.0
+    low, high = np.percentile(distances, [tail, 100.0 - tail])
+    return Interval(float(low), float(high))
+
+
+def noise_floor(runs: Floats, cost: Cost = Cost.SQUARED) -> float | None:
+    """Returns the distance between the medians of the two halves of runs under one condition.
+
+    It is what chance alone gives (decision G-4). None below four runs.
+    """
+    if len(runs) < 4:
+        return None
+    return median_warping(runs[0::2], runs[1::2], cost)
+
 
 ORIGINAL, REDUCED = "original", "reduced"
 METRICS = ("x", "y", "v", "cvip", "steer", "brake", "throttle")  # B-107

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from itertools import islice
 from typing import Any
 
 import msgspec
@@ -26,15 +28,15 @@ from skidpad.fleet.patterns.clusters import (
     find_clusters,
     recurring,
 )
-from skidpad.fleet.patterns.recurrence import keep_subjects, name_subjects, read_subjects
 from skidpad.fleet.service import CAME, Fleet
 from skidpad.fleet.store.events import add_event
 from skidpad.fleet.store.reading import record_of
 from skidpad.fleet.store.rights import visible
-from skidpad.fleet.store.tables import analyses, clusters, hazards, series
+from skidpad.fleet.store.tables import analyses, clusters, hazards, recurrences, series
 from skidpad.fleet.words import Principal, absent
 from skidpad.recording.hazards.records import HazardRecord
 
+CHUNK = 500  # ids of one query
 HAZARDS_MAX = 20_000  # newest hazards that one analysis looks at
 SERVICE = "analysis"  # actor of what nobody asked for
 
@@ -230,3 +232,57 @@ def to_plain(series: Floats) -> list[list[float]]:
 def from_plain(plain: Sequence[Sequence[float]]) -> Floats:
     """Returns the array of `to_plain`'s values."""
     return np.array(plain, dtype=np.float64).reshape(POINTS, len(SIGNALS))
+
+
+# The identity of a recurring hazard, which outlives each of its alarms.
+#
+# Its subject is the id of the alarm that was its first when it was found. Every alarm that joins it is
+# kept with that subject, so a later analysis knows it by any of them.
+
+
+def name_subjects(groups: Sequence[Sequence[str]], known: Mapping[str, str]) -> list[str]:
+    """Returns the subject of each group of alarms, whose ids are in order of time.
+
+    A group is what most of its alarms belonged to. Where two groups were one, the first in the list
+    keeps the subject, and the other one gets a new one.
+    """
+    taken: set[str] = set()
+    subjects = []
+    for group in groups:
+        votes = Counter(known[id] for id in group if id in known)
+        ranked = sorted(votes, key=lambda subject: (-votes[subject], subject))
+        used = taken | set(known.values())
+        fresh = next((id for id in group if id not in used), group[0])
+        subject = next((s for s in ranked if s not in taken), fresh)
+        taken.add(subject)
+        subjects.append(subject)
+    return subjects
+
+
+def read_subjects(connection: Connection, who: Principal, ids: Sequence[str]) -> dict[str, str]:
+    """Returns the subject of each hazard that an analysis with the same rights gave one."""
+    query = (
+        select(recurrences.c.hazard, recurrences.c.subject)
+        .join(analyses, analyses.c.id == recurrences.c.analysis)
+        .where(analyses.c.tenant == who.tenant, analyses.c.role == who.role.value)
+        .order_by(recurrences.c.at, recurrences.c.analysis)
+    )
+    found: dict[str, str] = {}
+    rest = iter(ids)
+    while some := list(islice(rest, CHUNK)):
+        rows = connection.execute(query.where(recurrences.c.hazard.in_(some)))
+        found |= {row.hazard: row.subject for row in rows}
+    return found
+
+
+def keep_subjects(
+    connection: Connection, analysis: tuple[str, float], subjects: Mapping[str, str]
+) -> None:
+    """Keep the subjects of hazards as an analysis (id, s) found them."""
+    id, at = analysis
+    rows = [
+        {"analysis": id, "hazard": hazard, "subject": subject, "at": at}
+        for hazard, subject in subjects.items()
+    ]
+    if rows:
+        connection.execute(recurrences.insert(), rows)

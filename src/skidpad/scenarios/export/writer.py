@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from enum import Enum
-from math import cos, sin
+from math import cos, radians, sin
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -20,11 +20,15 @@ from scenariogeneration import xosc
 from skidpad.core.vocabulary import SemanticClass, class_of
 from skidpad.recording.files import write_bytes
 from skidpad.scenarios.export.pieces import Vertex, pieces
-from skidpad.scenarios.export.sky_writer import environment_action
 from skidpad.scenarios.export.tracks import Track
 from skidpad.scenarios.reading.entities import GHOST
-from skidpad.scenarios.reading.environment import Environment
+from skidpad.scenarios.reading.environment import CELSIUS, HEAVY, Environment, Fall, Wetness
 
+NOON, MIDNIGHT = 12, 0  # h; where the sun stands is said beside it
+LIGHT = 100_000.0  # lx of a sun in the zenith
+CLEAR = 100_000.0  # m, where a file says nothing of the sight
+_DRY = xosc.PrecipitationType.dry
+_OKTAS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight")
 HEIGHTS = {SemanticClass.TRUCK: 3.5, SemanticClass.BUS: 3.2, SemanticClass.PEDESTRIAN: 1.75}
 EARLY = 0.005  # s that triggers fire before their time, so that rounding delays none
 LINGER = 0.05  # s that who vanishes is still there
@@ -275,3 +279,59 @@ def _after(t: float, sheet: Sheet, point: str = "start") -> Any:
     value = round(t - EARLY, 3) if t > 0.0 or sheet.old else 0.0
     condition = xosc.SimulationTimeCondition(value, rule)
     return xosc.ValueTrigger(point, 0, xosc.ConditionEdge.none, condition, point)
+
+
+# Weather, time of day and road of a run as an <EnvironmentAction>.
+
+
+def environment_action(environment: Environment, *, old: bool) -> Any:
+    """Returns the <EnvironmentAction> of an environment.
+
+    old: by the vocabulary of 1.0, where clouds are words and rain is a share.
+    """
+    elevation = environment.sun_elevation_deg or 0.0
+    sun = xosc.Sun(
+        1.0 if old else LIGHT if elevation > 0.0 else 0.0,
+        round(radians(environment.sun_azimuth_deg or 0.0), 4),
+        round(radians(elevation), 4),
+    )
+    rain = environment.fall_mm_h / HEAVY if old else environment.fall_mm_h
+    kind = xosc.PrecipitationType.rain if environment.fall is Fall.RAIN else _DRY
+    weather = xosc.Weather(
+        _clouds(environment.clouds or 0.0, old=old),
+        sun=sun,
+        fog=xosc.Fog(round(environment.visual_range or CLEAR, 1)),
+        precipitation=xosc.Precipitation(kind, round(rain, 4)),
+        **_temperature(environment, old=old),
+    )
+    wetness = {} if old else {"wetness": getattr(xosc.Wetness, _wetness(environment).value)}
+    scale = 1.0 if environment.friction_scale is None else environment.friction_scale
+    hour = NOON if elevation > 0.0 else MIDNIGHT
+    return xosc.EnvironmentAction(
+        xosc.Environment(
+            environment.name or "weather",
+            xosc.TimeOfDay(False, 2000, 3, 20, hour, 0, 0),
+            weather,
+            xosc.RoadCondition(scale, **wetness),
+        )
+    )
+
+
+def _clouds(share: float, *, old: bool) -> Any:
+    """Returns the enumeration value for a cloud cover of 0..1: oktas, or a cloud state for old versions."""
+    if not old:
+        return getattr(xosc.FractionalCloudCover, f"{_OKTAS[round(8.0 * share)]}Oktas")
+    words = xosc.CloudState
+    return words.free if share < 0.3 else words.cloudy if share < 0.8 else words.overcast
+
+
+def _temperature(environment: Environment, *, old: bool) -> dict[str, float]:
+    """Returns {"temperature": kelvin}; empty for old versions or where the temperature is unknown."""
+    if old or environment.temperature_c is None:
+        return {}
+    return {"temperature": round(environment.temperature_c + CELSIUS, 2)}
+
+
+def _wetness(environment: Environment) -> Wetness:
+    """Returns the wetness of the road; dry where the environment gives none."""
+    return environment.wetness or Wetness.DRY

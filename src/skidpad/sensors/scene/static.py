@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
 from typing import NamedTuple
@@ -11,18 +11,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats, Ints32
-from skidpad.core.vocabulary import LightState
+from skidpad.core.vocabulary import LightState, SemanticClass
 from skidpad.roads.lanes import LaneSamples, LaneTable
 from skidpad.roads.roadside import Roadside, Shape
-from skidpad.sensors.scene.clusters import Clusters, cluster
+from skidpad.roads.terrain import CELL, COARSE, FINE, Heights, terrain_of
 from skidpad.sensors.scene.furniture import cell, furniture_pieces, lamp_mesh
 from skidpad.sensors.scene.grain import NO_GRAIN, grain_table
-from skidpad.sensors.scene.ground import ground_pieces
 from skidpad.sensors.scene.materials import MATERIALS, Material, base_palette
-from skidpad.sensors.scene.mesh import Mesh, merge
+from skidpad.sensors.scene.mesh import Mesh, merge, quads
 from skidpad.sensors.scene.road_mesh import LEVELS, ChunkKey, road_pieces
 from skidpad.sensors.scene.street_light import StreetLight, street_light_of
 
+BULGE = (0.002, 0.002, 0.005, 0.03)  # m, what counts as flat at each level
+APRON = 4000.0  # m, flat land beyond it, out to the horizon
+SIZE = 16  # triangles: 16 m of one lane at full detail
+MARGIN = 1e-6  # m, more than rounding can put a vertex outside its sphere
 # A lamp lights up in its own colour; everything else is dark.
 LIT: dict[LightState, tuple[int, Material]] = {
     LightState.RED: (0, Material.LAMP_RED),
@@ -189,3 +192,105 @@ def _find_lamps(
                 place += [lamp] * size
     as_ints = (np.array(a, dtype=np.int32) for a in (signal, place, rows))
     return Lamps(*as_ints)
+
+
+# Short runs of triangles with a bounding sphere each: what a sensor cannot see costs one test.
+#
+# A road chunk around the ego reaches 24 m ahead and behind; a radar's cone and a camera's picture
+# hold a few of its strips. Runs keep the order of the triangles, so nothing changes in a picture.
+
+
+class Clusters(NamedTuple):
+    """K runs of at most SIZE triangles with V vertices of their own and T triangles in all."""
+
+    vertices: Floats  # (V, 3) world, m
+    triangles: Ints32  # (T, 3) indices relative to the cluster's first vertex
+    centre: Floats  # (K, 3)
+    radius: Floats  # (K,)
+    vertex_start: Ints32  # (K,)
+    vertex_count: Ints32  # (K,)
+    triangle_start: Ints32  # (K,)
+    triangle_count: Ints32  # (K,)
+
+
+def cluster(vertices: Floats, triangles: Ints32, block_size: Ints32) -> tuple[Clusters, Ints32]:
+    """Cut blocks of consecutive triangles into clusters; also how many each block has.
+
+    vertices: (V, 3); triangles: (T, 3) indices into them; block_size: (B,) triangles, T in all.
+    """
+    per_block = (-(-block_size // SIZE)).astype(np.int32)
+    block_first = np.repeat(np.cumsum(block_size) - block_size, block_size)
+    place = (np.arange(len(triangles)) - block_first) // SIZE
+    number = np.repeat(np.cumsum(per_block) - per_block, block_size) + place
+    pairs = number[:, None].astype(np.int64) * len(vertices) + triangles
+    distinct, corner = np.unique(pairs, return_inverse=True)
+    points = vertices[distinct % len(vertices)]
+    count = int(per_block.sum())
+    vertex_count = np.bincount(distinct // len(vertices), minlength=count)
+    vertex_start = np.cumsum(vertex_count) - vertex_count
+    low, high = np.minimum.reduceat(points, vertex_start), np.maximum.reduceat(points, vertex_start)
+    centre = (low + high) / 2.0
+    reach = np.linalg.norm(points - np.repeat(centre, vertex_count, axis=0), axis=1)
+    triangle_count = np.bincount(number, minlength=count)
+    relative = corner.reshape(-1, 3) - vertex_start[number][:, None]
+    clusters = Clusters(
+        points,
+        relative.astype(np.int32),
+        centre,
+        np.maximum.reduceat(reach, vertex_start) + MARGIN,
+        vertex_start.astype(np.int32),
+        vertex_count.astype(np.int32),
+        (np.cumsum(triangle_count) - triangle_count).astype(np.int32),
+        triangle_count.astype(np.int32),
+    )
+    return clusters, per_block
+
+
+# Triangles of the terrain under and around the roads. Decoration only: nothing drives on it.
+
+
+def ground_pieces(samples: LaneSamples) -> Iterator[tuple[ChunkKey, list[Mesh]]]:
+    """Terrain chunks on a grid of `CHUNK` m, and the apron around them."""
+    x0, y0, height = terrain_of(samples)
+    nx, ny = height.shape
+    for i in range(0, nx - 1, COARSE):
+        for j in range(0, ny - 1, COARSE):
+            bulge = _bulge(height[i : i + COARSE + 1, j : j + COARSE + 1])
+            strides = [COARSE if bulge < limit else FINE for limit in BULGE]
+            tiles = {stride: _tile(height, x0, y0, i, j, stride) for stride in set(strides)}
+            yield ("ground", i, j, 0), [tiles[stride] for stride in strides]
+    x1, y1 = x0 + (nx - 1) * CELL, y0 + (ny - 1) * CELL
+    apron = _apron(x0, y0, x1, y1, float(height.min()))
+    yield ("apron", 0, 0, 0), [apron] * LEVELS
+
+
+def _bulge(tile: Heights) -> float:
+    """Largest height in m by which a tile differs from the surface through its four corners."""
+    t = np.linspace(0.0, 1.0, len(tile))
+    a, b = t[:, None], t[None, :]
+    flat = (1 - a) * ((1 - b) * tile[0, 0] + b * tile[0, -1]) + a * (
+        (1 - b) * tile[-1, 0] + b * tile[-1, -1]
+    )
+    twist = abs(tile[0, 0] + tile[-1, -1] - tile[0, -1] - tile[-1, 0]) / 4.0
+    return float(np.abs(tile - flat).max() + twist)
+
+
+def _tile(height: Heights, x0: float, y0: float, i: int, j: int, stride: int) -> Mesh:
+    """Returns the mesh of one tile of terrain, every `stride` cells a vertex."""
+    at = np.arange(0, COARSE + 1, stride)
+    a, b = np.meshgrid(i + at, j + at, indexing="ij")
+    vertices = np.stack([x0 + a * CELL, y0 + b * CELL, height[a, b]], axis=-1).reshape(-1, 3)
+    n = len(at)
+    p, q = np.meshgrid(np.arange(n - 1), np.arange(n - 1), indexing="ij")
+    corners = np.stack([p * n + q, (p + 1) * n + q, (p + 1) * n + q + 1, p * n + q + 1], axis=-1)
+    return Mesh.of(vertices, quads(corners), SemanticClass.TERRAIN, Material.GRASS)
+
+
+def _apron(x0: float, y0: float, x1: float, y1: float, z: float) -> Mesh:
+    """Four flat trapezia from the terrain's border to the horizon."""
+    inner = np.array([[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]])
+    out = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * APRON
+    corners = np.array([[i, (i + 1) % 4, 4 + (i + 1) % 4, 4 + i] for i in range(4)])
+    return Mesh.of(
+        np.concatenate([inner, inner + out]), quads(corners), SemanticClass.TERRAIN, Material.GRASS
+    )

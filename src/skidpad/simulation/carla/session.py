@@ -6,25 +6,25 @@ import socket
 from collections.abc import Iterable
 from dataclasses import replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import Pose
+from skidpad.core.randomness import stream
 from skidpad.core.setup import ActorCommand, Setup
-from skidpad.core.states import ActorStates, VehicleCommand, WorldTruth
-from skidpad.core.vocabulary import TrafficStart
+from skidpad.core.states import ActorStates, EgoEstimate, VehicleCommand, WorldTruth
+from skidpad.core.vocabulary import LightState, TrafficStart
 from skidpad.roads.bundled import load_map
-from skidpad.roads.queries import LanePoint
+from skidpad.roads.queries import LanePoint, RoadMap
 from skidpad.simulation.carla import truth
 from skidpad.simulation.carla.actor_rows import ActorRow, place_of, spawn_setup, table_of
 from skidpad.simulation.carla.actor_set import EGO, ActorSet
 from skidpad.simulation.carla.connection import Connection
 from skidpad.simulation.carla.events import EgoEvents
 from skidpad.simulation.carla.grip import prepare_grip
-from skidpad.simulation.carla.lights import Programme, TrafficLights
-from skidpad.simulation.carla.odometry import Odometry
 from skidpad.simulation.carla.options import Optimisation
 from skidpad.simulation.carla.pictures import Pictures
 from skidpad.simulation.carla.reader import Reader
@@ -33,7 +33,9 @@ from skidpad.simulation.carla.sensors import Sensors
 from skidpad.simulation.carla.traffic import Traffic, spawn_fixed, spawn_random
 from skidpad.simulation.carla.watchdog import rest
 from skidpad.simulation.carla.weather import set_weather
+from skidpad.simulation.world.lights import Lights
 
+TRACK = 0.8  # of a car's width, between its wheels
 SETTLE = 8  # ticks in which vehicles fall onto the road and sensors begin to send
 SETTLE_MAX = 60
 SETTLE_PAUSE = 0.02  # s after each of them, for the wheel's threads to subscribe
@@ -282,3 +284,89 @@ def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("", 0))
         return int(probe.getsockname()[1])
+
+
+# Traffic lights by OpenDRIVE signal id: what they show (A-265), and our programme on them.
+
+
+class TrafficLights:
+    """Finds the lights once when cached, else at every reading."""
+
+    def __init__(self, world: Any, cached: bool) -> None:
+        self._world = world
+        self._known = find_lights(world) if cached else None
+
+    def read(self) -> dict[int, LightState]:
+        """Returns states by signal id, from the client's newest snapshot."""
+        known = find_lights(self._world) if self._known is None else self._known
+        return {id: LightState(int(light.get_state())) for id, light in known}
+
+
+def find_lights(world: Any) -> list[tuple[int, Any]]:
+    """Returns lights with their OpenDRIVE signal ids, sorted by id; those without a number are left out."""
+    found = []
+    for light in world.get_actors().filter("traffic.traffic_light*"):
+        text = light.get_opendrive_id()
+        if text.lstrip("-").isdigit():  # a light that the map does not know cannot be named
+            found.append((int(text), light))
+    return sorted(found, key=lambda pair: pair[0])
+
+
+class Programme:
+    """The cycle of the embedded simulator, with the seed's phases (decision M-2), on the server.
+
+    The server's own clocks stand still meanwhile.
+    """
+
+    def __init__(self, carla: Any, world: Any, map: RoadMap, seed: int, dt: float) -> None:
+        self._carla = carla
+        self._cycle, self._dt, self._tick = Lights.pretimed(map, seed, dt), dt, 0
+        self._lights = find_lights(world)
+        self._shown: dict[int, LightState] = {}
+        world.freeze_all_traffic_lights(True)
+        self.show(0)
+
+    def hold(self, held: Iterable[tuple[int, LightState]]) -> None:
+        """Holds lights in states that a client has set, by signal id, from the next `show` on."""
+        self._cycle.hold(held)
+
+    def show(self, tick: int) -> None:
+        """Sets the lights as belongs to this tick; the server shows it in the coming one."""
+        while self._tick < tick:
+            self._cycle.advance(self._dt)
+            self._tick += 1
+        for id, light in self._lights:
+            state = self._cycle.by_id.get(id)
+            if state is not None and self._shown.get(id) is not state:
+                light.set_state(self._carla.TrafficLightState.values[int(state)])
+                self._shown[id] = state
+
+
+# What the ego's localisation and its own sensors say of itself.
+
+
+class Odometry:
+    """Pose with noise; rims turn as the body moves (CARLA tells no wheel speeds)."""
+
+    def __init__(self, seed: int, sigma: float, width: float) -> None:
+        """sigma: m, noise of the position. width: m, of the ego."""
+        self._rng = stream(seed, "ego", "localisation")
+        self._sigma, self._half_track = sigma, TRACK * width / 2.0
+
+    def read(self, s: ActorStates, gear: int) -> EgoEstimate:
+        """Returns the estimate of this tick; call it once per tick, for the noise is drawn anew."""
+        pose = s.pose(EGO)
+        if self._sigma > 0.0:
+            dx, dy = self._rng.normal(0.0, self._sigma, 2).tolist()
+            pose = replace(pose, x=pose.x + dx, y=pose.y + dy)
+        v, yaw_rate = truth.along(s, EGO), float(s.yaw_rate[EGO])
+        left, right = v - yaw_rate * self._half_track, v + yaw_rate * self._half_track
+        return EgoEstimate(
+            pose=pose,
+            speed=v,
+            yaw_rate=yaw_rate,
+            ax=float(s.ax[EGO]),
+            ay=float(s.ay[EGO]),
+            wheel_speeds=(left, right, left, right),
+            gear=gear,
+        )

@@ -21,9 +21,8 @@ from skidpad.evidence.channels.judging.curves import (
 )
 from skidpad.evidence.channels.judging.evaluation import Evaluation
 from skidpad.evidence.channels.judging.reference import NAME as REFERENCE
-from skidpad.evidence.channels.judging.segments import judge
+from skidpad.evidence.channels.judging.segments import Weights, judge, weights_from
 from skidpad.evidence.channels.judging.truth import marks
-from skidpad.evidence.channels.judging.weights import Weights, weights_from
 from skidpad.evidence.channels.matching import Span, Weighed, score, tally
 from skidpad.evidence.channels.timefilter import TimeFilter
 from skidpad.recording.channels.cycles import cycles

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from math import nan
+from typing import NamedTuple
 
 import numpy as np
 
 from skidpad.core.arrays import Floats
 from skidpad.core.channels import Cycle
+from skidpad.core.errors import FileError
 from skidpad.core.vocabulary import HazardType, Stratum
 from skidpad.evidence.channels.hazards import (
     SCORED_HAZARDS,
@@ -44,10 +48,9 @@ from skidpad.evidence.channels.judging.curves import (
 from skidpad.evidence.channels.judging.facts import Observer, times_of, warm_times
 from skidpad.evidence.channels.judging.reference import NAME as REFERENCE
 from skidpad.evidence.channels.judging.reference import at_the_truths_limits, reference
-from skidpad.evidence.channels.judging.truth.marks import TrueHazard
+from skidpad.evidence.channels.judging.truth.marks import JUMP_KIND, TrueHazard
 from skidpad.evidence.channels.judging.truth.simulator import simulator_truth
 from skidpad.evidence.channels.judging.truth.worldmodel import world_model_truth
-from skidpad.evidence.channels.judging.weights import Weights, weights_from
 from skidpad.evidence.channels.matching import Span, match, merge_spans
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
 from skidpad.evidence.channels.timefilter import TimeFilter
@@ -268,3 +271,55 @@ def _apply_scaled(
 def _spans(hazards: Iterable[TrueHazard]) -> tuple[Span, ...]:
     """Returns the spans of true hazards, without what they are about."""
     return tuple(Span(h.hazard, h.t_start, h.t_end) for h in hazards)
+
+
+# How much a true hazard of the stratum of risky drivers counts (importance sampling).
+
+
+class Weights(NamedTuple):
+    """What a recording says of what was drawn more often than it occurs; 1: as it occurs."""
+
+    drivers: Mapping[str, tuple[float, float]] = {}  # by name: of his headway and of his cut-ins
+    jumps: float = 1.0  # of a channel's position
+
+    def weigh(self, hazard: TrueHazard) -> Span:
+        """Returns a true hazard as a span that counts by the habit that brought it about.
+
+        Being tailgated comes from a follower's headway, tailgating from a cut-in, a jump from the
+        channel; anything else counts 1.
+        """
+        match hazard.hazard:
+            case HazardType.INCONSISTENT_LOCALISATION if hazard.kind == JUMP_KIND:
+                weight = self.jumps
+            case HazardType.EGO_TAILGATED:
+                weight = self._mean(hazard, 0)
+            case HazardType.EGO_TAILGATING:
+                weight = self._mean(hazard, 1)
+            case _:
+                weight = 1.0
+        return Span(hazard.hazard, hazard.t_start, hazard.t_end, weight=weight)
+
+    def _mean(self, hazard: TrueHazard, column: int) -> float:
+        """Returns the mean of a column over the hazard's known drivers, 1 where none is known."""
+        own = [self.drivers[a][column] for a in hazard.about if a in self.drivers]
+        return sum(own) / len(own) if own else 1.0
+
+
+def weights_from(context: Mapping[str, str]) -> Weights:
+    """Returns the weights in a recording's context, 1 where it has none; FileError where they are damaged."""
+    text, jumps = context.get("weights", "{}"), context.get("weight_of_jumps", "1")
+    try:
+        drivers = {f"actor {i}": (float(a), float(b)) for i, (a, b) in json.loads(text).items()}
+    except (ValueError, TypeError, AttributeError):
+        raise FileError(
+            f"the recording's words `weights` must be JSON of two numbers per actor, got {text[:60]!r}"
+        ) from None
+    try:
+        weight = float(jumps)
+    except ValueError:
+        weight = nan
+    if not 0.0 < weight <= 1.0:  # nor is NaN
+        raise FileError(
+            f"the recording's word `weight_of_jumps` must be a number in (0, 1], got {jumps[:60]!r}"
+        )
+    return Weights(drivers, weight)

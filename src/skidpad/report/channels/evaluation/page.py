@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -14,9 +15,17 @@ from skidpad.core.reading import convert_plain, decode_json, read_bytes
 from skidpad.evidence.channels.findings import FINDINGS
 from skidpad.evidence.channels.judging.reference import NAME as REFERENCE
 from skidpad.evidence.channels.judging.segments import TOLD
+from skidpad.evidence.channels.redundancy import (
+    EVENTS,
+    Difference,
+    DriverRow,
+    compare_drivers,
+    differences,
+)
+from skidpad.evidence.statistics import interval_text, p_text, rate_text
 from skidpad.evidence.verdicts import Judgement, judge
+from skidpad.recording.channels.drives import read_outcomes
 from skidpad.report.channels.evaluation import scores
-from skidpad.report.channels.evaluation.redundancy import redundancy
 from skidpad.report.channels.evaluation.routes import route_blocks
 from skidpad.report.channels.evaluation.scores import (
     FEW,
@@ -34,6 +43,7 @@ from skidpad.report.elements.page import (
     Answer,
     Answers,
     Block,
+    Cell,
     Figure,
     Number,
     Numbers,
@@ -43,8 +53,15 @@ from skidpad.report.elements.page import (
     words,
     write_report_page,
 )
+from skidpad.report.elements.tables import Column, Format, table
 from skidpad.report.elements.verdicts import tally_text, verdict_blocks
 
+TITLES = {
+    "collisions": "collisions",
+    "collisions_struck": "of these, hit by the ego",
+    "red_lights_run": "red lights run",
+    "stalls": "stalls",
+}
 EVALUATION = "evaluation.json"
 LEAD = """A detection is right when a true hazard of the same kind overlaps it within 1 s; each counts once. \
 Two truths judge: the simulator's, which knows what was really so, and the world model's, which takes \
@@ -236,3 +253,49 @@ def _curve_figure(rows: Row, hours: float) -> str:
         Chart(false, axis, "false alarms per hour"),
     ]
     return curves(charts, width=10.0)
+
+
+# Whether redundancy pays: the same seeds driven by one channel and by the arbiter (decision C-9).
+
+
+def redundancy(folder: Path) -> list[Block]:
+    """Outcomes per driver, and each channel alone less the arbiter at equal seeds."""
+    outcomes = read_outcomes([folder])
+    drivers = compare_drivers(outcomes)
+    if len(drivers) < 2 or not drivers[0].segments:
+        return [
+            Text(
+                "Not shown: it needs the same seeds driven by the arbiter and by a channel alone "
+                "(`skidpad channels drive --drive-by NAME` into a folder below this one).",
+                tone="note",
+            )
+        ]
+    columns = [
+        Column[DriverRow]("driven by", lambda d: d.drive_by),
+        Column[DriverRow]("segments", lambda d: d.segments, "driven by all"),
+        Column[DriverRow]("hours", lambda d: d.hours, format=Format(".2f")),
+        Column[DriverRow]("km", lambda d: d.km, format=Format(".1f")),
+        *(
+            Column(TITLES[event], partial(_rate, event), "count, rate per hour below")
+            for event in EVENTS
+        ),
+    ]
+    return [
+        table(columns, drivers, "Outcomes by driver, on the seeds that all have driven"),
+        Text(" ".join(map(_sentence, differences(outcomes)))),
+    ]
+
+
+def _rate(event: str, driver: DriverRow) -> Cell:
+    """Returns a cell with a driver's number of events and, as note, their rate per segment or hour."""
+    rate = driver.rates[event]
+    return Cell(str(rate.events), float(rate.events), note=rate_text(rate, "segment", "h"))
+
+
+def _sentence(d: Difference) -> str:
+    """Returns a sentence on the paired difference per segment: interval, p value, number of pairs."""
+    c = d.pairs
+    return (
+        f"{d.drive_by} alone less the arbiter, {TITLES[d.event]} per segment: {c.mean:+.3g} "
+        f"({interval_text(c.interval, c.n, 'pair')}, {p_text(c.p)}, {c.n} pairs)."
+    )

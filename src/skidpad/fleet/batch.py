@@ -20,7 +20,6 @@ from skidpad.fleet.identity import digest
 from skidpad.fleet.words import Limits, Refused
 from skidpad.recording.hazards.text import HEADER
 
-Word = msgspec.Meta(max_length=200)
 END = b"\nZ\n"
 NUMBER_MAX = 1.0e9  # m or s, of any number in a head
 WORDS_MAX = 64

@@ -389,10 +389,3 @@ def signal_ahead(
         if lane < 0:
             return -1, inf
     return -1, inf
-
-
-@inner_kernel
-def distance_kernel(a: LaneArrays, lane: int, s: float, x: float, y: float) -> float:
-    """Returns the plane distance in m from a point to a place on a lane."""
-    px, py, _, _, _, _, _, _, _ = sample_kernel(a, lane, s)
-    return sqrt((x - px) ** 2 + (y - py) ** 2)

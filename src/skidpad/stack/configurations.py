@@ -21,15 +21,6 @@ CONFIGURATIONS: dict[int, Functions] = {
     4: frozenset({Function.ACC, Function.LCA, Function.TLA, Function.RESUME, Function.LIMITER}),
 }
 
-TITLES: dict[int, str] = {
-    0: "baseline, no ADAS",
-    1: "ACC only",
-    2: "ACC + LCA",
-    3: "ACC + LCA + traffic-light assist",
-    4: "full package, 80 km/h limiter",
-}
-
-
 # ours: their speed stays inside the envelope in place of the fixed limit (docs/envelope.md)
 GOVERNED: dict[int, Functions] = {
     5: CONFIGURATIONS[3],

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from skidpad.core.frames import SensorFrame
 from skidpad.core.specs import SensorSpec
-from skidpad.core.states import StackReport, VehicleCommand
+from skidpad.core.states import VehicleCommand
 
 if TYPE_CHECKING:
     from skidpad.roads.queries import RoadMap
@@ -28,9 +28,3 @@ class Stack(Protocol):
     def tick(self, frame: SensorFrame) -> VehicleCommand:
         """Returns the command for the coming step."""
         ...
-
-
-class ReportingStack(Stack, Protocol):
-    """A stack that also explains itself."""
-
-    report: StackReport

@@ -8,10 +8,10 @@ import errno
 import os
 import re
 from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Generic, Protocol, TypeVar
 from zlib import crc32
 
@@ -62,7 +62,7 @@ class Entry(Generic[K, M]):
 E = TypeVar("E", bound=Entry[Any, Any])
 
 
-class Ledger(Generic[E]):
+class Ledger(Generic[E], AbstractContextManager["Ledger[E]"]):
     """The open ledger of the one process that writes a campaign; use it as a context."""
 
     def __init__(
@@ -150,15 +150,7 @@ class Ledger(Generic[E]):
             os.close(self._file)
             self._file = -1
 
-    def __enter__(self) -> Ledger[E]:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
 

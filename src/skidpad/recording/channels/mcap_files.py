@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Protocol
 
 import mcap.records
@@ -93,7 +93,7 @@ class TopicInfo:
     t_last: float
 
 
-class ChannelWriter:
+class ChannelWriter(AbstractContextManager["ChannelWriter"]):
     """Writes a channel recording; times must not run backwards by the caller's own clock."""
 
     def __init__(self, path: Path, channels: Sequence[str]) -> None:
@@ -171,15 +171,7 @@ class ChannelWriter:
             self._writer.finish()  # type: ignore[no-untyped-call]
             self._file.close()
 
-    def __enter__(self) -> ChannelWriter:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
 

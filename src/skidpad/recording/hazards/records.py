@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from skidpad.core.channels import Cycle
@@ -60,7 +60,7 @@ class HazardRecord:
     worlds: tuple[Cycle, ...] = ()  # from 5 s before to 5 s after
 
 
-class HazardWriter:
+class HazardWriter(AbstractContextManager["HazardWriter"]):
     """Writes records as they close, text and index together."""
 
     def __init__(self, folder: Path) -> None:
@@ -87,15 +87,7 @@ class HazardWriter:
         self._text.close()
         self._index.close()
 
-    def __enter__(self) -> HazardWriter:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from skidpad.core.errors import InputError
 from skidpad.core.names import path_part
-from skidpad.core.vocabulary import ActorKind, SemanticClass
+from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind
 from skidpad.recording.files import write_bytes
 from skidpad.recording.run.log import RunLog
 from skidpad.roads.bundled import FOLDER, load_map
@@ -21,16 +21,6 @@ from skidpad.scenarios.reading.environment import Environment
 
 DATE = datetime(1970, 1, 1)  # noqa: DTZ001  # the library writes naive times
 EGO = 0  # row of the log's tables
-CLASSES = {
-    ActorKind.CAR: SemanticClass.CAR,
-    ActorKind.VAN: SemanticClass.CAR,
-    ActorKind.TRUCK: SemanticClass.TRUCK,
-    ActorKind.BUS: SemanticClass.BUS,
-    ActorKind.MOTORCYCLE: SemanticClass.MOTORCYCLE,
-    ActorKind.BICYCLE: SemanticClass.BICYCLE,
-    ActorKind.PEDESTRIAN: SemanticClass.PEDESTRIAN,
-    ActorKind.PROP: SemanticClass.DYNAMIC,
-}
 
 
 def export_run(
@@ -103,7 +93,7 @@ def _track(log: RunLog, i: int, name: str, there: np.ndarray) -> Track:
         name,
         "",
         i == EGO,
-        CLASSES[ActorKind(int(table.kind[i]))],
+        LABEL_OF_KIND[ActorKind(int(table.kind[i]))],
         (float(table.length[i]), float(table.width[i]), 0.0, 0.0),
         t=np.round(log.t[there] - log.t[0], 3).tolist(),
         x=x.tolist(),

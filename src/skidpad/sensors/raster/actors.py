@@ -12,8 +12,6 @@ from skidpad.sensors.scene.bodies import body_mesh
 from skidpad.sensors.scene.mesh import Mesh
 from skidpad.sensors.scene.static import pixel_key
 
-MAX_ACTORS = 32_766  # the instance has 15 bits of an int32 key
-
 
 def make_actors(table: ActorTable) -> Actors:
     """Meshes of the table's actors; actors of the same shape share one."""

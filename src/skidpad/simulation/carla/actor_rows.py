@@ -10,12 +10,13 @@ import numpy as np
 
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.geometry import Pose
-from skidpad.core.setup import ActorSetup, LanePosition
+from skidpad.core.setup import ActorSetup
 from skidpad.core.states import ActorTable
 from skidpad.core.vocabulary import ActorKind, Control
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.carla import blueprints
 from skidpad.simulation.carla.axes import from_vector, to_transform
+from skidpad.simulation.world.actors import place_of
 
 LIFT = 0.5  # m above the road at spawning
 WALKER_LIFT = 1.2  # m; a walker's origin is its middle

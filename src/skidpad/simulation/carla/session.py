@@ -20,7 +20,7 @@ from skidpad.core.vocabulary import LightState, TrafficStart
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import LanePoint, RoadMap
 from skidpad.simulation.carla import truth
-from skidpad.simulation.carla.actor_rows import ActorRow, place_of, spawn_setup, table_of
+from skidpad.simulation.carla.actor_rows import ActorRow, spawn_setup, table_of
 from skidpad.simulation.carla.actor_set import EGO, ActorSet
 from skidpad.simulation.carla.connection import Connection
 from skidpad.simulation.carla.events import EgoEvents
@@ -33,6 +33,7 @@ from skidpad.simulation.carla.sensors import Sensors
 from skidpad.simulation.carla.traffic import Traffic, spawn_fixed, spawn_random
 from skidpad.simulation.carla.watchdog import rest
 from skidpad.simulation.carla.weather import set_weather
+from skidpad.simulation.world.actors import place_of
 from skidpad.simulation.world.lights import Lights
 
 TRACK = 0.8  # of a car's width, between its wheels

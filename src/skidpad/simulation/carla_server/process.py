@@ -7,7 +7,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Sequence
-from types import TracebackType
+from contextlib import AbstractContextManager
 
 from skidpad.core.errors import BackendError
 
@@ -15,7 +15,7 @@ READY = re.compile(r"ready: CARLA \S+ on \S+:(\d+)")
 STOP_LIMIT = 10.0  # s
 
 
-class ServerProcess:
+class ServerProcess(AbstractContextManager["ServerProcess"]):
     """`skidpad carla-server` on a free port of 127.0.0.1; a context manager."""
 
     def __init__(self, options: Sequence[str] = (), start_limit: float = 600.0) -> None:
@@ -65,13 +65,5 @@ class ServerProcess:
         """Returns whether the server's process still runs."""
         return self._process.poll() is None
 
-    def __enter__(self) -> ServerProcess:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.stop()

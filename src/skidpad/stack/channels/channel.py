@@ -34,7 +34,6 @@ YIELD_SPEED = 4.0  # m/s at a yield line before the road is seen to be free
 CLEAR_REACH = 45.0  # m around a line in which other vehicles matter
 CLEAR_TIME = 5.0  # s, critical gap of minor streets (HCM 2010, 4.1 to 7.1 s)
 RELIEF = 1.5  # s for a change of driver before a light: dwell 1 s and the next one's own reaction
-PATIENCE = 12.0  # s after which a driver who waited goes when others stand
 CORNERS = 4
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from skidpad.campaign.studies.grip_judging import (
+from grip_judging import (
     Estimates,
     estimate_again,
     judge_estimates,

@@ -6,7 +6,7 @@ from math import inf, isnan
 import numpy as np
 import pytest
 
-from skidpad.campaign.studies.grip_judging import Estimates, judge_estimates
+from grip_judging import Estimates, judge_estimates
 from skidpad.envelope.belief import CHANGE, GripBelief, prior_grip, prior_of, quantile
 from skidpad.envelope.grip import GripEstimator
 from skidpad.envelope.signals import BRAKE_BAR, CarSignals

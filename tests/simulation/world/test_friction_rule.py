@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from friction_rule import FRICTION_RULE
 
 from skidpad.core.errors import ConfigError, FileError
-from skidpad.core.friction import FRICTION_RULE
 from skidpad.core.geometry import Pose
 from skidpad.core.setup import ActorSetup, LanePosition, Setup
 from skidpad.core.surface import SurfacePatch

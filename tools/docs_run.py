@@ -8,8 +8,8 @@ A comment before a block says how it is run:
     <!-- quick: --seeds 24 => --seeds 1; --duration 60 => --duration 2 -->   in CI with smaller values
     <!-- not run: needs Docker -->                                           never, and why
 
-Blocks of one page share a folder and run in order. Lines without `$` are what the commands print.
-Tutorials and docs/extending.md are run by tests of their own.
+Blocks of one page share a folder and run in order. Lines without `$` are what the commands print; a
+block with a title is a file of that name. docs/extending.md is run by tests of its own.
 """
 
 from __future__ import annotations
@@ -34,10 +34,11 @@ RECORD = ROOT / "docs" / "results" / "docs-run.csv"
 COLUMNS = ("page", "block", "begins", "processor_s", "date", "commit")
 BLOCK = re.compile(
     r"(?:^<!-- (?P<word>quick|not run): (?P<note>[^\n]*?) -->\n\s*)?"
-    r"^```(?P<language>console|python)(?P<title>[^\n]*)\n(?P<text>.*?)^```",
+    r"^```(?:(?P<language>console|python)|\w+(?= title=))(?: title=\"(?P<title>[\w./-]+)\")?\n"
+    r"(?P<text>.*?)^```",
     re.DOTALL | re.MULTILINE,
 )
-ELSEWHERE = ("tutorials/", "extending.md")
+ELSEWHERE = ("extending.md",)
 SET_UP = re.compile(r"^(make run|source |pip install)")  # what the environment has been through
 LONGEST_S = 3600.0
 
@@ -52,6 +53,7 @@ class Block:
     text: str
     word: str | None
     note: str
+    title: str = ""  # of a file that the block holds
 
     @property
     def is_run(self) -> bool:
@@ -66,7 +68,7 @@ class Block:
             if old not in text:
                 raise ValueError(f"{self.page}, block {self.number}: there is no {old!r} to change")
             text = text.replace(old, new)
-        if self.language == "python":
+        if self.language != "console":
             return text, []
         return split_console(text)
 
@@ -94,12 +96,13 @@ def pages() -> list[Path]:
 
 
 def blocks_of(page: Path) -> Iterator[Block]:
-    """Yield the console and Python blocks of a page in order."""
+    """Yield the console and Python blocks of a page, and the files that it holds, in order."""
     text = page.read_text(encoding="utf-8")
     for number, found in enumerate(BLOCK.finditer(text), start=1):
         yield Block(
             page.relative_to(ROOT).as_posix(), number,
-            found["language"], found["text"], found["word"], found["note"] or "",
+            found["language"] or "", found["text"], found["word"], found["note"] or "",
+            found["title"] or "",
         )  # fmt: skip
 
 
@@ -110,7 +113,9 @@ def run_block(block: Block, folder: Path, quick: bool) -> float:
         RuntimeError: it failed, or did not print what the page says.
     """
     script, printed = block.script(quick)
-    if not script.strip():
+    if block.title:
+        (folder / block.title).write_text(script, encoding="utf-8")
+    if block.title or not script.strip():
         return 0.0
     if block.language == "python":
         name = "test_block.py" if "def test_" in script else "block.py"

@@ -49,6 +49,13 @@ def test_a_smaller_value_must_be_in_the_block() -> None:
         block("$ a --n 9\n", "quick", "--m 9 => --m 1").script(quick=True)
 
 
+def test_a_block_with_a_title_is_a_file(tmp_path: Path) -> None:
+    page = docs_run.ROOT / "docs" / "tutorials" / "own-scenario.md"
+    (scenario,) = (b for b in docs_run.blocks_of(page) if b.title)
+    assert docs_run.run_block(scenario, tmp_path, quick=True) == 0.0
+    assert (tmp_path / "cut_in.xosc").read_text().startswith("<?xml")
+
+
 @pytest.mark.parametrize("text", ["$ false\n", "$ echo a\nb\n"])
 def test_a_block_that_does_otherwise_fails(text: str, tmp_path: Path) -> None:
     with pytest.raises(RuntimeError, match=r"a\.md, block 1"):

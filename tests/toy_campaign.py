@@ -21,7 +21,7 @@ class Toss:
     def name(self):
         return f"{self.cell}-{self.number:03d}"
 
-    def resolved(self):
+    def to_identity(self):
         return {"cell": self.cell, "number": self.number, "share": self.share}
 
 

@@ -83,9 +83,9 @@ class Trial:
         """Wall time after which the run counts as hanging."""
         return tuning_run(self.candidate, self.seed).deadline_s
 
-    def resolved(self) -> dict[str, Any]:
+    def to_identity(self) -> dict[str, Any]:
         """Everything that decides the run, as plain data."""
-        return tuning_run(self.candidate, self.seed).resolved()
+        return tuning_run(self.candidate, self.seed).to_identity()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

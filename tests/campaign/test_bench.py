@@ -82,6 +82,6 @@ def test_the_measured_files_do_something(tmp_path: Path) -> None:
 def test_a_target_is_a_bound_from_one_side() -> None:
     slow = bench_scenarios.ScenarioCost("x", 299.0, "times real time", 300.0, most=False)
     long = bench_scenarios.ScenarioCost("x", 2.1, "s", 2.0, most=True)
-    assert not slow.met
-    assert not long.met
-    assert bench_scenarios.ScenarioCost("x", 1.9, "s", 2.0, most=True).met
+    assert not slow.is_met
+    assert not long.is_met
+    assert bench_scenarios.ScenarioCost("x", 1.9, "s", 2.0, most=True).is_met

@@ -37,7 +37,7 @@ def test_the_matrix_is_every_driver_in_every_weather_with_common_seeds():
 @pytest.mark.req("A-210")
 def test_traffic_stands_at_the_fixed_places_unless_asked():
     assert RunSpec().course.traffic is TrafficStart.FIXED
-    runs = plan(template(), Drivers().chosen(), Climate().chosen())
+    runs = plan(template(), Drivers().find_drivers(), Climate().find_weathers())
     assert all(c.course.traffic is TrafficStart.FIXED for c in runs)
 
 
@@ -45,7 +45,9 @@ def test_traffic_stands_at_the_fixed_places_unless_asked():
 def test_the_command_line_reaches_the_cells():
     run = Tuned(set=("mu_ref=0.7",)).resolve(RunSpec(duration=60.0), grip="none", range=None)
     run = replace(run, course=Roads(traffic=TrafficStart.RANDOM, vehicles=40))
-    cells = plan(run, Drivers(configs="3").chosen(), Climate(weather="rain-night").chosen(), 2)
+    cells = plan(
+        run, Drivers(configs="3").find_drivers(), Climate(weather="rain-night").find_weathers(), 2
+    )
     assert [c.seed for c in cells] == [1, 2]
     (one, _) = cells
     assert (one.driver.label, one.weather.name) == ("3", "rain-night")
@@ -60,7 +62,9 @@ def test_the_command_line_reaches_the_cells():
 
 @pytest.mark.req("A-201")
 def test_recovery_and_wrong_way_watch_over_every_configuration():
-    for run in plan(template(), Drivers().chosen(), Climate(weather="clear-noon").chosen()):
+    for run in plan(
+        template(), Drivers().find_drivers(), Climate(weather="clear-noon").find_weathers()
+    ):
         assert isinstance(stage_of(run).supervisor, Supervisor)
 
 

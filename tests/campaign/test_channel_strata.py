@@ -21,7 +21,7 @@ from skidpad.core.vocabulary import Stratum
 from skidpad.recording.channels.context import context_of
 from skidpad.recording.channels.mcap_files import McapRecording
 from skidpad.sensors.channels.presets import senses_of
-from skidpad.simulation.world.stage import staged
+from skidpad.simulation.world.stage import build_world
 from skidpad.simulation.world.traffic.variety import risky_character
 
 
@@ -80,7 +80,7 @@ def test_a_recording_of_risky_drivers_says_how_much_each_of_them_counts(tmp_path
     senses = [senses_of(spec.id, spec.jumps) for spec in crew.sensors()]
     assert [s.localisation.jump_rate for s in senses] == rates
     weights = json.loads(context["weights"])
-    world = staged(segment_of(run).setup, run.seed)
+    world = build_world(segment_of(run).setup, run.seed)
     traits = world.traffic.drivers.trait
     for row, (of_headway, of_gap) in weights.items():
         character = risky_character(run.seed, int(row))

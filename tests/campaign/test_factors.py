@@ -30,7 +30,7 @@ ONE = Climate(weather="clear-noon")
 
 
 def drivers(**asked: object) -> list[AdasDriver]:
-    chosen = Drivers(**asked).chosen()  # type: ignore[arg-type]
+    chosen = Drivers(**asked).find_drivers()  # type: ignore[arg-type]
     assert all(isinstance(d, AdasDriver) for d in chosen)
     return chosen  # type: ignore[return-value]
 
@@ -45,12 +45,14 @@ def test_every_set_of_functions_with_every_target() -> None:
         frozenset({Function.ACC, Function.LCA, Function.BEND}),
     }
     assert asked[0].label == "2 at 60 km/h"
-    cells = plan(RunSpec(), Drivers(functions=("aeb",), cruise="80").chosen(), ONE.chosen(), 2)
+    cells = plan(
+        RunSpec(), Drivers(functions=("aeb",), cruise="80").find_drivers(), ONE.find_weathers(), 2
+    )
     assert [c.driver.label for c in cells] == ["aeb at 80 km/h"] * 2
 
 
 def test_without_factors_all_is_as_published() -> None:
-    *published, reference = Drivers().chosen()
+    *published, reference = Drivers().find_drivers()
     assert published == published_drivers("all")
     assert reference == ReferenceDriver()
     assert drivers(functions=("",))[0].label == "none"
@@ -95,7 +97,9 @@ def test_a_car_cruises_at_its_target() -> None:
 def test_the_report_shows_factors(tmp_path: Path) -> None:
     spec = RunSpec(sensors=SensorLevel.OBJECTS, duration=2.0, course=Roads(vehicles=2))
     cells = plan(
-        spec, Drivers(configs="1", functions=("aeb",), cruise="60:90:30").chosen(), ONE.chosen()
+        spec,
+        Drivers(configs="1", functions=("aeb",), cruise="60:90:30").find_drivers(),
+        ONE.find_weathers(),
     )
     Campaign(RECIPE, cells).run(tmp_path, local(1, warm_up))
     table = read_results(tmp_path, RECIPE.columns)

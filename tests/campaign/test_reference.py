@@ -20,12 +20,12 @@ from skidpad.stack.reference.person import person_of
 def test_it_is_named_wherever_a_driver_is_chosen():
     assert matrix_drivers("all")[-1] == ReferenceDriver()
     assert [d.label for d in matrix_drivers("reference,4")] == ["reference", "4"]
-    assert Drivers(stack="reference").chosen() == [ReferenceDriver()]
-    assert Drivers(configs="reference").chosen() == [ReferenceDriver()]
-    assert EgoStack(stack="reference").chosen() == ReferenceDriver()
+    assert Drivers(stack="reference").find_drivers() == [ReferenceDriver()]
+    assert Drivers(configs="reference").find_drivers() == [ReferenceDriver()]
+    assert EgoStack(stack="reference").find_driver() == ReferenceDriver()
     with pytest.raises(ConfigError, match="0, 1, 2, 3, 4, 5, 6, reference"):
         matrix_drivers("refrence")
-    assert all(isinstance(d, AdasDriver) for d in Drivers(cruise="80").chosen())
+    assert all(isinstance(d, AdasDriver) for d in Drivers(cruise="80").find_drivers())
 
 
 def test_its_run_is_a_value_and_its_cell_a_row():

@@ -9,7 +9,7 @@ from skidpad.campaign.dataset import label_of
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind
 from skidpad.roads.bundled import load_map
-from skidpad.stack.camera.codes import AHEAD, coded, decoded
+from skidpad.stack.camera.codes import AHEAD, decode_output, encode_label
 
 LENGTH, WIDTH = 4.0, 1.8
 
@@ -66,10 +66,10 @@ def test_of_two_the_nearer_counts():
 
 def test_codes_come_back_as_they_were():
     label = label_of(*world((20.0, 0.0, 0.0), offset=0.3))
-    numbers = coded(label)
+    numbers = encode_label(label)
     numbers[-2] = 4.0  # a logit for present
-    back = decoded(numbers)
+    back = decode_output(numbers)
     assert back.offsets == pytest.approx(label.offsets, abs=1e-4)
     assert back.gap == pytest.approx(label.gap, abs=1e-3)
     numbers[-2] = -4.0
-    assert decoded(numbers).gap is None
+    assert decode_output(numbers).gap is None

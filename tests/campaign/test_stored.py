@@ -68,9 +68,9 @@ def test_a_description_survives_its_file(kind: str) -> None:
 
 def test_an_address_decides_no_run_and_everything_else_does() -> None:
     one, far = KINDS["adas on CARLA"], replace(SERVER, host="10.0.0.8", port=9, server_command="")
-    assert replace(one, backend=far).resolved() == one.resolved()
-    assert replace(one, backend=replace(SERVER, pace=True)).resolved() != one.resolved()
-    assert len({yaml.safe_dump(r.resolved()) for r in KINDS.values()}) == len(KINDS)
+    assert replace(one, backend=far).to_identity() == one.to_identity()
+    assert replace(one, backend=replace(SERVER, pace=True)).to_identity() != one.to_identity()
+    assert len({yaml.safe_dump(r.to_identity()) for r in KINDS.values()}) == len(KINDS)
 
 
 @pytest.mark.parametrize(

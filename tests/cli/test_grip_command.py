@@ -28,7 +28,7 @@ SMALL = (
 def plan(repeats=100, **asked) -> list[RunSpec]:
     """As the command makes it: what is asked of the crossing, of the run, and who drives."""
     run = {n: asked.pop(n) for n in ("sensors", "overlay") if n in asked}
-    driver = EgoStack(stack=asked.pop("stack", "2")).chosen()
+    driver = EgoStack(stack=asked.pop("stack", "2")).find_driver()
     cross = GripCross(**asked)
     return plan_grip(
         cross, with_model(template(driver=driver, **run), Tuned(), cross.model), repeats

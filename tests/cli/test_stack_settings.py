@@ -63,15 +63,15 @@ def test_what_cannot_be_read_is_one_sentence(words, told):
 
 def test_they_reach_the_driver_of_a_campaign_and_of_a_scenario():
     given = {"cruise_kmh": 60}
-    assert Drivers(stack=WHERE, stack_set=("cruise_kmh=60",)).chosen() == [
+    assert Drivers(stack=WHERE, stack_set=("cruise_kmh=60",)).find_drivers() == [
         StackDriver(WHERE, given)
     ]
-    chosen = EgoStack(stack=WHERE, stack_set=("cruise_kmh=60",)).chosen()
+    chosen = EgoStack(stack=WHERE, stack_set=("cruise_kmh=60",)).find_driver()
     assert chosen == StackDriver(WHERE, given)
     with pytest.raises(ConfigError, match="--stack-set is for your own stack"):
-        Drivers(stack_set=("a=1",)).chosen()
+        Drivers(stack_set=("a=1",)).find_drivers()
     with pytest.raises(ConfigError, match="--stack-set is for your own stack"):
-        EgoStack(stack_set=("a=1",)).chosen()
+        EgoStack(stack_set=("a=1",)).find_driver()
 
 
 def test_a_scenarios_speed_reaches_a_users_stack_unless_it_is_told_another():

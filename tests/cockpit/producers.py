@@ -19,5 +19,5 @@ def bridge(*tabs, **seat):
     made = Bridge(Recorder())
     made.told = {"seat": seat}
     for tab in tabs or ("a",):
-        made.tabs.come(tab)
+        made.tabs.note_tab(tab)
     return made

@@ -80,19 +80,19 @@ def test_the_newest_picture_comes_out_as_it_went_in(feed):
         "b": np.arange(5, dtype=np.uint8).reshape(1, 5),
         "c": np.arange(8, dtype=np.uint32).reshape(4, 2)[::2],
     }
-    assert [feed.put(b'{"n":%d}' % n, views) for n in range(5)] == [1, 2, 3, 4, 5]
+    assert [feed.write_picture(b'{"n":%d}' % n, views) for n in range(5)] == [1, 2, 3, 4, 5]
     packet = other.take()
     assert (packet.number, packet.told) == (5, b'{"n":4}')
     assert packet.views.keys() == views.keys()
     assert all(np.array_equal(packet.views[k], views[k]) for k in views)
-    assert feed.taken == 5
+    assert feed.last_read == 5
     other.close()
     other.close()
 
 
 def test_a_picture_that_is_overtaken_while_it_is_read_is_read_anew(feed, monkeypatch):
     views = {"a": np.zeros((4, 4), dtype=np.uint8)}
-    feed.put(b"1", views)
+    feed.write_picture(b"1", views)
     slot, calls = feed._slot, itertools.count()
 
     def overtaken(number):
@@ -100,7 +100,7 @@ def test_a_picture_that_is_overtaken_while_it_is_read_is_read_anew(feed, monkeyp
         if next(calls) == 0:
             monkeypatch.setattr(feed, "_slot", slot)
             for k in range(SLOTS):
-                feed.put(b"2", {"a": np.full((4, 4), 7 + k, dtype=np.uint8)})
+                feed.write_picture(b"2", {"a": np.full((4, 4), 7 + k, dtype=np.uint8)})
         return data
 
     monkeypatch.setattr(feed, "_slot", overtaken)
@@ -111,7 +111,7 @@ def test_a_picture_that_is_overtaken_while_it_is_read_is_read_anew(feed, monkeyp
 
 def test_views_that_do_not_fit_are_refused(feed):
     with pytest.raises(ValueError, match="do not fit"):
-        feed.put(b"1", {"a": np.zeros(SLOT_BYTES, dtype=np.uint8)})
+        feed.write_picture(b"1", {"a": np.zeros(SLOT_BYTES, dtype=np.uint8)})
 
 
 # --- words
@@ -254,7 +254,7 @@ def test_a_drive_without_a_page_goes_on_or_pauses():
     for pauses, said in ((False, []), (True, [Pause(True)])):
         made = Bridge(Recorder(), pauses)
         for tab in ("a", "b"):
-            made.tabs.come(tab)
+            made.tabs.note_tab(tab)
         made.leave("a")
         assert made.producer.words == []
         made.leave("b")
@@ -264,11 +264,11 @@ def test_a_drive_without_a_page_goes_on_or_pauses():
 def test_a_tab_that_sleeps_lets_go_of_the_wheel_and_comes_last_when_it_wakes():
     made = Bridge(Recorder(), pauses=True, clock=(wall := Wall()))
     for tab in ("a", "b"):
-        made.tabs.come(tab)
+        made.tabs.note_tab(tab)
     made.say("a", "pedals", {"throttle": 1.0})
     made.producer.words.clear()
     wall.now += ASLEEP_AFTER - 0.1
-    made.tabs.come("b")
+    made.tabs.note_tab("b")
     made.check()
     assert made.may("a")
     wall.now += 0.2
@@ -276,7 +276,7 @@ def test_a_tab_that_sleeps_lets_go_of_the_wheel_and_comes_last_when_it_wakes():
     assert made.may("b")
     assert made.say("b", "take") is None
     assert made.producer.words == [Do(Pedals()), Do(Wheel(True))]
-    made.tabs.come("a")
+    made.tabs.note_tab("a")
     assert made.may("b")
     assert len(made.tabs) == 2
     # when all of them sleep, the drive stands, once
@@ -285,7 +285,7 @@ def test_a_tab_that_sleeps_lets_go_of_the_wheel_and_comes_last_when_it_wakes():
         wall.now += ASLEEP_AFTER + 0.1
         made.check()
     assert made.producer.words == [Pause(True)]
-    made.tabs.come("b")
+    made.tabs.note_tab("b")
     assert made.may("b")
 
 
@@ -293,7 +293,7 @@ def test_a_tab_that_sleeps_lets_go_of_the_wheel_and_comes_last_when_it_wakes():
 def test_there_is_always_one_driver_among_the_open_tabs(moves):
     tabs, opened = Tabs(), []
     for come, tab in moves:
-        (tabs.come if come else tabs.go)(tab)
+        (tabs.note_tab if come else tabs.go)(tab)
         opened = [t for t in opened if t != tab or come] + [tab] * (come and tab not in opened)
         assert len(tabs) == len(opened)
         assert tabs.driver == (opened[0] if opened else None)
@@ -394,7 +394,7 @@ def test_pedals_are_released_when_nothing_is_heard_of_them():
     man = DeadMan(lambda: released.append(wall.now), wall)
     man.check()
     for _ in range(5):
-        man.heard(True)
+        man.note_pedals(True)
         wall.now += RELEASE_AFTER - 0.01
         man.check()
     assert released == []
@@ -402,8 +402,8 @@ def test_pedals_are_released_when_nothing_is_heard_of_them():
     man.check()
     man.check()
     assert released == [wall.now]
-    man.heard(True)
-    man.heard(False)
+    man.note_pedals(True)
+    man.note_pedals(False)
     wall.now += 10.0
     man.check()
     assert len(released) == 1

@@ -153,6 +153,6 @@ def test_only_comparisons_of_known_numbers_are_read(text):
 
 def test_a_run_without_conflicts_fulfils_every_limit():
     values = {"collisions": 0.0, "min_ttc_s": np.inf, "max_drac_mps2": 0.0}
-    assert parse_expectation("min_ttc_s > 1.5").disappointed(values) == ""
-    assert parse_expectation("no-collision").disappointed(values) == ""
-    assert parse_expectation("max_drac_mps2 < 3").disappointed({"max_drac_mps2": 4.0})
+    assert parse_expectation("min_ttc_s > 1.5").explain_failure(values) == ""
+    assert parse_expectation("no-collision").explain_failure(values) == ""
+    assert parse_expectation("max_drac_mps2 < 3").explain_failure({"max_drac_mps2": 4.0})

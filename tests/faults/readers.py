@@ -79,7 +79,7 @@ def run_files() -> list[bytes]:
 
 def read_stored(path: Path) -> object:
     run = read_run(path.parent)
-    return run.name, run.resolved(), run.settings
+    return run.name, run.to_identity(), run.settings
 
 
 def records() -> list[bytes]:

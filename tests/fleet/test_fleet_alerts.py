@@ -135,14 +135,14 @@ def test_who_waits_is_woken():
     hub = Hub()
 
     async def wait() -> int:
-        waiting = asyncio.create_task(hub.changed("alerts red", 0, 1e6))
+        waiting = asyncio.create_task(hub.wait_for_change("alerts red", 0, 1e6))
         await asyncio.sleep(0)
         hub.tell("alerts blue")
         hub.tell("alerts red")
         return await asyncio.wait_for(waiting, 120)
 
     assert asyncio.run(wait()) == 1
-    assert asyncio.run(hub.changed("alerts red", 1, 0.04)) == 1  # gives up
+    assert asyncio.run(hub.wait_for_change("alerts red", 1, 0.04)) == 1  # gives up
 
 
 def test_the_thread_relays_without_being_asked(lite):

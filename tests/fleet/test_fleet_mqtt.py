@@ -50,26 +50,26 @@ def posting(world, broker, name="red-1"):
 def test_a_spool_is_emptied_over_the_broker_and_each_record_kept_once(listening, broker, tmp_path):
     spool = Spool(tmp_path / "spool")
     for k in range(3):
-        spool.put(Kind.HAZARDS, text_of(record(k)))
+        spool.add_batch(Kind.HAZARDS, text_of(record(k)))
     sent = send(spool, posting(listening, broker))
     assert (sent.acknowledged, sent.refused, sent.waiting) == (3, 0, 0)
-    ids = {i for receipt in spool.acknowledged().values() for i in receipt["ids"]}
+    ids = {i for receipt in spool.read_receipts().values() for i in receipt["ids"]}
     rows = listening.get("red operator", "/api/v1/hazards").json()
     assert {row["id"] for row in rows} == ids
     assert len(ids) == 3
     again = Spool(tmp_path / "again")
-    again.put(Kind.HAZARDS, text_of(record(0)))
+    again.add_batch(Kind.HAZARDS, text_of(record(0)))
     assert send(again, posting(listening, broker)).acknowledged == 1
-    (receipt,) = again.acknowledged().values()
+    (receipt,) = again.read_receipts().values()
     assert receipt["known"]
     assert set(receipt["ids"]) <= ids
 
 
 def test_the_broker_gives_nobody_more_than_https_does(listening, broker, tmp_path):
     spool = Spool(tmp_path / "spool")
-    spool.put(Kind.HAZARDS, b"nonsense")
+    spool.add_batch(Kind.HAZARDS, b"nonsense")
     assert send(spool, posting(listening, broker)).refused == 1
-    spool.put(Kind.HAZARDS, text_of(record(1)))
+    spool.add_batch(Kind.HAZARDS, text_of(record(1)))
     for name in ("red operator", "nobody"):
         listening.accounts.setdefault(name, type("Nobody", (), {"token": "wrong"}))
         with pytest.raises(BackendError, match="does not accept"):
@@ -121,7 +121,7 @@ def test_the_fleet_logs_in_where_only_it_may_read_what_vehicles_send(tmp_path):
         try:
             assert listener.listening.wait(WAIT_S)
             spool = Spool(tmp_path / "spool")
-            spool.put(Kind.HAZARDS, text_of(record(1)))
+            spool.add_batch(Kind.HAZARDS, text_of(record(1)))
             assert send(spool, posting(world, broker_of(at, None, None, None))).waiting == 1
             car = broker_of(at, None, "vehicle", tmp_path / "vehicle")
             assert send(spool, posting(world, car)).acknowledged == 1
@@ -133,7 +133,7 @@ def test_the_fleet_logs_in_where_only_it_may_read_what_vehicles_send(tmp_path):
 
 def test_without_a_broker_the_batch_waits(tmp_path):
     spool = Spool(tmp_path / "spool")
-    spool.put(Kind.HAZARDS, text_of(record(1)))
+    spool.add_batch(Kind.HAZARDS, text_of(record(1)))
     nowhere = Broker(host="127.0.0.1", port=1)
     assert send(spool, mqtt_poster(nowhere, "token", timeout_s=5.0)).waiting == 1
 
@@ -141,7 +141,7 @@ def test_without_a_broker_the_batch_waits(tmp_path):
 def test_a_credential_has_one_bucket_for_both_links(listening, broker, tmp_path):
     """60 requests at once, however they come."""
     spool = Spool(tmp_path / "spool")
-    spool.put(Kind.HAZARDS, text_of(record(1)))
+    spool.add_batch(Kind.HAZARDS, text_of(record(1)))
     answers = {listening.get("red-1", "/api/v1/vehicle").status_code for _ in range(60)}
     assert answers == {200}
     sent = send(spool, posting(listening, broker))

@@ -115,7 +115,7 @@ def test_batches_that_wait_are_committed_together_and_answered_after_it(world):
     """The first batch's pack is held back; what comes meanwhile shares the second commit."""
     intake, blobs = world.fleet.intake, world.fleet.blobs
     held, release, packs = threading.Event(), threading.Event(), []
-    put = blobs.put
+    put = blobs.store
 
     def slow(content: bytes) -> str:
         packs.append(len(content))
@@ -123,7 +123,7 @@ def test_batches_that_wait_are_committed_together_and_answered_after_it(world):
         assert release.wait(120)
         return put(content)
 
-    blobs.put = slow
+    blobs.store = slow
     futures: list[Future] = [intake.submit(batch(world, "first-key", record(1)))]
     assert held.wait(120)
     futures += [intake.submit(batch(world, f"later-{k}", record(k))) for k in range(2, 8)]
@@ -140,7 +140,7 @@ def test_a_store_that_fails_acknowledges_nothing(lite):
     def broken(content: bytes) -> str:
         raise OSError("no space left")
 
-    lite.fleet.blobs.put = broken
+    lite.fleet.blobs.store = broken
     assert lite.send("red-1", packed(record(1))).status_code == 500
     assert count(lite, batches) == 0
 
@@ -164,8 +164,8 @@ def test_a_damaged_body_is_told_not_served(lite):
 @pytest.mark.parametrize("url", ["folder", "memory://blobs-of-a-test"])
 def test_blobs_are_named_by_what_they_are(url, tmp_path):
     blobs = Blobs(str(tmp_path / "b") if url == "folder" else url)
-    name = blobs.put(b"weather")
-    assert blobs.put(b"weather") == name
+    name = blobs.store(b"weather")
+    assert blobs.store(b"weather") == name
     assert (blobs.get(name), blobs.part(name, 1, 3)) == (b"weather", b"eat")
     for wrong in ("../../etc/passwd", "a" * 63, "A" * 64, "0" * 64):
         with pytest.raises(FileError):
@@ -225,14 +225,14 @@ def test_words_that_a_store_cannot_keep_are_refused_alike(world):
 def test_a_batch_that_cannot_be_kept_takes_no_other_with_it(world):
     """Both are of one commit: the one that the store refuses fails alone."""
     intake, blobs = world.fleet.intake, world.fleet.blobs
-    held, release, put = threading.Event(), threading.Event(), blobs.put
+    held, release, put = threading.Event(), threading.Event(), blobs.store
 
     def slow(content: bytes) -> str:
         held.set()
         assert release.wait(120)
         return put(content)
 
-    blobs.put = slow
+    blobs.store = slow
     first = intake.submit(batch(world, "first-key", record(1)))
     assert held.wait(120)
     good = intake.submit(batch(world, "good-key", record(2)))

@@ -63,7 +63,7 @@ def test_a_monitored_drive_reaches_the_store_whole(world, tmp_path):
         rows = connection.execute(select(hazards.c.id, hazards.c.drive)).all()
     assert (drive.seconds, drive.map, drive.release) == (70.0, "town", "release-7")
     assert {row.drive for row in rows} == {drive.drive}
-    receipts = spool.acknowledged()
+    receipts = spool.read_receipts()
     assert {i for k in keys for i in receipts[k]["ids"]} == {row.id for row in rows}
     assert spool_folder(spool, tmp_path / "m", "release-7") == keys  # again: nothing waits
     assert spool.count() == 0
@@ -119,7 +119,7 @@ def test_an_answer_that_was_lost_is_given_again(lite, tmp_path):
     first = answers[0]
     assert any(
         r["batch"] == first["batch"] and r["ids"] == first["ids"]
-        for r in spool.acknowledged().values()
+        for r in spool.read_receipts().values()
     )
 
 
@@ -127,7 +127,7 @@ def test_what_will_never_be_taken_is_set_aside_and_the_rest_goes_on(lite, tmp_pa
     spool = Spool(tmp_path / "spool")
     spool_folder(spool, monitored(tmp_path / "m"))
     (spool.waiting / "broken.batch").write_bytes(b"no head")
-    bad = spool.put(Kind.DRIVE, b"[]")
+    bad = spool.add_batch(Kind.DRIVE, b"[]")
     sent = send(spool, through(lite))
     assert (sent.acknowledged, sent.refused, sent.waiting) == (3, 1, 0)
     assert sorted(p.name for p in spool.waiting.iterdir()) == sorted(
@@ -156,7 +156,7 @@ from skidpad.fleet.store.accounts import principal_of
 from skidpad.fleet.words import Kind
 spool = Spool(Path(sys.argv[1]))
 for k in range(100000):
-    spool.put(Kind.DRIVE, b"x" * k)
+    spool.add_batch(Kind.DRIVE, b"x" * k)
     print(k, flush=True)
 """
 
@@ -234,7 +234,7 @@ def test_a_server_killed_at_any_moment_keeps_what_it_acknowledged(tmp_path):
                 assert said == "6 acknowledged, 0 refused, 0 waiting"
             finally:
                 os.kill(child.pid, signal.SIGKILL)
-    acknowledged = {i for r in Spool(tmp_path / "spool").acknowledged().values() for i in r["ids"]}
+    acknowledged = {i for r in Spool(tmp_path / "spool").read_receipts().values() for i in r["ids"]}
     engine = open_store(Places(data=data))
     with engine.connect() as connection:
         stored = set(connection.execute(select(hazards.c.id)).scalars())

@@ -115,9 +115,9 @@ def test_a_second_start_needs_resume_and_then_knows_what_is_done(tmp_path: Path)
     with pytest.raises(OutputError, match="--resume"):
         Ledger(tmp_path / "out", MatrixEntry, IDENTITY)
     with Ledger(tmp_path / "out", MatrixEntry, IDENTITY, resume=True) as ledger:
-        assert ledger.done() == {"1-rain-noon-0"}
+        assert ledger.completed_runs() == {"1-rain-noon-0"}
         ledger.append(entry("1-rain-noon-1", collisions=7))
-        assert ledger.done() == {"1-rain-noon-0", "1-rain-noon-1"}
+        assert ledger.completed_runs() == {"1-rain-noon-0", "1-rain-noon-1"}
     assert [
         e.metrics.fatal_collisions for e in latest(read_ledger(tmp_path / "out", MatrixEntry))
     ] == [2, 7]
@@ -142,7 +142,7 @@ def test_two_writers_are_refused(tmp_path: Path) -> None:
             Ledger(tmp_path / "out", MatrixEntry, IDENTITY, resume=True)
         ledger.append(entry("a"))
     with Ledger(tmp_path / "out", MatrixEntry, IDENTITY, resume=True) as again:
-        assert again.done() == {"a"}
+        assert again.completed_runs() == {"a"}
 
 
 @pytest.mark.parametrize("kept", [1, 20, 200])
@@ -154,7 +154,7 @@ def test_a_torn_last_line_costs_that_line_only(tmp_path: Path, kept: int) -> Non
     first = path.read_bytes().index(b"\n") + 1
     os.truncate(path, first + kept)
     with Ledger(tmp_path, MatrixEntry, IDENTITY, resume=True) as ledger:
-        assert ledger.done() == {"a"}
+        assert ledger.completed_runs() == {"a"}
         ledger.append(entry("b"))
     assert [e.run for e in read_ledger(tmp_path, MatrixEntry)] == ["a", "b"]
 
@@ -176,7 +176,7 @@ def test_a_full_disk_loses_no_earlier_line(tmp_path: Path, monkeypatch: pytest.M
         with pytest.raises(OutputError, match="disk is full"):
             ledger.append(entry("b"))
         monkeypatch.setattr(ledger_module.os, "write", whole)
-        assert ledger.done() == {"a"}
+        assert ledger.completed_runs() == {"a"}
         ledger.append(entry("c"))
     assert [e.run for e in read_ledger(tmp_path, MatrixEntry)] == ["a", "c"]
 
@@ -196,7 +196,7 @@ def test_what_was_appended_survives_kill_9(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", script], check=False)
     assert done.returncode == -signal.SIGKILL
     with Ledger(tmp_path / "out", MatrixEntry, IDENTITY, resume=True) as ledger:
-        assert ledger.done() == {"a"}
+        assert ledger.completed_runs() == {"a"}
 
 
 def test_folder_state(tmp_path: Path) -> None:

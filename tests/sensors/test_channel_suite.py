@@ -133,9 +133,9 @@ def test_localisation_is_stationary_with_the_stated_strength():
     steps = np.diff([jumps.update()[:2] for _ in range(36_000)], axis=0)
     large = np.hypot(*steps.T) > 0.5
     assert 200 < large.sum() < 900  # 360 there, and most of them back again
-    assert error.scaled(1.0, True).sigma == error.sigma
+    assert error.scale(1.0, True).sigma == error.sigma
     dark = TFUSE_LIKE.localisation
-    assert dark.scaled(1.0, True).sigma > dark.scaled(1.0, False).sigma
+    assert dark.scale(1.0, True).sigma > dark.scale(1.0, False).sigma
 
 
 @pytest.mark.req("C-026")

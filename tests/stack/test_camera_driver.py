@@ -71,8 +71,8 @@ def test_the_same_images_give_the_same_commands(images):
 @pytest.mark.req("X-4")
 def test_a_mirrored_road_is_steered_the_other_way(images):
     picture = mosaic(images_of(images))
-    there = network.seen(picture)
-    back = network.seen(np.ascontiguousarray(picture[:, ::-1]))
+    there = network.read_mosaic(picture)
+    back = network.read_mosaic(np.ascontiguousarray(picture[:, ::-1]))
     assert back.offsets[:3] == pytest.approx([-y for y in there.offsets[:3]], abs=0.5)
 
 

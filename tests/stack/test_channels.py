@@ -54,7 +54,7 @@ def test_tracks_find_position_velocity_and_identity():
     assert len(found) == 1
     assert found[0, :2] == pytest.approx([100 + 30 - 4 * 5.9, 50 + 5 + 5.9], abs=0.4)
     assert found[0, 3:] == pytest.approx([-4.0, 1.0], abs=0.6)
-    assert tracker.confirmed["id"].tolist() == [0]
+    assert tracker.confirmed_tracks["id"].tolist() == [0]
     for k in range(60, 70):
         tracker.update(view(0.1 * k))
     assert len(tracker.objects(np.zeros(3))) == 0
@@ -71,7 +71,7 @@ def test_whoever_drives_at_motorway_speed_becomes_a_track(v):
         seen = (20.0 + (v - 30.0) * t, 3.5, heading, 4.5, 1.9)
         tracker.update(view(t, (30.0 * t, 0, 0, 30.0, 0), [seen]))
         if k == LAV.confirm - 1:
-            assert tracker.confirmed["id"].tolist() == [0]
+            assert tracker.confirmed_tracks["id"].tolist() == [0]
     (found,) = tracker.objects(tracker.pose)
     assert found[:2] == pytest.approx([30.0 * t + 20.0 + (v - 30.0) * t, 3.5], abs=0.2)
     assert found[3:] == pytest.approx([v, 0.0], abs=1.5)

@@ -213,11 +213,11 @@ def test_a_relocation_clears_everything_that_was_seen_and_summed():
     hierarchy = stack.hierarchy
     hierarchy.speed_pid.update(5.0)
     hierarchy.distance_pid.update(5.0)
-    assert stack.front.persistence.confirmed
+    assert stack.front.persistence.is_confirmed
     assert stack.lock.signal == 7
     stack.tick(frame(9, [], ego_at(400.0), supervision=Supervision.WARM_UP))
     for pid in (hierarchy.speed_pid, hierarchy.distance_pid):
         assert (pid.previous, pid.integral) == (0.0, 0.0)
-    assert not stack.front.persistence.confirmed
+    assert not stack.front.persistence.is_confirmed
     assert stack.lock.signal is None
     assert stack.report.tier is Tier.NONE, "the supervisor drives"

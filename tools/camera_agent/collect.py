@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from camera_agent.scenes import samples
-from skidpad.stack.camera.codes import OUTPUTS, coded, mosaic
+from skidpad.stack.camera.codes import OUTPUTS, encode_label, mosaic
 
 
 def collect(out: Path, n: int, seed: int) -> None:
@@ -19,7 +19,7 @@ def collect(out: Path, n: int, seed: int) -> None:
     )
     labels = np.zeros((n, OUTPUTS), dtype=np.float32)
     for k, sample in enumerate(samples(n, seed)):
-        images[k], labels[k] = mosaic(sample.images), coded(sample.label)
+        images[k], labels[k] = mosaic(sample.images), encode_label(sample.label)
     images.flush()
     np.save(out / "labels.npy", labels)
 

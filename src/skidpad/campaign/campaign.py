@@ -114,7 +114,7 @@ class Campaign(Generic[T, K, M]):
 
         What all runs have in common, what varies, and a hash over every run.
         """
-        plain = [t.resolved() for t in self.tasks]
+        plain = [t.to_identity() for t in self.tasks]
         names = sorted({name for p in plain for name in p})
         values = {
             name: list({_text(p.get(name)): p.get(name) for p in plain}.values()) for name in names
@@ -164,7 +164,7 @@ class Campaign(Generic[T, K, M]):
         driven, earlier = 0, set[str]()
         with Ledger(out, self.recipe.entry, self.identity(), resume) as ledger:
             keep_files(out, self.files)
-            done = ledger.done()
+            done = ledger.completed_runs()
             for entry in latest(ledger.entries):
                 if entry.run in done:
                     on_run(entry)

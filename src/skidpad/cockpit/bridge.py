@@ -159,7 +159,7 @@ class Bridge:
         """Moves the pedals as a tab sends them; the dead man's switch learns whether any is pressed."""
         pedals = msgspec.convert(dict(value), Pedals)
         still = Pedals(method=pedals.method) == pedals
-        self.dead_man.heard(not still)
+        self.dead_man.note_pedals(not still)
         self._move(pedals)
 
     def _move(self, pedals: Pedals) -> None:
@@ -270,7 +270,7 @@ class Tabs:
         self.clock = clock
         self._open: dict[str, float] = {}  # when each of them was last heard of
 
-    def come(self, tab: str) -> None:
+    def note_tab(self, tab: str) -> None:
         """A tab is opened, or gives a sign that it is awake."""
         self._open[tab] = self.clock()
 
@@ -299,7 +299,7 @@ class DeadMan:
         self.release, self.clock = release, clock
         self._heard: float | None = None  # None: they are released
 
-    def heard(self, pressed: bool) -> None:
+    def note_pedals(self, pressed: bool) -> None:
         """The tab told how its pedals stand."""
         self._heard = self.clock() if pressed else None
 

@@ -68,11 +68,11 @@ class Feed:
         return int(self._state[LAST])
 
     @property
-    def taken(self) -> int:
+    def last_read(self) -> int:
         """Number of the picture that was read last."""
         return int(self._state[TAKEN])
 
-    def put(self, told: bytes, views: dict[str, Array]) -> int:
+    def write_picture(self, told: bytes, views: dict[str, Array]) -> int:
         """Write the next picture; returns its number."""
         number = self.last + 1
         planes = tuple(Plane(n, a.dtype.name, a.shape) for n, a in views.items())

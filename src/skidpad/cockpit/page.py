@@ -143,8 +143,8 @@ class Panel:
         self.elements.append(element)
         return element
 
-    def changed(self, name: str, now: Any, word: str, value: Any) -> None:
-        """A control was moved, by hand or by the look at what is the case."""
+    def apply_change(self, name: str, now: Any, word: str, value: Any) -> None:
+        """A control was on_moved, by hand or by the look at what is the case."""
         seat = self.bridge.told.get("seat", {})
         if now == self._real(name, seat):
             return
@@ -230,7 +230,7 @@ def extra_switch(panel: Panel, extra: Extra) -> None:
     """Draws the switch of one addition to the picture."""
     name, word = PICTURE + extra.value, extra.value
     switch = ui.switch(
-        EXTRAS[extra], on_change=lambda e: panel.changed(name, e.value, "extra", word)
+        EXTRAS[extra], on_change=lambda e: panel.apply_change(name, e.value, "extra", word)
     )
     panel.follow(name, switch.props("dense"), lambda _: _has(panel.bridge.told.get("extras"), word))
 
@@ -243,14 +243,14 @@ def drive_controls(panel: Panel) -> None:
             function_switch(panel, kind.name, f"{kind.title} ({key})")
     lamps = ui.toggle(
         [switch.value for switch in LAMP_ORDER],
-        on_change=lambda e: panel.changed("lamps", e.value, "lamps", e.value),
+        on_change=lambda e: panel.apply_change("lamps", e.value, "lamps", e.value),
     ).props("dense no-caps unelevated")
     panel.follow("lamps", lamps, lambda seat: seat.get("lamps"))
 
 
 def function_switch(panel: Panel, name: str, title: str) -> None:
     """Draws the switch of one function of our stack."""
-    switch = ui.switch(title, on_change=lambda e: panel.changed(name, e.value, "toggle", name))
+    switch = ui.switch(title, on_change=lambda e: panel.apply_change(name, e.value, "toggle", name))
     panel.follow(name, switch.props("dense"), lambda seat: _has(seat.get("functions"), name))
 
 
@@ -266,7 +266,7 @@ def weather_controls(panel: Panel) -> None:
         weather = ui.select(
             titles,
             label="weather (N)",
-            on_change=lambda e: panel.changed("weather", e.value, "weather", e.value),
+            on_change=lambda e: panel.apply_change("weather", e.value, "weather", e.value),
         ).props("dense outlined options-dense")
         panel.follow("weather", weather, lambda seat: _known_name(seat.get("weather"), titles))
         meaning_line(panel, meaning_of_weather)
@@ -284,7 +284,7 @@ def acting_select(panel: Panel, word: str, kinds: type[Enum]) -> None:
     select = ui.select(
         [k.value for k in kinds],
         label=word,
-        on_change=lambda e: panel.changed(word, e.value, word, e.value),
+        on_change=lambda e: panel.apply_change(word, e.value, word, e.value),
     )
     panel.follow(word, select.props("dense outlined options-dense"), lambda seat: seat.get(word))
     meaning_line(panel, lambda seat: MEANINGS[word].get(seat.get(word, ""), ""))
@@ -324,10 +324,10 @@ def weather_slider(panel: Panel, field: str, title: str) -> None:
     ui.label(title)
     slider = ui.slider(min=low, max=high, step=1).props("label dense")
 
-    def moved(event: GenericEventArguments) -> None:
-        panel.changed(field, event.args, "sky", {field: event.args})
+    def on_moved(event: GenericEventArguments) -> None:
+        panel.apply_change(field, event.args, "sky", {field: event.args})
 
-    slider.on("update:model-value", moved, throttle=0.15)
+    slider.on("update:model-value", on_moved, throttle=0.15)
     panel.follow(field, slider, lambda seat: seat.get("sky", {}).get(field))
 
 
@@ -336,10 +336,10 @@ def crowd_slider(panel: Panel) -> None:
     ui.label("vehicles")
     slider = ui.slider(min=0, max=panel.vehicles, step=1).props("label dense")
 
-    def moved(event: GenericEventArguments) -> None:
-        panel.changed("crowd", event.args, "crowd", event.args)
+    def on_moved(event: GenericEventArguments) -> None:
+        panel.apply_change("crowd", event.args, "crowd", event.args)
 
-    slider.on("update:model-value", moved, throttle=0.15)
+    slider.on("update:model-value", on_moved, throttle=0.15)
     panel.follow("crowd", slider, lambda seat: seat.get("crowd"))
 
 

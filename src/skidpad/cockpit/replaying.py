@@ -61,7 +61,9 @@ class Replayer:
         self.note = ""  # what the page is told beside everything else
         self.dt = source.step * DT
         surface = read_run_surface(source.folder)
-        self.screen = Screen(feed, link, source.map, self._shown, source.seed, surface, scenery)
+        self.screen = Screen(
+            feed, link, source.map, self._describe_moment, source.seed, surface, scenery
+        )
         self.screen.begin(source.table)
         if other is not None:
             self.screen.beside = Companion(other, source.tick(0), scenery)
@@ -72,7 +74,7 @@ class Replayer:
         """Shows the replay until the page ends it; time stands until a page has taken a picture."""
         self.turn()
         self.show()
-        while self.screen.feed.taken == 0 and not self.link.ended:
+        while self.screen.feed.last_read == 0 and not self.link.ended:
             self.link.drain(PATIENCE)
         self._from(self.k)
         while not self.link.ended:
@@ -134,7 +136,7 @@ class Replayer:
     def _is_taken(self) -> bool:
         """The page has the picture before, or is too slow to be waited for."""
         feed = self.screen.feed
-        return feed.taken >= feed.last or self.clock() - self._shown_at > TAKES_WITHIN
+        return feed.last_read >= feed.last or self.clock() - self._shown_at > TAKES_WITHIN
 
     def _from(self, k: int) -> None:
         """Goes on from moment `k`, at the present time."""
@@ -147,7 +149,7 @@ class Replayer:
         self.screen.show(self.source.moment(self.k))
         self._shown_k, self._shown_at = self.k, self.clock()
 
-    def _shown(self) -> Shown:
+    def _describe_moment(self) -> Shown:
         """Returns what is outside at the present moment and what the page is told of it."""
         seat, link = self.source.seat(self.k), self.link
         beam = seat.outside.beam

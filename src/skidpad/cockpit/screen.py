@@ -85,8 +85,8 @@ class Screen(Sink):
         self.events.extend((t, text) for text in hud.list_events(moment))
         if perf_counter() - self._at < 1.0 / MOST_PER_SECOND:
             return
-        if self.feed.taken < self.feed.last:
-            self.dropped += self.feed.taken > 0  # before the first page it is not missed
+        if self.feed.last_read < self.feed.last:
+            self.dropped += self.feed.last_read > 0  # before the first page it is not missed
             return
         self.show(moment)
 
@@ -103,7 +103,7 @@ class Screen(Sink):
             shown = Shown(shown.outside, {**shown.told, BESIDE: said})
         self.shown += 1
         self._at = perf_counter()
-        self.feed.put(msgspec.json.encode(self._describe_moment(moment, shown)), planes)
+        self.feed.write_picture(msgspec.json.encode(self._describe_moment(moment, shown)), planes)
 
     def _is_wanted(self, view: View) -> bool:
         """The main view, and all small ones that are not hidden."""

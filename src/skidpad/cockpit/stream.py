@@ -28,7 +28,7 @@ class Stream:
     async def run(self) -> None:
         """Until the tab is closed."""
         await self.socket.accept()
-        self.bridge.tabs.come(self.tab)
+        self.bridge.tabs.note_tab(self.tab)
         tasks = [asyncio.ensure_future(part()) for part in (self._send, self._receive, self._check)]
         try:
             done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
@@ -78,7 +78,7 @@ class Stream:
         """Takes the tab's messages in as they come, those that cannot be read left out."""
         while True:
             message = await self.socket.receive_text()
-            self.bridge.tabs.come(self.tab)  # whatever it says: it is awake
+            self.bridge.tabs.note_tab(self.tab)  # whatever it says: it is awake
             with suppress(ValueError, AttributeError):  # not a message of ours
                 await self._take(json.loads(message))
 

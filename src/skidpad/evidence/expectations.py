@@ -26,7 +26,7 @@ class Expectation:
     compare: Callable[[float, float], bool]
     limit: float
 
-    def disappointed(self, values: dict[str, float]) -> str:
+    def explain_failure(self, values: dict[str, float]) -> str:
         """Returns what is wrong in words; "" when it is as expected.
 
         values: of `run_values`.

@@ -116,7 +116,7 @@ def _criterion(
 ) -> tuple[str, dict[str, str]]:
     """Return the criterion in words, and what is wrong by rule; no rule: nothing is judged."""
     if rules:
-        wrong = {rule.text: rule.disappointed(values) for rule in rules}
+        wrong = {rule.text: rule.explain_failure(values) for rule in rules}
         return f"--expect {', '.join(wrong)}", wrong
     known = {r.name: r.wrong for r in of_file if r.wrong is not None}
     unknown = [r.name for r in of_file if r.wrong is None]
@@ -127,7 +127,7 @@ def _criterion(
         return NOTHING_UNDER_TEST, {}
     rule = parse_expectation(NO_COLLISION)
     left_out = f" (the file's {', '.join(unknown)} cannot be judged here)" if unknown else ""
-    return NO_CONTACT + left_out, {NO_CONTACT: rule.disappointed(values)}
+    return NO_CONTACT + left_out, {NO_CONTACT: rule.explain_failure(values)}
 
 
 def void_reasons(staging: Staging, others: Sequence[Counterpart]) -> list[str]:

@@ -23,7 +23,7 @@ class Blobs:
         protocol = self._fs.protocol
         self._local = "file" in ((protocol,) if isinstance(protocol, str) else protocol)
 
-    def put(self, content: bytes) -> str:
+    def store(self, content: bytes) -> str:
         """Store `content` durably before returning its name."""
         name = digest(content)
         path = self._path(name)

@@ -34,12 +34,12 @@ def spool_folder(
         summary["judged"] = {"errors": judged[0], "before": judged[1]}
     content = json.dumps(summary, sort_keys=True).encode()
     drive = digest(content)[:32]
-    keys = [spool.put(Kind.HAZARDS, batch, drive) for batch in hazard_batches(folder)]
-    keys.append(spool.put(Kind.DRIVE, content, drive))
+    keys = [spool.add_batch(Kind.HAZARDS, batch, drive) for batch in hazard_batches(folder)]
+    keys.append(spool.add_batch(Kind.DRIVE, content, drive))
     if (folder / indicators.FILE).exists():
         rows = indicator_rows(indicators.read_indicators(folder))
         if rows:
-            keys.append(spool.put(Kind.INDICATORS, rows, drive))
+            keys.append(spool.add_batch(Kind.INDICATORS, rows, drive))
     return keys
 
 

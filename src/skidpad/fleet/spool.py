@@ -44,10 +44,10 @@ class Spool:
         except OSError as error:
             raise OutputError(f"{folder}: cannot be written ({error.strerror})") from error
 
-    def put(self, kind: Kind, content: bytes, drive: str = "") -> str:
+    def add_batch(self, kind: Kind, content: bytes, drive: str = "") -> str:
         """Keep a batch until it is acknowledged; the same batch twice is one. Returns its key."""
         key = digest(b"\n".join((kind.value.encode(), drive.encode(), content)))[:48]
-        if key in self.acknowledged():
+        if key in self.read_receipts():
             return key
         head = json.dumps({"kind": kind.value, "drive": drive}).encode()
         body = gzip.compress(content, compresslevel=6, mtime=0)
@@ -78,7 +78,7 @@ class Spool:
         path = self.waiting / f"{key}.batch"
         path.rename(path.with_suffix(".refused"))
 
-    def acknowledged(self) -> dict[str, dict[str, Any]]:
+    def read_receipts(self) -> dict[str, dict[str, Any]]:
         """Receipts by key; a line cut off by a kill is left out, its batch still waits."""
         path = self.folder / "acknowledged.jsonl"
         found = {}

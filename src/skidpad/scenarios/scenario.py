@@ -145,17 +145,17 @@ def check(
 def _minor_revision(root: Node) -> str:
     """Returns the minor revision of the header, for the schema; "" where none fits (before 1.0)."""
     if root.find("ParameterValueDistribution") is not None:
-        raise root.unsupported("a distribution is a campaign of another file: play it as one")
+        raise root.unsupported_fault("a distribution is a campaign of another file: play it as one")
     if root.find("Catalog") is not None:
-        raise root.unsupported("a catalog holds no scenario")
+        raise root.unsupported_fault("a catalog holds no scenario")
     header = root.child("FileHeader")
     if any("$" in str(value) for value in header.element.attrib.values()):
-        header = header.scoped(root_values(root, {}))
+        header = header.with_parameters(root_values(root, {}))
     major, minor = header.whole("revMajor"), header.whole("revMinor")
     if (major, minor) == (0, 9):
         return ""
     if major != 1 or minor > NEWEST:
-        raise header.unsupported(f"OpenSCENARIO XML {major}.{minor} is not supported")
+        raise header.unsupported_fault(f"OpenSCENARIO XML {major}.{minor} is not supported")
     return str(minor)
 
 
@@ -176,7 +176,7 @@ class _Wish:
 def _compile_scenario(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | None:
     """Compiles the scenario of a parsed file; None, with findings, where a fault is not allowed."""
     values = root_values(root, wish.parameters)
-    root = root.scoped(values)
+    root = root.with_parameters(values)
     findings += oddities(root)
     network = _network(root, wish.maps, findings)
     catalogs = Catalogs(root, findings)
@@ -232,7 +232,7 @@ def _entity_controllers(
     for entity in root.child("Entities").children("ScenarioObject"):
         for node in entity.children("ObjectController"):
             try:
-                found, finding = controller_of(catalogs.resolved(node.only(), "Controller"), names)
+                found, finding = controller_of(catalogs.resolve(node.only(), "Controller"), names)
             except Fault:
                 continue  # its entity says so
             if found is not None:

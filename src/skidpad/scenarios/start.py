@@ -79,7 +79,7 @@ def compile_start(init: Node, ctx: Context) -> Start:
             continue
         make = {"GlobalAction": global_action, "UserDefinedAction": user_defined}.get(node.tag)
         if make is None:
-            ctx.findings.append(node.unsupported().finding)
+            ctx.findings.append(node.unsupported_fault().finding)
             continue
         action = ctx.attempt(partial(make, node, ctx))
         if isinstance(action, AddEntity):

@@ -126,7 +126,7 @@ def element_paths(board: Node, ctx: Context) -> list[tuple[str, Path]]:
     def look(node: Node, above: Path) -> None:
         if node.tag == "CatalogReference":
             try:
-                node = ctx.catalogs.resolved(node, "Maneuver")
+                node = ctx.catalogs.resolve(node, "Maneuver")
             except Fault:
                 return  # reported where the manoeuvre is compiled
         level = LEVELS[node.tag]
@@ -183,7 +183,7 @@ def _group(node: Node, above: Path, ctx: Context) -> Group:
 
 def _manoeuvre(node: Node, above: Path, ctx: Context) -> Manoeuvre:
     """Compiles a manoeuvre, resolved from a catalogue; faulty events become findings."""
-    node = ctx.catalogs.resolved(node, "Maneuver")
+    node = ctx.catalogs.resolve(node, "Maneuver")
     path = (*above, node.label())
     events = [ctx.attempt(partial(_event, e, path, ctx)) for e in node.children("Event")]
     return Manoeuvre(path, tuple(e for e in events if e is not None))
@@ -216,4 +216,4 @@ def _action(node: Node, above: Path, ctx: Context) -> NamedAction:
         return NamedAction(path, None, global_action(what, ctx))
     if what.tag == "UserDefinedAction":
         return NamedAction(path, None, user_defined(what, ctx))
-    raise what.unsupported()
+    raise what.unsupported_fault()

@@ -162,7 +162,7 @@ class Directions:
     same: float
     opposite: float
 
-    def drawn(self, rng: Random, scene: Scene, spots: Spots) -> Flags:
+    def draw_mask(self, rng: Random, scene: Scene, spots: Spots) -> Flags:
         """Returns the mask of the spots in the direction of one draw: same as the entity's or opposite."""
         same = rng.random() * (self.same + self.opposite) < self.same
         mask = along(scene.actors[self.entity].pose, spots)
@@ -205,7 +205,7 @@ class Filling:
         for _ in range(len(self.pool.cars) - len(self.pool.there(scene))):
             some = spots
             if self.directions is not None:
-                some = spots.where(self.directions.drawn(self.pool.rng, scene, spots))
+                some = spots.where(self.directions.draw_mask(self.pool.rng, scene, spots))
             self.pool.bring(scene, some)
 
     def _release(self, scene: Scene) -> None:

@@ -172,14 +172,14 @@ def condition(node: Node, ctx: Context) -> Condition:
     if inner.tag == "ByValueCondition":
         leaf = inner.only()
         if leaf.tag not in BY_VALUE:
-            raise leaf.unsupported()
+            raise leaf.unsupported_fault()
         return BY_VALUE[leaf.tag](leaf, ctx)
     if inner.tag != "ByEntityCondition":
-        raise inner.unsupported()
+        raise inner.unsupported_fault()
     who = inner.child("TriggeringEntities")
     leaf = inner.child("EntityCondition").only()
     if leaf.tag not in ENTITY_CONDITIONS:
-        raise leaf.unsupported()
+        raise leaf.unsupported_fault()
     names = ctx.actors(who.children("EntityRef"))
     rule = who.text("triggeringEntitiesRule")
     if rule not in ("any", "all"):

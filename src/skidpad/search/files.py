@@ -34,7 +34,7 @@ def read_space(file: Path) -> tuple[Path, Space]:
     else:
         fixed = node.child("Deterministic")
         for many in fixed.children("DeterministicMultiParameterDistribution"):
-            raise many.unsupported()
+            raise many.unsupported_fault()
         ones = fixed.children("DeterministicSingleParameterDistribution")
     found = tuple(Variable(one.plain("parameterName"), _law(one.only()), str(file)) for one in ones)
     return scenario_of_choices(file, node), check_space(Space(found))
@@ -62,7 +62,7 @@ def _law(node: Node) -> Law:
             raise node.error(f"variance must be above 0, got {variance:g}")
         is_log = node.tag == "LogNormalDistribution"
         return Normal(node.number("expectedValue"), sqrt(variance), low, high, is_log)
-    raise node.unsupported()
+    raise node.unsupported_fault()
 
 
 def write_choices(path: Path, scenario: str, trials: Sequence[Trial]) -> None:

@@ -26,7 +26,7 @@ from skidpad.stack.configurations import (
     functions_of,
     parse_functions,
 )
-from skidpad.stack.control.bends import BendSpeed, slowed
+from skidpad.stack.control.bends import BendSpeed, slow_for_bend
 from skidpad.stack.control.steering import NoSmoothing, Smoothing, steering_of
 from skidpad.stack.control.text import mode_text
 from skidpad.stack.control.tiers import (
@@ -177,7 +177,7 @@ class AdasStack:
         supervised = frame.supervision is not Supervision.NONE
         request = Request(Tier.NONE)
         if not supervised:
-            request = slowed(self.hierarchy.decide(situation), v, v_bends)
+            request = slow_for_bend(self.hierarchy.decide(situation), v, v_bends)
         self.front.conclude(sight, stop is not None)
         self.report = self._report(view, sight, situation, request.tier, light, hsv)
         if supervised:

@@ -384,9 +384,9 @@ def test_thresholds_are_the_published_ones_and_equality_passes():
     assert upper == {"MV_ELSS": 0.05}
     assert {e.label for e in table.values() if e.reporting_only} == {"HCS", "OCSS"}
     elss = table[Indicator.EGO_LOCATION]
-    assert [elss.violated(v) for v in (0.5999, 0.6, 0.7)] == [True, False, False]
+    assert [elss.is_violated(v) for v in (0.5999, 0.6, 0.7)] == [True, False, False]
     variance = table[Indicator.EGO_LOCATION_VARIANCE]
-    assert [variance.violated(v) for v in (0.0501, 0.05)] == [True, False]
+    assert [variance.is_violated(v) for v in (0.0501, 0.05)] == [True, False]
 
 
 @pytest.mark.req("C-030", "C-031", "C-033", "C-035", "C-036")

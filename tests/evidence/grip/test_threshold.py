@@ -82,7 +82,7 @@ def test_a_situation_that_fails_on_dry_road_does_not_tell():
 
 def test_drives_that_are_completed_again_are_counted():
     (one,) = situations(table(lambda mu, seed: mu != 0.28))
-    assert (one.recovered.k, one.recovered.n) == (40, 40)
+    assert (one.recovered_share.k, one.recovered_share.n) == (40, 40)
 
 
 @pytest.mark.req("B-140")

@@ -18,7 +18,7 @@ from skidpad.physics.grip import RoadSurface, physical_params, ratio_at, road_su
 from skidpad.roads.bundled import FOLDER
 from skidpad.roads.opendrive.materials import read_materials
 from skidpad.simulation.world.patches import FrictionZone
-from skidpad.simulation.world.stage import staged
+from skidpad.simulation.world.stage import build_world
 
 V, MU, MATERIAL, SCALE, SHARE, THIN, OTHER = 20.0, 0.7, 0.6, 0.8, 0.5, 0.3, 0.45
 TYRES, WET, DEEP = "summer_4mm", Weather(wetness=100.0), 1.5
@@ -55,7 +55,7 @@ def felt(road, words):
         material_base=mu_ref if LANE in words else None,
         patches=tuple(patch(**p) for word in words for p in patches.get(word, [])),
     )  # fmt: skip
-    world = staged(setup, 1)
+    world = build_world(setup, 1)
     if WHEEL in words:
         world.set_tyres(0, [CONTROL] * 4)
     if ZONE in words:
@@ -116,7 +116,7 @@ def test_a_map_without_materials_says_so():
         ego=ActorSetup(name="ego", type="hatchback", place=LanePosition(1, -2, 300.0)),
     )  # fmt: skip
     with pytest.raises(ConfigError, match="map straight says no <material friction>"):
-        staged(setup, 1)
+        build_world(setup, 1)
 
 
 def test_the_page_shows_the_rule():

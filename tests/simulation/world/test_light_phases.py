@@ -71,7 +71,7 @@ def test_one_waits_before_the_crossing_wherever_the_light_is_drawn() -> None:
 def test_one_arm_at_a_time_has_green_or_yellow_and_all_have_their_turn() -> None:
     map, dt = redrawn(controllers=False), 0.05
     for seed in range(4):
-        lights = Lights.pretimed(map, seed, dt)
+        lights = Lights.build_pretimed(map, seed, dt)
         open_for = dict.fromkeys((1001, 1002, 1003, 1004), 0.0)
         cycle = 4 * (GREEN_S + YELLOW_S + RED_S)
         assert cycle > CYCLE_S
@@ -86,7 +86,7 @@ def test_one_arm_at_a_time_has_green_or_yellow_and_all_have_their_turn() -> None
 
 
 def test_a_light_that_is_held_stays_and_nobody_crosses_it() -> None:
-    lights = Lights.pretimed(TOWN, 1, 0.05)
+    lights = Lights.build_pretimed(TOWN, 1, 0.05)
     lights.hold([(1003, LightState.GREEN), (77, LightState.RED)])
     wanted = {
         1001: LightState.RED,

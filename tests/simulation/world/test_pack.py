@@ -14,7 +14,7 @@ from skidpad.core.vocabulary import Control, SensorLevel, TrafficStart
 from skidpad.core.weather import Weather
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
-from skidpad.simulation.world.stage import staged
+from skidpad.simulation.world.stage import build_world
 from skidpad.simulation.world.traffic.pack import RADIUS, UNSEEN, Pack
 from skidpad.simulation.world.world import EGO, World
 
@@ -31,7 +31,7 @@ def packed(map: str, vehicles: int = 20, seed: int = 3) -> World:
     setup = Setup(
         map=map, weather=Weather(), specs=(), ego=ego, traffic=traffic, level=SensorLevel.OBJECTS
     )
-    return staged(setup, seed)
+    return build_world(setup, seed)
 
 
 def pack_of(world: World) -> Pack:

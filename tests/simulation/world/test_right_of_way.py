@@ -79,7 +79,7 @@ def test_of_two_that_meet_exactly_one_yields_unless_the_lanes_part():
 @pytest.mark.req("C-210")
 def test_crossing_streets_never_have_green_together():
     for seed in range(5):
-        lights = Lights.pretimed(TOWN, seed, 0.05)
+        lights = Lights.build_pretimed(TOWN, seed, 0.05)
         heading = TOWN.signals.heading[lights.rows]
         north_south = np.abs(np.sin(heading)) > 0.7
         for _ in range(1800):

@@ -22,7 +22,7 @@ from skidpad.physics.presets import find_weather
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.world.lights import CYCLE_S, Lights
-from skidpad.simulation.world.stage import staged
+from skidpad.simulation.world.stage import build_world
 from skidpad.simulation.world.traffic.idm import A_EMERGENCY, Character, idm
 from skidpad.simulation.world.traffic.mobil import GAP_CLEAR, incentive, is_safe
 from skidpad.simulation.world.traffic.placement import (
@@ -48,7 +48,7 @@ FOLLOWER = Character(1.5, 1.4)
 
 
 def world_without_ego(seed: int, setup: Setup = SETUP) -> World:
-    world = staged(setup, seed)
+    world = build_world(setup, seed)
     world.states.present[0] = False
     world.command(EGO, PARKED)
     return world
@@ -205,7 +205,7 @@ def test_ice_that_drivers_do_not_know_makes_them_slide_and_knowing_helps() -> No
 
 @pytest.mark.req("M-7")
 def test_a_wreck_is_put_back_far_from_the_ego() -> None:
-    world = staged(SETUP, 1)
+    world = build_world(SETUP, 1)
     world.command(EGO, PARKED)
     for _ in range(100):
         world.step()
@@ -228,7 +228,9 @@ def test_a_wreck_is_put_back_far_from_the_ego() -> None:
 
 @pytest.mark.req("A-209")
 def test_random_traffic_fills_up_and_stays_around_the_ego() -> None:
-    world = staged(replace(SETUP, traffic=TrafficSetup(mode=TrafficStart.RANDOM, vehicles=40)), 1)
+    world = build_world(
+        replace(SETUP, traffic=TrafficSetup(mode=TrafficStart.RANDOM, vehicles=40)), 1
+    )
     world.command(EGO, PARKED)
     assert world.states.present.sum() == 1
     for _ in range(600):
@@ -238,7 +240,7 @@ def test_random_traffic_fills_up_and_stays_around_the_ego() -> None:
     away = np.hypot(states.x - states.x[0], states.y - states.y[0])
     assert away.max() < 650.0
     with pytest.raises(ConfigError, match="between 0 and 80"):
-        staged(replace(SETUP, traffic=TrafficSetup(mode=TrafficStart.RANDOM, vehicles=81)), 1)
+        build_world(replace(SETUP, traffic=TrafficSetup(mode=TrafficStart.RANDOM, vehicles=81)), 1)
 
 
 @pytest.mark.req("M-6")
@@ -258,7 +260,7 @@ def test_an_initial_limit_holds_until_the_first_sign() -> None:
 @pytest.mark.req("M-2")
 def test_lights_cycle_with_ten_three_and_thirty_two_seconds() -> None:
     dt = 0.05
-    lights = Lights.pretimed(MAP, seed=4, dt=dt)
+    lights = Lights.build_pretimed(MAP, seed=4, dt=dt)
     seen = []
     for _ in range(round(2 * CYCLE_S / dt)):
         seen.append(dict(lights.by_id))

@@ -54,7 +54,7 @@ def test_coming_and_going_of_others_changes_nothing_far_away():
         alone.step()
         busy.step()
         assert np.array_equal(motion(alone, ids[0]), motion(busy, ids[0]))
-    assert [m.wheeled for m in busy.members] == [True, False]
+    assert [m.is_wheeled for m in busy.members] == [True, False]
 
 
 def test_ids_are_kept_and_vehicles_come_before_bodies_without_wheels():

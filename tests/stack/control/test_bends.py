@@ -14,7 +14,7 @@ from skidpad.core.run import AdasDriver, Function, Roads, RunSpec
 from skidpad.core.vocabulary import SensorLevel, Tier
 from skidpad.roads.bundled import load_map
 from skidpad.stack.adas import AdasStack
-from skidpad.stack.control.bends import BendSpeed, bend_speed, slowed, speed_before
+from skidpad.stack.control.bends import BendSpeed, bend_speed, slow_for_bend, speed_before
 from skidpad.stack.control.tiers import Request
 
 
@@ -42,11 +42,11 @@ def test_braking_as_planned_arrives_at_the_speed_of_the_bend(v: float) -> None:
 
 def test_the_harder_braking_wins() -> None:
     cruise, stop = Request(Tier.CRUISE, throttle=0.5), Request(Tier.HARD_STOP, brake=1.0)
-    assert slowed(cruise, 20.0, inf) == cruise
-    assert slowed(cruise, 20.0, 20.0) == cruise
-    assert slowed(cruise, 20.5, 20.0) == Request(Tier.BEND, brake=pytest.approx(0.2))
-    assert slowed(cruise, 40.0, 20.0).brake == 0.4
-    assert slowed(stop, 40.0, 20.0) == stop
+    assert slow_for_bend(cruise, 20.0, inf) == cruise
+    assert slow_for_bend(cruise, 20.0, 20.0) == cruise
+    assert slow_for_bend(cruise, 20.5, 20.0) == Request(Tier.BEND, brake=pytest.approx(0.2))
+    assert slow_for_bend(cruise, 40.0, 20.0).brake == 0.4
+    assert slow_for_bend(stop, 40.0, 20.0) == stop
 
 
 def test_a_bend_is_braked_for_only_with_the_function() -> None:

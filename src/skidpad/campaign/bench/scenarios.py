@@ -65,7 +65,7 @@ class ScenarioCost:
     most: bool
 
     @property
-    def met(self) -> bool:
+    def is_met(self) -> bool:
         """The target is reached."""
         return self.value <= self.target if self.most else self.value >= self.target
 

@@ -96,7 +96,7 @@ class Meter:
     def __init__(self) -> None:
         self.total: dict[str, int] = {}
 
-    def timed(self, name: str, function: F) -> F:
+    def time_calls(self, name: str, function: F) -> F:
         """`function`, its time added to `name`."""
 
         @wraps(function)
@@ -142,10 +142,10 @@ def tick_cost(spec: RunSpec, seconds: float = 60.0) -> TickCost:
     backend = EmbeddedBackend()
     frame = backend.reset(stage.setup, spec.seed)
     _instrument(backend, meter)
-    driver.act = meter.timed("stack", driver.act)
-    supervisor.observe = meter.timed("supervisor", supervisor.observe)
-    supervisor.act = meter.timed("supervisor", supervisor.act)
-    log.see = meter.timed("log", log.see)
+    driver.act = meter.time_calls("stack", driver.act)
+    supervisor.observe = meter.time_calls("supervisor", supervisor.observe)
+    supervisor.act = meter.time_calls("supervisor", supervisor.act)
+    log.see = meter.time_calls("log", log.see)
     clock = Spans(meter, round(WARM_UP / stage.setup.dt))
     failure = loop(backend, frame, driver, supervisor, stage.script, (log, clock))
     backend.close()
@@ -157,12 +157,12 @@ def tick_cost(spec: RunSpec, seconds: float = 60.0) -> TickCost:
 def _instrument(backend: EmbeddedBackend, meter: Meter) -> None:
     """Clocks around the world's step, the sensors, and images that the stack asks for."""
     world: Any = backend.world
-    world.step = meter.timed("world", world.step)
+    world.step = meter.time_calls("world", world.step)
     sensing: Any = backend.sensing
-    sensing.read = meter.timed("sensors", sensing.read)
+    sensing.read = meter.time_calls("sensors", sensing.read)
     if isinstance(sensing, Pixels):
         suite: Any = sensing.suite
-        suite.render = meter.timed("rendering", suite.render)
+        suite.render = meter.time_calls("rendering", suite.render)
 
 
 def _summary(spans: np.ndarray[Any, Any], total: dict[str, int], lazy: bool) -> TickCost:

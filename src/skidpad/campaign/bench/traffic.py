@@ -16,7 +16,7 @@ from skidpad.core.setup import DT
 from skidpad.core.vocabulary import TrafficStart
 from skidpad.evidence.statistics import Interval, poisson_interval
 from skidpad.physics.presets import find_weather
-from skidpad.simulation.world.stage import staged
+from skidpad.simulation.world.stage import build_world
 from skidpad.simulation.world.world import EGO, World
 
 DRIVE = 500.0  # s from one seed
@@ -76,7 +76,7 @@ def background_world(asked: TrafficBench, weather: str, seed: int) -> World:
         "recommended", {"drivers": not asked.careless, "headways": asked.headways}
     )
     spec = RunSpec(course=roads, weather=find_weather(weather), settings=settings)
-    world = staged(stage_of(spec).setup, seed)
+    world = build_world(stage_of(spec).setup, seed)
     assert world.traffic is not None
     place = world.placed[EGO]
     world.traffic.engage(EGO, int(place["lane"]), float(place["s"]))

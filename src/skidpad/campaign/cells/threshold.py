@@ -138,9 +138,9 @@ class Task:
         """How the lead is moved."""
         return scenario_of(self.run).actors
 
-    def resolved(self) -> dict[str, Any]:
+    def to_identity(self) -> dict[str, Any]:
         """Everything that decides the run."""
-        return self.run.resolved()
+        return self.run.to_identity()
 
 
 def tasks(template: RunSpec, levels: Levels, seeds: range) -> list[Task]:

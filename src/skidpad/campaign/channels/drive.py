@@ -150,7 +150,7 @@ class ChannelRecorder(Sink):
         """The contacts of the step that led here; at the begin of a cycle what is said and true."""
         crew, truth = self.crew, moment.truth
         if self._t is not None:
-            self.referee.touched(self._t, truth)
+            self.referee.note_contacts(self._t, truth)
         if crew.cycle is None or crew.cycle < 0:
             return
         if self.referee.over or self.left == 0:

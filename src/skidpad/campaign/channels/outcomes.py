@@ -63,7 +63,7 @@ class Referee:
         if abs(offset) > LOST or self.at * STEP > self.route.length - 30.0:
             self.over, self.ended = True, Ending.OFF_ROUTE
 
-    def touched(self, t: float, truth: WorldTruth) -> None:
+    def note_contacts(self, t: float, truth: WorldTruth) -> None:
         """Contacts of one tick."""
         s = truth.states
         for contact in truth.contacts:

@@ -83,7 +83,7 @@ class StackAtWheel:
     def act(self, frame: SensorFrame) -> VehicleCommand:
         """Returns the stack's answer to the frame."""
         if self.lens is not None:
-            images, extra = self.lens.seen(frame.images), self.lens.seen(frame.extra)
+            images, extra = self.lens.add_drops(frame.images), self.lens.add_drops(frame.extra)
             frame = replace(frame, images=images, extra=extra)
         return self.stack.tick(frame)
 

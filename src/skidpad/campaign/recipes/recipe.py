@@ -27,7 +27,7 @@ class Task(Protocol):
         """Wall time after which the run counts as hanging."""
         ...
 
-    def resolved(self) -> dict[str, Any]:
+    def to_identity(self) -> dict[str, Any]:
         """Everything that decides the run, as plain data."""
         ...
 

@@ -95,20 +95,20 @@ def same_segment(recording: Path) -> bool:
 def first_ticks(log: RunLog, n: int) -> RunLog:
     """The first n ticks of a log."""
 
-    def cut(series: Any) -> Any:
+    def cut_series(series: Any) -> Any:
         return type(series)._make(a[:n] for a in series)
 
     last = int(log.tick[n - 1])
     return replace(
         log,
         tick=log.tick[:n],
-        actors=cut(log.actors),
+        actors=cut_series(log.actors),
         present=log.present[:n],
         mu=log.mu[:n],
-        ego=cut(log.ego),
-        applied=cut(log.applied),
-        requested=cut(log.requested),
-        report=cut(log.report),
+        ego=cut_series(log.ego),
+        applied=cut_series(log.applied),
+        requested=cut_series(log.requested),
+        report=cut_series(log.report),
         supervision=log.supervision[:n],
         weather=log.weather[:n],
         weathers=log.weathers[: int(log.weather[:n].max()) + 1],

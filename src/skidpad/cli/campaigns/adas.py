@@ -57,7 +57,7 @@ def adas(
 
     # what is misspelt is said before kernels and tables load
     run = tuned.resolve(run, grip=grip, range=range)
-    chosen, weathers = drivers.chosen(), climate.chosen()
+    chosen, weathers = drivers.find_drivers(), climate.find_weathers()
     if backend.backend != BackendKind.CARLA:
         require_map(roads.map)
     from skidpad.campaign.campaign import Campaign

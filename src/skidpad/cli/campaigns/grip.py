@@ -71,7 +71,7 @@ def grip(
     from skidpad.cli.campaigns.grip_plan import plan_grip, with_model
 
     run = with_model(run, tuned, cross.model, cross.esc)
-    run = structs.replace(run, driver=ego.chosen(), course=scenario)
+    run = structs.replace(run, driver=ego.find_driver(), course=scenario)
     cells = plan_grip(cross, run, seeds or REPEATS)
     from skidpad.campaign.campaign import Campaign
     from skidpad.campaign.recipes.grip import recipe

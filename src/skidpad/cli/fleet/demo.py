@@ -191,7 +191,7 @@ class Demo:
             "hazards": list(hazards),
         }  # fmt: skip
         change = self.call(self.maker, "POST", "/api/v1/changes", text).json()["change"]
-        targets = base64.b64encode(self.signed(content)).decode()
+        targets = base64.b64encode(self.sign_list(content)).decode()
         order = {"change": change, "targets": targets, "plan": PLAN}
         release = self.call(self.maker, "POST", "/api/v1/releases", order).json()["release"]
         self.payloads[payload_name(PayloadKind.RULES, content)] = content
@@ -199,7 +199,7 @@ class Demo:
         said, state = 0, dict[str, Any]()
         for _ in range(ROUNDS_MAX):
             self.round(release)
-            state = self.looked(release)
+            state = self.look_at_release(release)
             looks = [e["detail"] for e in state["events"] if e["what"] == "looked"]
             for finding in looks[said:]:
                 self.say(f"  {title}: {_finding(finding)}")
@@ -214,13 +214,13 @@ class Demo:
         )
         return state
 
-    def looked(self, release: str) -> dict[str, Any]:
+    def look_at_release(self, release: str) -> dict[str, Any]:
         """The release after a look; the service looks by itself too, and it may have ended meanwhile."""
         with suppress(BackendError):
             self.call(self.maker, "POST", f"/api/v1/releases/{release}/look")
         return next(r for r in self.releases() if r["release"] == release)
 
-    def signed(self, content: bytes) -> bytes:
+    def sign_list(self, content: bytes) -> bytes:
         """Signs the list with the new update by two of the three keys, as off line."""
         import time
 

@@ -172,7 +172,7 @@ def _scenarios(seconds: float, quiet: bool) -> dict[str, Any]:
         typer.echo("two cars, everything ideal, step 0.05 s; medians")
         for row in rows:
             typer.echo(f"  {row.what:<22} {row.value:8.2f} {row.unit}")
-    return {"rows": [{**asdict(row), "met": row.met} for row in rows]}
+    return {"rows": [{**asdict(row), "met": row.is_met} for row in rows]}
 
 
 def _traffic(asked: TrafficBench, quiet: bool) -> dict[str, Any]:

@@ -54,7 +54,7 @@ class Drivers(Struct, frozen=True):
     ] = None
     stack_set: StackSettings = ()
 
-    def chosen(self) -> list[DriverSpec]:
+    def find_drivers(self) -> list[DriverSpec]:
         """The drivers; ConfigError or FileError for what is not there."""
         from skidpad.campaign.cells.matrix import (
             cruising,
@@ -92,7 +92,7 @@ class EgoStack(Struct, frozen=True):
     ] = "2"
     stack_set: StackSettings = ()
 
-    def chosen(self) -> DriverSpec:
+    def find_driver(self) -> DriverSpec:
         """The driver; ConfigError or FileError for one that is not there."""
         from skidpad.campaign.driving.drivers import STACK, find_driver
 
@@ -141,7 +141,7 @@ class Climate(Struct, frozen=True):
         str | None, Meta(description="Vary one weather field: FIELD=FROM:TO:STEP.")
     ] = None
 
-    def chosen(self) -> list[Weather]:
+    def find_weathers(self) -> list[Weather]:
         """The weathers; `all` is the six published presets."""
         from skidpad.campaign.cells.matrix import sweep
         from skidpad.physics.presets import MATRIX, find_weather, preset_groups

@@ -81,7 +81,7 @@ class CampaignOptions(Driving, frozen=True, kw_only=True):
                 runner,
                 resume=self.resume,
                 csv=self.csv,
-                on_run=shown.ended,
+                on_run=shown.note_end,
                 on_total=shown.planned_runs,
             )
         for warning in summary.warnings():

@@ -50,7 +50,7 @@ class Shown(Progress):
         """The number of runs, once it is known that some need not be driven."""
         self.update(self.bar, total=total)
 
-    def ended(self, entry: Entry[Any, Any]) -> None:
+    def note_end(self, entry: Entry[Any, Any]) -> None:
         """A run has ended."""
         cell = cell_of(entry.run)
         runs = self.runs[cell]

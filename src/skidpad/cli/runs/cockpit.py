@@ -78,7 +78,7 @@ def drive(
     from skidpad.physics.presets import find_weather
     from skidpad.roads.map_files import require_map
 
-    chosen = drivers.chosen() if drivers != Drivers() else Drivers(configs="3").chosen()
+    chosen = drivers.find_drivers() if drivers != Drivers() else Drivers(configs="3").find_drivers()
     if len(chosen) != 1:
         raise ConfigError(f"one driver at a time, got {len(chosen)}")
     spec = structs.replace(

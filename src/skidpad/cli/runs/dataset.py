@@ -39,7 +39,7 @@ def export_dataset(
 
     require_choice("--course", course, (COURSES, *NAMES))
     run = structs.replace(tuned.resolve(run), weather=find_weather(weather))
-    run = structs.replace(run, driver=ego.chosen())
+    run = structs.replace(run, driver=ego.find_driver())
     from skidpad.campaign.dataset import export_drive, write_card
 
     for seed in range(first_seed, first_seed + seeds):

@@ -52,7 +52,7 @@ def shadow(
 
     driver = driver or "reference"
     drivers = Drivers(stack=driver) if ":" in driver else Drivers(configs=driver)
-    (found,) = drivers.chosen()
+    (found,) = drivers.find_drivers()
     spec = read_run(run)
     for foreign in spec.foreign_code:
         if not yes:

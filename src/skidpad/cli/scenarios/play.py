@@ -132,7 +132,7 @@ def play_template(
 
     return structs.replace(
         tuned.resolve(run, grip=cross.frictions()[1]),
-        driver=ego.chosen(),
+        driver=ego.find_driver(),
         course=structs.replace(scenario, parameters=cross.parameters()),
         backend=check_backend(backend),
         weather=find_weather(PLAIN),

@@ -33,12 +33,12 @@ def played_text(played: Played, page: Path) -> str:
 
 def _line(cells: Sequence[str]) -> str:
     """Return a row of the table as text, names fitted and numbers to the right."""
-    names = [_fit(cell, width) for cell, width in zip(cells[:3], WIDTHS, strict=False)]
+    names = [_pad_text(cell, width) for cell, width in zip(cells[:3], WIDTHS, strict=False)]
     numbers = [f"{cell:>{width}}" for cell, width in zip(cells[3:], WIDTHS[3:], strict=True)]
     return " ".join([*names, *numbers]).rstrip()
 
 
-def _fit(text: str, width: int) -> str:
+def _pad_text(text: str, width: int) -> str:
     """Pad to the width; what is too long loses its middle, as names differ at their ends."""
     if len(text) > width:
         half = (width - 2) // 2

@@ -92,7 +92,7 @@ class Situation:
         return threshold(self.outcomes, self.levels)
 
     @property
-    def recovered(self) -> Share:
+    def recovered_share(self) -> Share:
         """Returns the share of drives below their seed's critical friction that were completed again."""
         failed = np.logical_not(self.outcomes)
         below = np.cumsum(failed, axis=1) - failed > 0

@@ -102,6 +102,6 @@ def _is_due(alert: Alert, relay: str, now: float) -> bool:
         for e in alert.events
         if e.detail.get("relay") == relay and e.detail.get("level") == alert.level
     ]
-    if any(e.what == What.RELAYED.value for e in mine) or alert.closed or len(mine) >= TRIES:
+    if any(e.what == What.RELAYED.value for e in mine) or alert.is_closed or len(mine) >= TRIES:
         return False
     return not mine or now - mine[-1].at >= 2.0 ** (len(mine) - 1)

@@ -25,7 +25,7 @@ class Hub:
         """How often something happened so far."""
         return self._counts[topic]
 
-    async def changed(self, topic: str, seen: int, wait_s: float) -> int:
+    async def wait_for_change(self, topic: str, seen: int, wait_s: float) -> int:
         """The count once it is no longer `seen`, or after `wait_s`."""
         for _ in range(round(wait_s / STEP_S)):
             if self.count(topic) != seen:

@@ -84,7 +84,7 @@ class Alert:
         return next((e.actor for e in self.events if e.what == What.ACKNOWLEDGED.value), None)
 
     @property
-    def closed(self) -> bool:
+    def is_closed(self) -> bool:
         """Whether a person has closed the alert."""
         return any(e.what == What.CLOSED.value for e in self.events)
 
@@ -100,7 +100,7 @@ class Alert:
             "id": r.id, "operator": r.operator, "vehicle": r.vehicle, "kind": r.kind,
             "text": r.text, "scene": json.loads(r.scene), "vehicle_time": r.vehicle_time,
             "at": r.at, "level": self.level, "acknowledged_by": self.acknowledged_by,
-            "closed": self.closed,
+            "closed": self.is_closed,
             "events": [
                 {"what": e.what, "actor": e.actor, "at": e.at, "detail": e.detail}
                 for e in self.events
@@ -179,7 +179,7 @@ def _with_events(connection: Connection, rows: Any) -> list[Alert]:
 
 def answer(connection: Connection, alert: Alert, what: What, by: Principal, at: float) -> None:
     """Acknowledge, escalate or close; Refused (409) when that was done already."""
-    if alert.closed:
+    if alert.is_closed:
         raise Refused(409, "this alert is closed")
     if what is What.ACKNOWLEDGED and alert.acknowledged_by is not None:
         raise Refused(409, "this alert was acknowledged already")
@@ -190,7 +190,7 @@ def answer(connection: Connection, alert: Alert, what: What, by: Principal, at: 
 
 def overdue(alert: Alert, now: float) -> bool:
     """Whether nobody took it up for so long that it goes one level up."""
-    if alert.closed or alert.acknowledged_by is not None or alert.level >= LEVELS:
+    if alert.is_closed or alert.acknowledged_by is not None or alert.level >= LEVELS:
         return False
     at: float = alert.row.at
     return now - at >= ESCALATE_AFTER_S * (alert.level + 1)

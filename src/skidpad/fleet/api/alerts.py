@@ -61,7 +61,7 @@ async def list_alerts(
 ) -> dict[str, Any]:
     """The newest alerts; with `seen` of the last answer it waits until there is something new."""
     fleet = fleet_of(request)
-    count = await fleet.hub.changed(f"alerts {who.tenant}", seen, wait)
+    count = await fleet.hub.wait_for_change(f"alerts {who.tenant}", seen, wait)
 
     def read() -> list[dict[str, Any]]:
         with fleet.engine.connect() as connection:

@@ -31,7 +31,7 @@ async def fetch(
 
     seen = fleet.hub.count(topic)
     found = await run_in_threadpool(take)
-    if not found and await fleet.hub.changed(topic, seen, wait) != seen:
+    if not found and await fleet.hub.wait_for_change(topic, seen, wait) != seen:
         found = await run_in_threadpool(take)
     return found
 

@@ -46,7 +46,7 @@ def propose(fleet: Fleet, who: Principal, proposal: Proposal) -> str:
     row = {
         "id": new_id(), "tenant": who.tenant, "cluster": proposal.cluster,
         "kind": proposal.kind.value, "name": payload_name(proposal.kind, proposal.content),
-        "payload": fleet.blobs.put(proposal.content),
+        "payload": fleet.blobs.store(proposal.content),
         "hazards": json.dumps(list(proposal.hazards)), "reason": proposal.reason,
         "actor": who.id, "at": fleet.clock(),
     }  # fmt: skip

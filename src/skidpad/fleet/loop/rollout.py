@@ -32,7 +32,7 @@ class Rollout:
     events: tuple[Event, ...]
 
     @property
-    def ended(self) -> str | None:
+    def outcome(self) -> str | None:
         """`completed`, `reverted`, or None while it goes on."""
         return next((e.what for e in self.events if e.what in (COMPLETED, REVERTED)), None)
 
@@ -51,7 +51,7 @@ class Rollout:
         return {
             "release": self.row.id, "change": self.row.change, "payload": self.name,
             "before": self.row.before, "plan": msgspec.to_builtins(self.plan), "at": self.row.at,
-            "stage": self.stage, "share": self.share, "ended": self.ended,
+            "stage": self.stage, "share": self.share, "ended": self.outcome,
             "events": [
                 {"what": e.what, "actor": e.actor, "at": e.at, "detail": e.detail}
                 for e in self.events
@@ -63,7 +63,7 @@ def release(fleet: Fleet, who: Principal, change: str, targets: bytes, plan: Pla
     """Publish a change that was signed off line and begin its first stage; the release's id."""
     _, name, content = payload_of(fleet, who, change)
     with fleet.engine.connect() as connection:
-        running = [r for r in rollouts(connection, who.tenant) if r.ended is None]
+        running = [r for r in rollouts(connection, who.tenant) if r.outcome is None]
         before = standing(connection, who.tenant)
     if running:
         raise Refused(409, "another release is on its way; it ends first")
@@ -106,7 +106,7 @@ def rollout_of(connection: Connection, tenant: str, id: str) -> Rollout:
 
 def standing(connection: Connection, tenant: str) -> str:
     """Name of the payload that every vehicle may run: of the last completed release; "" for none."""
-    done = [r.name for r in rollouts(connection, tenant) if r.ended == COMPLETED]
+    done = [r.name for r in rollouts(connection, tenant) if r.outcome == COMPLETED]
     return done[-1] if done else ""
 
 
@@ -114,7 +114,7 @@ def assignment(connection: Connection, tenant: str, vehicle: str) -> dict[str, s
     """What a vehicle is to run: the release under way if it is chosen, else what stands."""
     stands = standing(connection, tenant)
     for one in rollouts(connection, tenant):
-        if one.ended is None and vehicle in running_on(connection, one):
+        if one.outcome is None and vehicle in running_on(connection, one):
             return {"release": one.row.id, "payload": one.name, "before": stands}
     return {"release": "", "payload": stands, "before": stands}
 
@@ -147,8 +147,8 @@ def look_at(fleet: Fleet, who: Principal, id: str) -> Finding | None:
     """
     with fleet.engine.begin() as connection:
         one = rollout_of(connection, who.tenant, id)
-        if one.ended is not None:
-            raise Refused(409, f"this release was {one.ended} already")
+        if one.outcome is not None:
+            raise Refused(409, f"this release was {one.outcome} already")
         differences, hours = _driven_differences(connection, one)
         looks_so_far = [e for e in one.events if e.what == LOOKED]
         seen = sum(int(e.detail["new_drives"]) for e in looks_so_far)

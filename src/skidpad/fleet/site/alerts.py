@@ -46,7 +46,7 @@ def draw_alerts(
 
     @ui.refreshable  # type: ignore[untyped-decorator]
     def cards(now: Principal, known: list[Alert]) -> None:
-        ui.label(open_text(sum(not a.closed for a in known)))
+        ui.label(open_text(sum(not a.is_closed for a in known)))
         for alert in known[:SHOWN]:
             _card(fleet, lines, ui, now, alert)
 
@@ -75,7 +75,7 @@ def _card(fleet: Fleet, lines: MapLines, ui: Any, who: Principal, alert: Alert) 
     """Adds the card of an alert to the page: scene, state and, while it is open, its buttons."""
     id, scene = alert.row.id, msgspec.json.decode(alert.row.scene, type=Scene)
     with ui.element("div").classes("card"):
-        state = "closed" if alert.closed else f"level {alert.level}"
+        state = "closed" if alert.is_closed else f"level {alert.level}"
         ui.label(f"{alert.row.kind.replace('_', ' ')}: {alert.row.text} ({state})")
         taken = "acknowledged" if alert.acknowledged_by else "not taken up yet"
         ui.label(f"{scene.map}, {scene.v:.1f} m/s, {taken}").classes("dim")
@@ -85,7 +85,7 @@ def _card(fleet: Fleet, lines: MapLines, ui: Any, who: Principal, alert: Alert) 
         ui.html(scene_legend(), sanitize=False).classes("dim")
         ui.label(scene_text(ego, scene.objects))
         ui.label("; ".join(e.what for e in alert.events) or "new").classes("dim")
-        if alert.closed:
+        if alert.is_closed:
             return
         for name, what in ANSWERS.items():
             ui.button(name, on_click=_answering(fleet, ui, who, id, what))

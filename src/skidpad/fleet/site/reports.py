@@ -119,7 +119,7 @@ def effect_text(one: Rollout) -> str:
 def _release(ui: Any, one: Rollout, reason: str) -> None:
     """Adds the card of a release to the page: state, effect and events so far."""
     with ui.element("div").classes("card"):
-        state = one.ended or f"stage {one.stage + 1} of {len(one.plan.stages)}"
+        state = one.outcome or f"stage {one.stage + 1} of {len(one.plan.stages)}"
         ui.label(f"{reason}: {state}")
         ui.label(effect_text(one))
         ui.label(f"{one.name}, in place of {one.row.before or 'what vehicles came with'}").classes(

@@ -125,7 +125,7 @@ class Intake:
 
     def _write(self, group: list[Batch]) -> list[Receipt | Refused]:
         """Stores the group as one pack and its facts in one transaction; returns an answer per batch."""
-        pack = self.blobs.put(b"".join(batch.body for batch in group))
+        pack = self.blobs.store(b"".join(batch.body for batch in group))
         starts = [0]
         for batch in group:
             starts.append(starts[-1] + len(batch.body))

@@ -103,7 +103,7 @@ class RosTopics:
                     quiet = time.monotonic()
                     for entry in merge.ready():
                         yield from self._frames(*entry)
-                elif merge.begun and gone:
+                elif merge.has_begun and gone:
                     break
                 elif time.monotonic() - quiet > self.silence:
                     self.losses.cut = True
@@ -152,7 +152,7 @@ class _Merge:
         self.count = 0
 
     @property
-    def begun(self) -> bool:
+    def has_begun(self) -> bool:
         """Whether any message has arrived."""
         return self.count > 0
 

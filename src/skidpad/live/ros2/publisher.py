@@ -87,7 +87,7 @@ class RosPublisher:
 
     def _writer(self, topic: str, kind: str) -> Any:
         """Returns a DDS writer of the topic for messages of type `kind`, with the flow's quality."""
-        wanted = qos(self.flow, self.types.announced(kind))
+        wanted = qos(self.flow, self.types.describe_type(kind))
         rt = Topic(self.participant, f"rt{topic}", self.types.cls(kind), qos=wanted)
         return DataWriter(self.participant, rt, qos=wanted)
 

@@ -107,7 +107,7 @@ class Types:
             self._value(what[0], v) for v in (value.tolist() if hasattr(value, "tolist") else value)
         ]
 
-    def announced(self, name: str) -> bytes:
+    def describe_type(self, name: str) -> bytes:
         """Returns what a writer announces of its type, for readers of newer distributions."""
         return f"typehash={self.store.hash_rihs01(name)};".encode()
 

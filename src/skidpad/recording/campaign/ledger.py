@@ -139,7 +139,7 @@ class Ledger(Generic[E], AbstractContextManager["Ledger[E]"]):
             raise output_error(self.path, error) from error
         self.entries.append(entry)
 
-    def done(self) -> frozenset[str]:
+    def completed_runs(self) -> frozenset[str]:
         """Runs that need not be driven again: all but those that crashed or timed out."""
         last = latest(self.entries)
         return frozenset(e.run for e in last if Outcome(e.key.outcome) not in RETRIED)

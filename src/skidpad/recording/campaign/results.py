@@ -91,7 +91,7 @@ class Columns(Generic[K, M]):
                 write_csv((folder / name).with_suffix(".csv"), content)
         return self.hash(table)
 
-    def checked(self, table: pl.DataFrame, path: Path) -> pl.DataFrame:
+    def check_table(self, table: pl.DataFrame, path: Path) -> pl.DataFrame:
         """The table with every column; FileError when it is one of another kind.
 
         Metrics of versions that did not have them yet are null, factors their default.
@@ -134,7 +134,7 @@ def read_results(folder: Path, columns: Columns[Any, Any] | None = None) -> pl.D
     if (folder / "ledger.jsonl").is_file() and not (folder / RESULTS).is_file():
         raise FileError(f"{folder} holds a campaign that is not finished: finish it with --resume")
     table = read_parquet(folder / RESULTS)[0]
-    return table if columns is None else columns.checked(table, folder / RESULTS)
+    return table if columns is None else columns.check_table(table, folder / RESULTS)
 
 
 def definitions_of(rows: type[Any]) -> list[tuple[str, str, str]]:

@@ -133,7 +133,7 @@ class _Assembler:
                 return None
             found = self.objects[1]
             if self.topics.objects.frame is Frame.EGO:
-                found = found.placed(ego)
+                found = found.to_world(ego)
         self.last = t
         return ChannelFrame(
             t=t,

@@ -36,7 +36,7 @@ class RosObjects(NamedTuple):
     ids: Ints  # (n,)
     classes: Ints  # (n,)
 
-    def placed(self, ego: Floats) -> RosObjects:
+    def to_world(self, ego: Floats) -> RosObjects:
         """The objects in the world, given in the frame of `ego` (5,)."""
         c, s = cos(ego[2]), sin(ego[2])
         turn = np.array([[c, s], [-s, c]])

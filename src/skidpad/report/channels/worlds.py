@@ -27,7 +27,7 @@ def worlds_replay(record: HazardRecord) -> dict[str, Any] | None:
         return None
     times = np.array([c.t for c in cycles])
 
-    def shown(t: float) -> int:  # a drive may end between two shown cycles
+    def find_shown(t: float) -> int:  # a drive may end between two shown cycles
         return min(int(np.searchsorted(times, t)), len(times) - 1)
 
     return {
@@ -35,10 +35,10 @@ def worlds_replay(record: HazardRecord) -> dict[str, Any] | None:
         "unit": UNIT,
         "span": SPAN,
         "t0": round(float(times[0]), 2),
-        "mark": shown(record.t_worst),
+        "mark": find_shown(record.t_worst),
         "hazard": [
-            shown(record.t_start),
-            shown(record.t_end),
+            find_shown(record.t_start),
+            find_shown(record.t_end),
         ],
         "names": list(record.channels),
         "driving": None if record.driving is None else record.channels.index(record.driving),

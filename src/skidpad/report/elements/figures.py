@@ -86,14 +86,14 @@ def _numbered_ids(text: str) -> str:
         old: str(k) for k, old in enumerate(dict.fromkeys(re.findall(r'\bid="([^"]+)"', text)))
     }
 
-    def renamed(prefix: str) -> str:
+    def rename_ids(prefix: str) -> str:
         def swap(match: re.Match[str]) -> str:
             new = order.get(match[2])
             return match[0] if new is None else f"{match[1]}{prefix}{new}{match[3]}"
 
         return re.sub(r'(\bid="|url\(#|href="#)([^")]+)(["\)])', swap, text)
 
-    return renamed("c" + hashlib.sha256(renamed("").encode()).hexdigest()[:8] + "-")
+    return rename_ids("c" + hashlib.sha256(rename_ids("").encode()).hexdigest()[:8] + "-")
 
 
 def grouped_bars(groups: Sequence[str], series: Sequence[Series], y_label: str) -> str:

@@ -75,7 +75,7 @@ class ThresholdMap(CampaignView[ThresholdEntry]):
         return [s for s in self.situations if s.tells]
 
     @cached_property
-    def reached(self) -> list[Situation]:
+    def reached_situations(self) -> list[Situation]:
         """Those of them in which half of the drives end in an accident on some level."""
         return [s for s in self.telling if s.threshold.mu is not None]
 
@@ -115,7 +115,7 @@ def build_page(campaign: ThresholdMap) -> Page:
 
 def _answers(campaign: ThresholdMap) -> Answers:
     """Returns the answers of a threshold map: whether, where and for which driver friction decides."""
-    telling, reached = campaign.telling, campaign.reached
+    telling, reached = campaign.telling, campaign.reached_situations
     asked = (
         f"{len(telling)} of {len(campaign.situations)} situations are completed on dry road; in "
         f"{len(reached)} of these half of the drives end in an accident on some level of friction."
@@ -150,7 +150,9 @@ def _headline(campaign: ThresholdMap) -> Numbers:
     items = [
         Number(f"{len(campaign.results)}", "runs", f"{n} situations"),
         Number(f"{len(campaign.telling)}", "completed on dry road", "at least 95 % of drives"),
-        Number(f"{len(campaign.reached)}", "with a threshold", "half of the drives collide"),
+        Number(
+            f"{len(campaign.reached_situations)}", "with a threshold", "half of the drives collide"
+        ),
     ]
     return Numbers(items)
 
@@ -186,7 +188,7 @@ def _map(campaign: ThresholdMap) -> list[Block]:
         Column("threshold", _threshold, "friction at which half have had an accident", "", MU),
         Column(
             "completed again",
-            lambda s: share(s.recovered),
+            lambda s: share(s.recovered_share),
             "of the drives below their seed's critical friction; not 0: less grip can be milder",
             "%",
             SHARE,

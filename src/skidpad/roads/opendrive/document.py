@@ -47,7 +47,7 @@ class Shift:
     z: float = 0.0
     heading: float = 0.0
 
-    def applied(self, x: float, y: float) -> tuple[float, float]:
+    def apply(self, x: float, y: float) -> tuple[float, float]:
         """Returns the world's x and y in m of a point of the file."""
         c, s = cos(self.heading), sin(self.heading)
         x, y = x + self.x, y + self.y
@@ -340,7 +340,7 @@ def _element(read: Reader, node: Node) -> Element:
                 node, f"needs line, arc, spiral, poly3 or paramPoly3, got {tag or 'nothing'}"
             )
     s, x, y, heading = (read.number(node, k) for k in ("s", "x", "y", "hdg"))
-    return Element(s, *read.shift.applied(x, y), heading + read.shift.heading, length, shape)
+    return Element(s, *read.shift.apply(x, y), heading + read.shift.heading, length, shape)
 
 
 def _sections(read: Reader, road: Node, length: float) -> tuple[SectionRecord, ...]:

@@ -97,7 +97,7 @@ def compile_assign(node: Node, ctx: Context) -> Activate:
     found: ControllerOf | None = None
     for one in node.children("CatalogReference", "Controller"):
         try:
-            found, unknown = controller_of(ctx.catalogs.resolved(one, "Controller"), ctx.names)
+            found, unknown = controller_of(ctx.catalogs.resolve(one, "Controller"), ctx.names)
         except Fault as fault:
             ctx.findings.append(replace(fault.finding, kind=Kind.NOTE))
             continue
@@ -134,7 +134,7 @@ def compile_override(node: Node, ctx: Context) -> PrivateAction:
     inputs: dict[str, float | None] = {}
     for part in node.children():
         if part.tag not in INPUTS:
-            raise part.unsupported()
+            raise part.unsupported_fault()
         name, value = INPUTS[part.tag]
         active = part.flag("active", default=False)
         if name and not (active and part.find("BrakeForce") is not None):
@@ -205,7 +205,7 @@ def compile_controller(node: Node, ctx: Context) -> PrivateAction:
 def _is_known(node: Node) -> bool:
     """Returns True for a supported tag; raises the error "not supported" for any other."""
     if node.tag not in TABLE:
-        raise node.unsupported()
+        raise node.unsupported_fault()
     return True
 
 

@@ -98,7 +98,7 @@ class KeepGap:
 
     def excess(self, scene: Scene, actor: Actor, side: Displacement) -> float:
         """Returns by how much the entity is too far back, m."""
-        return self.ahead(scene, actor) - self.wanted(scene, side)
+        return self.ahead(scene, actor) - self.wanted_gap(scene, side)
 
     def ahead(self, scene: Scene, actor: Actor) -> float:
         """Returns how far the other one is ahead, m; between the outlines if free, 0 abreast."""

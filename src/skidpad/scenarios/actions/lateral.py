@@ -183,7 +183,7 @@ def compile_lane_change(node: Node, ctx: Context) -> LaneChange:
     change = dynamics(node.child("LaneChangeActionDynamics"))
     target = node.child("LaneChangeTarget").only()
     if target.tag not in ("RelativeTargetLane", "AbsoluteTargetLane"):
-        raise target.unsupported()
+        raise target.unsupported_fault()
     other = ctx.entity(target) if target.tag == "RelativeTargetLane" else None
     return LaneChange(change, target.whole("value"), other, node.number("targetLaneOffset", 0.0))
 
@@ -241,7 +241,7 @@ def compile_lane_offset(node: Node, ctx: Context) -> LaneOffset:
         raise found.error(f"maxLateralAcc must be positive, got {a_max:g}")
     target = node.child("LaneOffsetTarget").only()
     if target.tag not in ("AbsoluteTargetLaneOffset", "RelativeTargetLaneOffset"):
-        raise target.unsupported()
+        raise target.unsupported_fault()
     other = ctx.entity(target) if target.tag == "RelativeTargetLaneOffset" else None
     shape = found.choice("dynamicsShape", Shape)
     continuous = node.flag("continuous", default=False)

@@ -210,7 +210,7 @@ def compile_synchronize(node: Node, ctx: Context) -> Synchronize:
         speed = found.only()
         relative = speed.tag == "RelativeSpeedToMaster"
         if not relative and speed.tag != "AbsoluteSpeed":
-            raise speed.unsupported()
+            raise speed.unsupported_fault()
         v_end = speed.number("value")
         steady = _steady(speed)
     master = "masterEntityRef" if node.has("masterEntityRef") else "entityRef"

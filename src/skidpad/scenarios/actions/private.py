@@ -58,5 +58,5 @@ def private_action(node: Node, ctx: Context) -> PrivateAction:
     if inner.tag in GROUPS:
         inner = inner.only()
     if inner.tag not in PRIVATE:
-        raise inner.unsupported()
+        raise inner.unsupported_fault()
     return PRIVATE[inner.tag](inner, ctx)

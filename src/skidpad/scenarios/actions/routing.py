@@ -139,7 +139,7 @@ class FollowTrajectory:
 
     def first_pose(self, scene: Scene, here: Pose, v: float) -> Pose:
         """Returns where an entity with speed v is led to at the begin of the scenario."""
-        line = self.trajectory.traced(scene, here)
+        line = self.trajectory.trace(scene, here)
         if self.timing is None or line.t is None:
             return PacedTrack(line, self.s_begin, 0.0, self.trajectory.closed, v).at(0.0)[0]
         return line.at_time(-self._zero(line, self.timing, 0.0) / self.timing.scale)

@@ -268,7 +268,7 @@ def compile_speed(node: Node, ctx: Context) -> Speed:
     if target.tag == "AbsoluteTargetSpeed":
         return Speed(change, Target(target.number("value")))
     if target.tag != "RelativeTargetSpeed":
-        raise target.unsupported()
+        raise target.unsupported_fault()
     relation = target.choice("speedTargetValueType", Relation)
     continuous = target.flag("continuous", default=False)
     other = ctx.entity(target)

@@ -217,5 +217,5 @@ def compile_traffic(node: Node, ctx: Context) -> GlobalAction:
     if what.tag == "TrafficStopAction":
         return StopTraffic(name)
     if what.tag not in TRAFFIC:
-        raise what.unsupported()
+        raise what.unsupported_fault()
     return StartTraffic(name, TRAFFIC[what.tag](what, ctx))

@@ -68,4 +68,4 @@ def compile_trailer(node: Node, ctx: Context) -> ConnectTrailer | DisconnectTrai
         return ConnectTrailer(ctx.entity(inner, "trailerRef"))
     if inner.tag == "DisconnectTrailerAction":
         return DisconnectTrailer()
-    raise inner.unsupported()
+    raise inner.unsupported_fault()

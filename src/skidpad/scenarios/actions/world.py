@@ -59,7 +59,7 @@ def _entity(node: Node, ctx: Context) -> GlobalAction:
         return AddEntity(name, position(what.child("Position"), ctx))
     if what.tag == "DeleteEntityAction":
         return DeleteEntity(name)
-    raise what.unsupported()
+    raise what.unsupported_fault()
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +96,7 @@ def _value(node: Node, ctx: Context) -> GlobalAction:
         value = what.text("value")
         return SetValue(name, variable, lambda _: value)
     if what.tag != "ModifyAction":
-        raise what.unsupported()
+        raise what.unsupported_fault()
     rule = what.child("Rule").only()
     size = rule.number("value")
     try:
@@ -107,7 +107,7 @@ def _value(node: Node, ctx: Context) -> GlobalAction:
         return SetValue(name, variable, lambda old: as_text(float(old) + size))
     if rule.tag == "MultiplyByValue":
         return SetValue(name, variable, lambda old: as_text(float(old) * size))
-    raise rule.unsupported()
+    raise rule.unsupported_fault()
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +131,7 @@ def _infrastructure(node: Node, ctx: Context) -> GlobalAction:
         return SetSignal(what.text("name"), what.text("state"))
     if what.tag == "TrafficSignalControllerAction":
         return SetSignal(what.text("trafficSignalControllerRef"), what.text("phase"))
-    raise what.unsupported()
+    raise what.unsupported_fault()
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +149,7 @@ class SetEnvironment:
 
 def _environment(node: Node, ctx: Context) -> GlobalAction:
     """Compiles the action that sets the environment given in place or by a catalogue reference."""
-    return SetEnvironment(compile_environment(ctx.catalogs.resolved(node.only(), "Environment")))
+    return SetEnvironment(compile_environment(ctx.catalogs.resolve(node.only(), "Environment")))
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,5 +196,5 @@ def global_action(node: Node, ctx: Context) -> GlobalAction:
     """Compiles the action inside a <GlobalAction>; raises an error for an unsupported one."""
     inner = node.only()
     if inner.tag not in GLOBAL:
-        raise inner.unsupported()
+        raise inner.unsupported_fault()
     return GLOBAL[inner.tag](inner, ctx)

@@ -57,5 +57,5 @@ def rule_name(node: Node) -> str:
     """Returns the attribute `rule` of a node; raises an error for one that is not supported."""
     name = node.text("rule")
     if name not in RULES:
-        raise node.unsupported(f"rule={name!r} is not supported, only {', '.join(RULES)}")
+        raise node.unsupported_fault(f"rule={name!r} is not supported, only {', '.join(RULES)}")
     return name

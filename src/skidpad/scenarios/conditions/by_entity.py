@@ -84,17 +84,17 @@ class Motion:
         """
         own = scene.actors[actor]
         if self.component is Component.VERTICAL:
-            return self.rule.met(0.0)
+            return self.rule.is_met(0.0)
         if self.component is Component.TOTAL:
             total = own.a if self.acceleration else own.v_signed
             other = 0.0 if self.other is None else scene.actors[self.other].v_signed
-            return self.rule.met(total - other)
+            return self.rule.is_met(total - other)
         x, y = own.acceleration if self.acceleration else (own.motion.vx, own.motion.vy)
         if self.other is not None:
             m = scene.actors[self.other].motion
             x, y = x - m.vx, y - m.vy
         forward, left = between(Pose(0.0, 0.0, yaw=own.motion.yaw), x, y)
-        return self.rule.met(forward if self.component is Component.LONGITUDINAL else left)
+        return self.rule.is_met(forward if self.component is Component.LONGITUDINAL else left)
 
 
 def _motion(node: Node, ctx: Context) -> EntityCondition:
@@ -145,7 +145,7 @@ def _collision(node: Node, ctx: Context) -> EntityCondition:
     if by.tag == "EntityRef":
         return Collision(ctx.actors([by]))
     if by.tag != "ByType":
-        raise by.unsupported()
+        raise by.unsupported_fault()
     return Collision(None, by.choice("type", Body))
 
 
@@ -272,7 +272,7 @@ class Clearance:
         if not self.opposite and (there.lane_id > 0) != (near.lane_id > 0):
             return False
         sign = 1 if scene.network.forward(near) == along else -1
-        return not self.lanes or there.lane_id in self._wanted(near.lane_id, sign)
+        return not self.lanes or there.lane_id in self._find_lanes(near.lane_id, sign)
 
 
 def _clearance(node: Node, ctx: Context) -> EntityCondition:

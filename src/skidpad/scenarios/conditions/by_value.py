@@ -26,7 +26,7 @@ class SimulationTime:
 
     def probe(self) -> Probe:
         """Returns the function of a scene that compares its time in s with the value."""
-        return lambda scene: self.rule.met(scene.t)
+        return lambda scene: self.rule.is_met(scene.t)
 
 
 def _time(node: Node, ctx: Context) -> Condition:
@@ -129,7 +129,7 @@ def _element(node: Node, ctx: Context) -> Condition:
     for move in Move:
         if move.value == text:
             return ElementMove(path, move)
-    raise node.unsupported(f"state={text!r} is not supported")
+    raise node.unsupported_fault(f"state={text!r} is not supported")
 
 
 @dataclass(frozen=True, slots=True)

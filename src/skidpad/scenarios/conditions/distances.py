@@ -95,7 +95,7 @@ class Distance:
     def holds(self, scene: Scene, actor: str) -> bool:
         """Returns whether the actor's distance in m meets the comparison with the value."""
         goal, other = target(scene, self.other, self.goal)
-        return self.rule.met(self.measure.distance(scene, scene.actors[actor], goal, other))
+        return self.rule.is_met(self.measure.distance(scene, scene.actors[actor], goal, other))
 
 
 def target(scene: Scene, other: str | None, goal: Position | None) -> tuple[Pose, Actor | None]:
@@ -135,7 +135,7 @@ class TimeHeadway:
         if own.v <= 0.0 or (behind and self.measure.direction is Direction.LONGITUDINAL):
             return False
         distance = self.measure.distance(scene, own, other.pose, other)
-        return self.rule.met(distance / own.v)
+        return self.rule.is_met(distance / own.v)
 
 
 def _headway(node: Node, ctx: Context) -> EntityCondition:
@@ -170,7 +170,7 @@ class TimeToCollision:
             forward = self.measure.direction is Direction.LONGITUDINAL
             way, speed = (ahead, along) if forward else (left, across)
             closing = speed if way >= 0.0 else -speed
-        return self.rule.met(distance / closing if closing > SLOWEST else inf)
+        return self.rule.is_met(distance / closing if closing > SLOWEST else inf)
 
 
 def _collision_time(node: Node, ctx: Context) -> EntityCondition:

@@ -196,7 +196,7 @@ def _vertices(track: Track) -> list[Vertex]:
 
 def _waiting(t: float, sheet: Sheet, k: int, further: float = 0.0) -> Vertex:
     """Returns a vertex at time t in s on the parking place of entity k, `further` m along its heading."""
-    x, y, h = sheet.parked(k)
+    x, y, h = sheet.parking_place(k)
     x, y = x + further * cos(h), y + further * sin(h)
     return Vertex(round(t, 3), round(x, 3), round(y, 3), 0.0, round(h, 4))
 

@@ -218,7 +218,7 @@ class Network:
             if 0.0 <= s <= length:
                 return self.map.at(point.lane, s)
             forward = s > length
-            following = self._wanted(point.lane, forward, roads)
+            following = self._next_lane(point.lane, forward, roads)
             if following is None:
                 return self.map.ahead(point, distance)
             entry = 0.0 if forward else float(self.map.lanes.length[following])

@@ -120,7 +120,7 @@ def _geo(node: Node, ctx: Context) -> Position:
 
 def _facing(place: Place, facing: Orientation) -> Place:
     """Returns the place with its yaw turned to the given orientation."""
-    return replace(place, pose=replace(place.pose, yaw=facing.turned(place.pose.yaw)))
+    return replace(place, pose=replace(place.pose, yaw=facing.to_world_heading(place.pose.yaw)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +145,7 @@ class RelativeLane:
         pose, here = at.pose, at.lane
         if here is None:
             moved = pose.moved(forward=self.ds, left=self.offset)
-            return Place(replace(moved, yaw=self.facing.turned(pose.yaw)))
+            return Place(replace(moved, yaw=self.facing.to_world_heading(pose.yaw)))
         forward = network.forward(here)
         backwards = not (forward or self.along_lane)
         sign = -1 if self.along_lane and not forward else 1
@@ -160,7 +160,7 @@ class RelativeLane:
         left = self.offset if (aligned or self.along_lane) else -self.offset
         base = point.heading if (aligned or self.along_lane) else point.heading + pi
         spot = network.aside(point, left)
-        pose = replace(spot, yaw=self.facing.turned(wrap_angle(base)))
+        pose = replace(spot, yaw=self.facing.to_world_heading(wrap_angle(base)))
         return Place(pose, replace(point, offset=left))
 
 
@@ -209,7 +209,7 @@ class RelativeObject:
             moved = pose.moved(forward=self.dx, left=self.dy * cos(roll))
         else:
             moved = replace(pose, x=pose.x + self.dx, y=pose.y + self.dy)
-        return scene.network.place_of(replace(moved, yaw=self.facing.turned(pose.yaw)))
+        return scene.network.place_of(replace(moved, yaw=self.facing.to_world_heading(pose.yaw)))
 
 
 def _relative_lane(node: Node, ctx: Context) -> Position:
@@ -254,5 +254,5 @@ def position(node: Node, ctx: Context) -> Position:
     inner = node.only()
     make = POSITIONS.get(inner.tag) or ctx.further_positions.get(inner.tag)
     if make is None:
-        raise inner.unsupported()
+        raise inner.unsupported_fault()
     return make(inner, ctx)

@@ -38,7 +38,7 @@ def compile_route(node: Node, ctx: Context) -> ScenarioRoute:
     for waypoint in node.children("Waypoint"):
         at = position(waypoint.child("Position"), ctx)
         if not isinstance(at, Fixed):
-            raise waypoint.unsupported("waypoints that depend on entities are not supported")
+            raise waypoint.unsupported_fault("waypoints that depend on entities are not supported")
         if at.fixed.lane is None:
             raise waypoint.error("is on no road")
         points.append(at.fixed.lane)
@@ -98,12 +98,12 @@ class OnRoute:
         if self.lane_id is None:
             there = network.on_road(point.road, network.map.s_road(point), self.offset).pose
             _, left = between(point.pose, there.x, there.y)
-            there = replace(there, yaw=self.facing.turned(point.heading))
+            there = replace(there, yaw=self.facing.to_world_heading(point.heading))
             return Place(there, replace(point, offset=left / network.lean(point)))
         point = network.beside(point, self.lane_id) or point
         left = self.offset if network.forward(point) else -self.offset
         pose = network.aside(point, left)
-        pose = replace(pose, yaw=self.facing.turned(pose.yaw))
+        pose = replace(pose, yaw=self.facing.to_world_heading(pose.yaw))
         return Place(pose, replace(point, offset=left))
 
 
@@ -131,4 +131,4 @@ def route_position(node: Node, ctx: Context) -> Position:
         return OnRoute(
             route, inside.number("pathS"), inside.whole("laneId"), offset, orientation(node)
         )
-    raise inside.unsupported()
+    raise inside.unsupported_fault()

@@ -56,7 +56,7 @@ def compile_trajectory(node: Node, ctx: Context) -> Trajectory:
             _check_times(shape, [v.time for v in known])
             return Trajectory(name, closed, Line(known, closed=closed))
     if shape.tag not in SHAPES:
-        raise shape.unsupported()
+        raise shape.unsupported_fault()
     nodes, make = SHAPES[shape.tag](shape)
     places = tuple(position(n, ctx) for n in nodes)
     fixed = [p.fixed.pose for p in places if isinstance(p, Fixed)]
@@ -234,11 +234,11 @@ class OnTrajectory:
 
     def place(self, scene: Scene) -> Place:
         """Returns the place on the line as it is now; left of the way that the line runs."""
-        line = self.trajectory.traced(scene)
+        line = self.trajectory.trace(scene)
         pose = line.at_length(self.s)
         tangent = line.tangent(self.s)
         spot = replace(pose, yaw=tangent).moved(left=self.t)
-        facing = self.facing.turned(tangent)
+        facing = self.facing.to_world_heading(tangent)
         return scene.network.place_of(replace(spot, yaw=facing))
 
 

@@ -82,7 +82,7 @@ class Catalogs:
             raise reference.error(f"catalog {catalog!r} has no entry {name!r}")
         given = assignments(reference)
         values = read_declarations(found, reference.values, given)
-        return found.scoped(values | given)
+        return found.with_parameters(values | given)
 
     def resolved(self, node: Node, kind: str | None = None) -> Node:
         """Returns the node itself, or the entry where it is a reference; its own parameters are in scope.

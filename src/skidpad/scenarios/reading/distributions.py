@@ -81,7 +81,7 @@ def _values(node: Node) -> list[str]:
     if node.tag == "DistributionSet":
         return [e.text("value") for e in node.children("Element")]
     if node.tag != "DistributionRange":
-        raise node.unsupported()
+        raise node.unsupported_fault()
     step, (low, high) = node.number("stepWidth"), _range(node)
     if step <= 0.0 or (high - low) / step > CHOICES_MAX:
         raise node.error(f"stepWidth {step:g} makes too many choices or none")
@@ -142,7 +142,7 @@ def _draw(node: Node) -> Draw:
         which = _draw_weighted(list(range(len(bins))), [b.number("weight") for b in bins])
         edges = [_range(b) for b in bins]
         return lambda rng: float(rng.uniform(*edges[int(which(rng))]))
-    raise node.unsupported()
+    raise node.unsupported_fault()
 
 
 def _draw_weighted(values: Sequence[str] | Sequence[int], weights: Sequence[float]) -> Draw:
@@ -156,11 +156,11 @@ def _within(
 ) -> Draw:
     """Returns a draw repeated until it lies in low..high; it raises an error after `TRIES_MAX` attempts."""
 
-    def drawn(rng: np.random.Generator) -> float:
+    def draw_within(rng: np.random.Generator) -> float:
         for _ in range(TRIES_MAX):
             value = float(draw(rng))
             if low <= value <= high:
                 return value
         raise node.error(f"hardly ever lies in its range from {low:g} to {high:g}")
 
-    return drawn
+    return draw_within

@@ -48,12 +48,12 @@ class Node:
         """Returns the fault to raise about something wrong in this element."""
         return Fault(self.finding(what))
 
-    def unsupported(self, what: str = "") -> Fault:
+    def unsupported_fault(self, what: str = "") -> Fault:
         """Returns the fault to raise about an element that is sound, but unknown here."""
         text = what or f"<{self.tag}> is not supported"
         return Fault(self.finding(text, Kind.UNSUPPORTED))
 
-    def scoped(self, values: Mapping[str, str]) -> Node:
+    def with_parameters(self, values: Mapping[str, str]) -> Node:
         """Returns the same element with other parameters in scope."""
         return replace(self, values=values)
 
@@ -112,9 +112,9 @@ class Node:
             if default is None:
                 raise self.error(f"needs the attribute {name}")
             return default
-        return self.filled(value, name) if "$" in value else value
+        return self.fill_parameters(value, name) if "$" in value else value
 
-    def filled(self, value: str, name: str) -> str:
+    def fill_parameters(self, value: str, name: str) -> str:
         """Returns a text with its parameter or expression replaced; name: of the attribute, for faults."""
         if value.startswith("${") and value.endswith("}"):
             try:
@@ -159,7 +159,9 @@ class Node:
             return allowed(text)
         except ValueError:
             known = ", ".join(str(c.value) for c in allowed)
-            raise self.unsupported(f"{name}={text!r} is not supported, only {known}") from None
+            raise self.unsupported_fault(
+                f"{name}={text!r} is not supported, only {known}"
+            ) from None
 
     def flag(self, name: str, default: bool) -> bool:
         """Returns an attribute that is `true` or `false`, or 1 or 0; raises a Fault for anything else."""

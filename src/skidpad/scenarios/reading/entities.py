@@ -160,7 +160,7 @@ def _inner_trailers(node: Node, tractor: Entity, catalogs: Catalogs) -> Iterator
     """Yields the trailers that a vehicle's description holds, one behind the other."""
     for _ in range(TRAILERS_MOST):
         body = next((n for n in node.children() if n.tag != "ObjectController"), None)
-        inner = None if body is None else catalogs.resolved(body).find("Trailer", "Trailer")
+        inner = None if body is None else catalogs.resolve(body).find("Trailer", "Trailer")
         if inner is None:
             return
         tractor = compile_entity_object(inner, tractor.coupling.trailer, catalogs)
@@ -202,7 +202,7 @@ def compile_entity_object(node: Node, name: str, catalogs: Catalogs) -> Entity:
     found = next((n for n in node.children() if n.tag != "ObjectController"), None)
     if found is None:
         raise node.error("needs a <Vehicle>, <Pedestrian>, <MiscObject> or a reference to one")
-    body = catalogs.resolved(found)
+    body = catalogs.resolve(found)
     properties = _properties(body)
     if body.tag == "Vehicle":
         return _vehicle(name, body, properties)
@@ -214,7 +214,7 @@ def compile_entity_object(node: Node, name: str, catalogs: Catalogs) -> Entity:
         size = max(box.length, box.width)
         type = next(kind for kind, largest in PROPS if size <= largest)
         return Entity(name, Body.PROP, type, False, box, properties=properties)
-    raise body.unsupported()
+    raise body.unsupported_fault()
 
 
 def _controllers(node: Node, catalogs: Catalogs) -> Iterator[Finding]:
@@ -233,7 +233,7 @@ def _controllers(node: Node, catalogs: Catalogs) -> Iterator[Finding]:
 def _sizes(node: Node, catalogs: Catalogs) -> Iterator[Finding]:
     """Yields a note on a box without volume."""
     body = next((n for n in node.children() if n.tag != "ObjectController"), None)
-    size = None if body is None else catalogs.resolved(body).find("BoundingBox", "Dimensions")
+    size = None if body is None else catalogs.resolve(body).find("BoundingBox", "Dimensions")
     flat = [n for n in SIZES if size is not None and size.number(n) <= 0.0]
     if size is not None and flat:
         told = ", ".join(f"{name} {size.number(name):g}" for name in flat)
@@ -249,7 +249,7 @@ def _vehicle(name: str, node: Node, properties: Mapping[str, str]) -> Entity:
         return Entity(name, Body.VEHICLE, "bicycle", False, box, limits, properties, axles=axles)
     coupling = _coupling(name, node)
     if category not in WHEELED:
-        raise node.unsupported(f"vehicleCategory={category!r} is not supported")
+        raise node.unsupported_fault(f"vehicleCategory={category!r} is not supported")
     if properties.get(TYRES, REFERENCE) not in known_tyres():
         raise node.error(
             f"property {TYRES} must be one of {', '.join(known_tyres())}, "
@@ -278,7 +278,7 @@ def of_category(node: Node, name: str, category: str) -> Entity:
     if category in TWO_WHEELED:
         return Entity(name, Body.VEHICLE, "bicycle", False, BICYCLE)
     if category not in WHEELED:
-        raise node.unsupported(f"category={category!r} is not supported")
+        raise node.unsupported_fault(f"category={category!r} is not supported")
     kind = WHEELED[category]
     box = USUAL[kind]
     type = nearest_type(kind, box.length, box.width, box.height)

@@ -112,7 +112,7 @@ def _weather(node: Node) -> dict[str, Any]:
     """Returns the fields of the environment that the weather gives; None for what the file omits."""
     clouds = node.text("fractionalCloudCover", node.text("cloudState", ""))
     if clouds and clouds not in CLOUDS:
-        raise node.unsupported(f"clouds {clouds!r} are not known")
+        raise node.unsupported_fault(f"clouds {clouds!r} are not known")
     sun, rain, fog, wind = (node.find(t) for t in ("Sun", "Precipitation", "Fog", "Wind"))
     fall, rate = Fall.DRY, 0.0
     if rain is not None:

@@ -57,12 +57,12 @@ def read_declarations(
     for one in declarations.children("ParameterDeclaration"):
         name = one.plain("name")
         value = given.get(name)
-        text = one.scoped(values).text("value") if value is None else _text(value)
+        text = one.with_parameters(values).text("value") if value is None else _text(value)
         _require_type(one, text)
         values[name] = text
     for one in declarations.children("ParameterDeclaration"):  # which may name each other
         name = one.plain("name")
-        _require_constraints(one.scoped(values), name, values[name])
+        _require_constraints(one.with_parameters(values), name, values[name])
     return values
 
 
@@ -70,7 +70,7 @@ def inner(node: Node) -> Node:
     """Returns an element with its own declarations in scope."""
     if node.find("ParameterDeclarations") is None:
         return node
-    return node.scoped(read_declarations(node, node.values, {}))
+    return node.with_parameters(read_declarations(node, node.values, {}))
 
 
 def assignments(node: Node) -> dict[str, str]:
@@ -122,7 +122,7 @@ def _require_constraints(node: Node, name: str, text: str) -> None:
     for group in groups:
         for one in group:
             if one.text("rule") not in RULES:
-                raise one.unsupported(f"rule={one.text('rule')!r} is not supported")
+                raise one.unsupported_fault(f"rule={one.text('rule')!r} is not supported")
     if not any(
         all(holds_between(c.text("rule"), text, c.text("value")) for c in g) for g in groups
     ):

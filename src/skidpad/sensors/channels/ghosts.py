@@ -24,7 +24,7 @@ class GhostSettings:
     rate: float  # 1/h
     life: float  # s, mean of an exponential distribution
 
-    def scaled(self, factor: float) -> GhostSettings:
+    def scale(self, factor: float) -> GhostSettings:
         """Returns the settings with ghosts `factor` times as often."""
         return replace(self, rate=factor * self.rate)
 

@@ -32,7 +32,7 @@ class LocalisationError:
         require_range("localisation.time", self.time, 1e-3, 1e6)
         require_range("localisation.drift_time", self.drift_time, 1e-3, 1e6)
 
-    def scaled(self, factor: float, is_dark: bool) -> LocalisationError:
+    def scale(self, factor: float, is_dark: bool) -> LocalisationError:
         """The same with all strengths times `factor`, in the dark or not."""
         f = factor * (self.dark if is_dark else 1.0)
         return replace(

@@ -75,7 +75,7 @@ class ChannelSensing:
         for name in ("miss", "miss_far", "share_seen", "confusion"):
             require_range(f"channel.{name}", getattr(self, name), 0.0, 1.0)
 
-    def scaled(self, factor: float) -> ChannelSensing:
+    def scale(self, factor: float) -> ChannelSensing:
         """All noise, misses, ghosts and confusions times `factor`: the sweep of decision C-2.
 
         The localisation is scaled when it is built, since darkness comes in there.
@@ -89,7 +89,7 @@ class ChannelSensing:
             miss=min(factor * self.miss, 1.0),
             miss_far=min(factor * self.miss_far, 1.0),
             confusion=min(factor * self.confusion, 1.0),
-            ghosts=self.ghosts.scaled(factor),
+            ghosts=self.ghosts.scale(factor),
         )
 
 
@@ -117,7 +117,7 @@ class ChannelSuite:
         noise: float = 1.0,
     ) -> None:
         """noise: factor of the sweep."""
-        self.name, self.sensing, self.table = name, sensing.scaled(noise), table
+        self.name, self.sensing, self.table = name, sensing.scale(noise), table
         self._labels = np.array([LABEL_OF_KIND[ActorKind(k)] for k in table.kind], dtype=np.int64)
         self._reach = _reach(self.sensing, table, weather)
         self._light_range = sensing.light_range if sensing.lights else 0.0
@@ -126,7 +126,7 @@ class ChannelSuite:
         self._heights = np.concatenate([table.height, self._fixed.height])
         is_dark = daylight(weather) < DARK_LUX
         self.localisation = Localisation(
-            sensing.localisation.scaled(noise, is_dark), name, seed, CYCLE
+            sensing.localisation.scale(noise, is_dark), name, seed, CYCLE
         )
         self.ghosts = Ghosts(self.sensing.ghosts, name, seed, CYCLE)
         n = len(table)

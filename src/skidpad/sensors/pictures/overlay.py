@@ -64,7 +64,7 @@ class Lens:
         self.weather, self.seed = weather, seed
         self.layers: dict[str, Layer] = {}
 
-    def seen(self, images: Mapping[str, Any]) -> Mapping[str, Any]:
+    def add_drops(self, images: Mapping[str, Any]) -> Mapping[str, Any]:
         """The same readings, images among them with drops when they are first read."""
         return _Wet(images, self)
 

@@ -321,7 +321,7 @@ class Programme:
 
     def __init__(self, carla: Any, world: Any, map: RoadMap, seed: int, dt: float) -> None:
         self._carla = carla
-        self._cycle, self._dt, self._tick = Lights.pretimed(map, seed, dt), dt, 0
+        self._cycle, self._dt, self._tick = Lights.build_pretimed(map, seed, dt), dt, 0
         self._lights = find_lights(world)
         self._shown: dict[int, LightState] = {}
         world.freeze_all_traffic_lights(True)

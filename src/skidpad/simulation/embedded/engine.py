@@ -22,7 +22,7 @@ from skidpad.roads.queries import RoadMap
 from skidpad.sensors.requested import AskedSensors
 from skidpad.simulation.sensing import sensing_of
 from skidpad.simulation.world.feel import feel_motion
-from skidpad.simulation.world.stage import staged
+from skidpad.simulation.world.stage import build_world
 from skidpad.simulation.world.world import EGO, World
 
 REVERSE = 4  # column of the commands
@@ -52,7 +52,7 @@ class EmbeddedBackend:
 
     def reset(self, setup: Setup, seed: int) -> Frame:
         """Begin a run: everything is built anew (decision X-12)."""
-        self._world, self._noise = staged(setup, seed), setup.localisation_noise
+        self._world, self._noise = build_world(setup, seed), setup.localisation_noise
         self._setup, self._seed = setup, seed
         self._unseen: NDArray[np.bool_] | None = None  # hidden from all sensors; None: none is
         self._brake_lamps: list[tuple[int, bool]] = []

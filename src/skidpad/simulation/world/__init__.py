@@ -1,6 +1,6 @@
 """The moving world of a run, on which every simulator of the house stands.
 
-`World(map, Lights(map), Conditions(...))` begins empty; `stage.staged(setup, seed)` fills one.
+`World(map, Lights(map), Conditions(...))` begins empty; `stage.build_world(setup, seed)` fills one.
 Ids are given on entering and kept; rows of the arrays move when actors come and go.
 
 Actors: `add`, `enter` (many, not yet present), `remove`, `reshape` (other physics), `row(id)`.

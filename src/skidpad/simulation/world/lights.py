@@ -110,7 +110,7 @@ class Lights:
         self.reset()
 
     @classmethod
-    def pretimed(cls, map: RoadMap, seed: int, dt: float) -> Lights:
+    def build_pretimed(cls, map: RoadMap, seed: int, dt: float) -> Lights:
         """Groups with the published cycle whose position is part of the seed (decision M-2)."""
         lights = cls(map)
         for group in lights.groups.values():

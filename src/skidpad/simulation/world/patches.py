@@ -65,7 +65,7 @@ class Patches:
         self.road = road
         self._pack()
 
-    def fit(self, types: Sequence[VehicleType]) -> None:
+    def set_vehicles(self, types: Sequence[VehicleType]) -> None:
         """These are the vehicles from now on."""
         self._place = np.array(
             [

@@ -53,7 +53,7 @@ class Member:
         return body.actor_kind if isinstance(body, VehicleType) else body.kind
 
     @property
-    def wheeled(self) -> bool:
+    def is_wheeled(self) -> bool:
         """Whether the physics of vehicles moves it."""
         return isinstance(self.actor.body, VehicleType)
 

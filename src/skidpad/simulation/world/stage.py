@@ -17,7 +17,7 @@ from skidpad.simulation.world.traffic.manager import Traffic
 from skidpad.simulation.world.world import EGO, Conditions, World
 
 
-def staged(setup: Setup, seed: int) -> World:
+def build_world(setup: Setup, seed: int) -> World:
     """A world at the beginning of a run."""
     map = dress_map(load_map(setup.map), setup.scenery)
     roles = cast_of(map, setup, seed)
@@ -33,7 +33,7 @@ def staged(setup: Setup, seed: int) -> World:
         roll_over=setup.roll_over,
         wind=setup.wind,
     )
-    world = World(map, Lights.pretimed(map, seed, setup.dt), conditions)
+    world = World(map, Lights.build_pretimed(map, seed, setup.dt), conditions)
     traffic = setup.traffic or TrafficSetup(vehicles=0)
     drivers = Traffic(map, traffic, seed, care_of(setup, traffic.slow_in_weather))
     world.let_drive(drivers)

@@ -155,7 +155,7 @@ class World:
     def _arrange(self, members: Sequence[Member]) -> None:
         """New rows for these actors; who was there goes on from its old row."""
         old, fleet, tyres, was = self.rows, self.fleet, self.tyres, self._rows_by_id
-        self._begin(sorted(members, key=lambda m: not m.wheeled))
+        self._begin(sorted(members, key=lambda m: not m.is_wheeled))
         kept = [(i, was[m.id]) for i, m in enumerate(self.members) if m.id in was]
         to, source = np.array(kept, dtype=np.intp).reshape(-1, 2).T
         self.rows.carry(old, to, source)
@@ -169,7 +169,7 @@ class World:
         if self.traffic is not None:
             self.traffic.arrange(self.members, dict(kept))
         if self.patches is not None:
-            self.patches.fit(self.fleet.types)
+            self.patches.set_vehicles(self.fleet.types)
         if self.book is not None:
             self.book.arrange({before: now for now, before in kept})
         self._outfit()

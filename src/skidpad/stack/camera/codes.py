@@ -41,7 +41,7 @@ def network_input(picture: NDArray[np.uint8]) -> Floats32:
     return scaled
 
 
-def coded(label: Label) -> Floats32:
+def encode_label(label: Label) -> Floats32:
     """Returns (OUTPUTS,) what the network should say: scaled offsets, presence, nearness.
 
     Presence is 1, 0, or 0.5 for a gap from SEEN m on, where it does not matter.
@@ -54,7 +54,7 @@ def coded(label: Label) -> Floats32:
     return np.array([*offsets, present, near], dtype=np.float32)
 
 
-def decoded(output: Floats32) -> Label:
+def decode_output(output: Floats32) -> Label:
     """Returns what the network says as a label; no gap where the presence, a logit, is not above 0."""
     offsets = tuple(float(v) * d / OFFSET_SCALE for v, d in zip(output, AHEAD, strict=False))
     logit, near = float(output[-2]), float(output[-1])

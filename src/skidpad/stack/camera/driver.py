@@ -28,8 +28,8 @@ from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.camera.codes import AHEAD, Label, mosaic
 from skidpad.stack.camera.eyes import CAMERAS, images_of
-from skidpad.stack.camera.network import seen
-from skidpad.stack.control.bends import bend_speed, slowed
+from skidpad.stack.camera.network import read_mosaic
+from skidpad.stack.control.bends import bend_speed, slow_for_bend
 from skidpad.stack.control.steering import Smoothing, lookahead_distance, steer_command
 from skidpad.stack.control.tiers import Hierarchy, Lead, Situation, time_gap
 
@@ -73,7 +73,7 @@ class CameraDriver:
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
         """Returns the command of one tick from the three images and the own speed; renews `report`."""
-        label = seen(self.picture(frame))
+        label = read_mosaic(self.picture(frame))
         v = frame.ego.speed
         offsets, gap = self._path(label), self._gap(label)
         bend = curvature(offsets)
@@ -83,7 +83,7 @@ class CameraDriver:
         request = self.hierarchy.decide(
             Situation(v, kmh_from_mps(v), lead, None, cruise_kmh=cruise, follow_cap_kmh=cruise)
         )
-        request = slowed(request, v, allowed)
+        request = slow_for_bend(request, v, allowed)
         self.report = StackReport(
             tier=request.tier,
             detected=gap is not None,

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats32
-from skidpad.stack.camera.codes import Label, decoded, network_input
+from skidpad.stack.camera.codes import Label, decode_output, network_input
 
 WEIGHTS = "weights.onnx"
 
@@ -24,9 +24,9 @@ def _network() -> Any:
         return cv2.dnn.readNetFromONNX(str(path))
 
 
-def seen(picture: NDArray[np.uint8]) -> Label:
+def read_mosaic(picture: NDArray[np.uint8]) -> Label:
     """Returns what the network makes of a mosaic of the three images."""
     net = _network()
     net.setInput(network_input(picture))
     output: Floats32 = np.asarray(net.forward(), dtype=np.float32).reshape(-1)
-    return decoded(output)
+    return decode_output(output)

@@ -75,7 +75,7 @@ class Channel:
     def update(self, view: ChannelView) -> ChannelFrame:
         """Tracks, predicts and plans one cycle; returns the frame and sets `self.command`."""
         self.tracker.update(view)
-        rows = self.tracker.confirmed
+        rows = self.tracker.confirmed_tracks
         objects = self.tracker.objects(view.ego)
         labels = np.ascontiguousarray(rows["label"])
         sizes = np.column_stack([rows["length"], rows["width"]])

@@ -90,7 +90,7 @@ class Tracker:
         )
 
     @property
-    def confirmed(self) -> NDArray[np.void]:
+    def confirmed_tracks(self) -> NDArray[np.void]:
         """Rows of TRACK that count as objects, `confirm` detections at least, in the odometry frame."""
         rows = self._all[: self.count]
         chosen: NDArray[np.void] = rows[rows["hits"] >= self.settings.confirm]
@@ -101,7 +101,7 @@ class Tracker:
 
         ego: x, y, heading (and more) of the ego in the world.
         """
-        rows = self.confirmed
+        rows = self.confirmed_tracks
         turn = float(ego[2]) - float(self.pose[2])
         c, s = cos(turn), sin(turn)
         dx, dy = rows["x"] - self.pose[0], rows["y"] - self.pose[1]

@@ -59,7 +59,7 @@ class BendSpeed:
         return self.allowed
 
 
-def slowed(request: Request, v: float, v_allowed: float) -> Request:
+def slow_for_bend(request: Request, v: float, v_allowed: float) -> Request:
     """Returns the request, or braking for a bend where that is harder; no throttle above v_allowed (m/s)."""
     if v <= v_allowed:
         return request

@@ -116,13 +116,13 @@ class Front:
         steady = fused if self.rate is None else self.rate.update(fused)
         radar = NO_RADAR
         if self.radar is not None:
-            tracking = self.persistence.confirmed
+            tracking = self.persistence.is_confirmed
             radar = self.radar.update(frame.radar, frame.ego.pose, v, view, tracking)
         detection = self.persistence.update(self.median.update(steady), bumper, radar)
         return Sight(
             detection.status,
             detection.distance,
-            self.persistence.confirmed,
+            self.persistence.is_confirmed,
             bumper,
             roof,
             fused,

@@ -63,7 +63,7 @@ class Persistence:
         self.was_stopping = False
 
     @property
-    def confirmed(self) -> bool:
+    def is_confirmed(self) -> bool:
         """Whether vision has seen the target for long enough (A-073, A-088)."""
         return self.seen_ticks >= self.confirm_ticks
 
@@ -92,11 +92,11 @@ class Persistence:
         if fused is not None and fused < self.gate:
             self.seen_ticks += 1
             self.missed_ticks = 0
-            if self.confirmed:
+            if self.is_confirmed:
                 return Detection(DetectionStatus.FUSION_DETECT, fused)
             return self._radar_active(radar)
         self.missed_ticks += 1
-        if self.missed_ticks <= self._window() and self.confirmed:
+        if self.missed_ticks <= self._window() and self.is_confirmed:
             return Detection(DetectionStatus.FUSION_PERSIST, self.last_distance)
         self.seen_ticks = 0
         return self._radar_fallback(bumper, radar)

@@ -37,7 +37,7 @@ from skidpad.stack.reference.caution import (
 from skidpad.stack.reference.following import Manner, acceleration
 from skidpad.stack.reference.junctions import LOOK_FROM, V_THROUGH, GivingWay
 from skidpad.stack.reference.person import Person, person_of
-from skidpad.stack.reference.way import Body, Place, Way, anticipated, gaps_ahead
+from skidpad.stack.reference.way import Body, Place, Way, anticipate_actors, gaps_ahead
 
 EYES = "eyes"
 KEYS = ("seed", "car", "cruise_kmh")
@@ -139,7 +139,7 @@ class ReferenceDriver:
             return inf, 0.0
         before_tick, before = self.views[0]
         span = (view.tick - before_tick) * self.dt
-        expected = anticipated(view.actors, before, span, view.age)
+        expected = anticipate_actors(view.actors, before, span, view.age)
         body = Body(place.s, v, 0.5 * self.car.length, 0.5 * self.car.width)
         gaps, speeds = gaps_ahead(self.way.path.points, place.at, expected, body)
         nearest = int(np.argmin(gaps))
@@ -179,7 +179,7 @@ class ReferenceDriver:
             return v > V_THROUGH
         return self.giving_way.must_wait(
             self.way.path.points, place.at, gap + LINE_MARGIN, v, self.car.length, m.a_max,
-            anticipated(view.actors, view.actors, 0.0, view.age),
+            anticipate_actors(view.actors, view.actors, 0.0, view.age),
         )  # fmt: skip
 
     def _stops_for(self, signal: int, tick: int, gap: float, v: float, m: Manner) -> bool:

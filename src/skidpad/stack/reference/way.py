@@ -109,7 +109,7 @@ class Body(NamedTuple):
     half_width: float
 
 
-def anticipated(seen: SeenActors, before: SeenActors, span: float, age: float) -> SeenActors:
+def anticipate_actors(seen: SeenActors, before: SeenActors, span: float, age: float) -> SeenActors:
     """Returns the same actors where they are taken to be `age` s later.
 
     Those with brake lamps on are taken to go on slowing down as between the view `before`, `span` s

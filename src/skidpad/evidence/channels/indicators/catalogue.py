@@ -103,7 +103,7 @@ class Threshold(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if (self.threshold is None) != (self.bound is Bound.NONE):
             raise ValueError("a threshold goes with the bound lower or upper, and with no other")
 
-    def violated(self, value: float) -> bool:
+    def is_violated(self, value: float) -> bool:
         """Returns whether an evaluated `value` raises an alarm; equality passes (C-101), as does no bound."""
         if self.threshold is None:
             return False

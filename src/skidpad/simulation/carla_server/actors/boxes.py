@@ -41,11 +41,11 @@ class Boxes:
         """
         c, s = np.cos(self.pose[:, 3]), np.sin(self.pose[:, 3])
 
-        def turned(v: Floats) -> Floats:
+        def turn_vector(v: Floats) -> Floats:
             return np.stack((v[:, 0] * c + v[:, 1] * s, v[:, 1] * c - v[:, 0] * s, v[:, 2]), axis=1)
 
-        begin = turned(np.array(start) - self.pose[:, :3])
-        along = turned(np.broadcast_to(np.array(way), begin.shape))
+        begin = turn_vector(np.array(start) - self.pose[:, :3])
+        along = turn_vector(np.broadcast_to(np.array(way), begin.shape))
         along = np.where(np.abs(along) < 1e-12, 1e-12, along)
         one, other = (-self.half - begin) / along, (self.half - begin) / along
         return np.minimum(one, other).max(axis=1), np.maximum(one, other).min(axis=1)

@@ -179,7 +179,7 @@ def _accept_without_effect(name: str, reason: str) -> None:
     """Registers a call that checks its actor and has no effect, for the given reason."""
 
     @TABLE.method(name, Shape.VOID, without_effect=reason)
-    def accepted(served: Served, id: Any, a: Any = None, b: Any = None, c: Any = None, d: Any = None,
+    def accept_call(served: Served, id: Any, a: Any = None, b: Any = None, c: Any = None, d: Any = None,
                  e: Any = None, f: Any = None) -> None:  # fmt: skip
         """Checks that the actor is alive and does nothing else."""
         del a, b, c, d, e, f

@@ -197,7 +197,7 @@ class Traffic:
         if self.setup.put_wrecks_back:
             wrecks = np.flatnonzero(driver["active"] & (driver["stuck"] > STUCK_TIME))
             for i in wrecks.tolist():
-                yield from self._put(
+                yield from self._claim_place(
                     i, states, claimed, Area(PUT_BACK_NEAREST, np.inf), Reason.WRECK
                 )
         if self.free_choice:
@@ -217,12 +217,12 @@ class Traffic:
         if self.waiting:
             yield from self._let_in(states, claimed, area(True, False))
         for i, ahead in pack.lost(self.drivers, states):
-            yield from self._put(i, states, claimed, area(ahead), Reason.FAR)
+            yield from self._claim_place(i, states, claimed, area(ahead), Reason.FAR)
 
     def _let_in(self, states: ActorStates, claimed: Claimed, area: Area) -> Iterator[Move]:
         """Yields the moves by which waiting vehicles enter the area where there is room."""
         for id in list(self.waiting):
-            for move in self._put(self.row[id], states, claimed, area, Reason.ENTERS):
+            for move in self._claim_place(self.row[id], states, claimed, area, Reason.ENTERS):
                 self.waiting.remove(id)
                 self.drivers.state["active"][move.actor] = True
                 yield move
@@ -237,9 +237,9 @@ class Traffic:
             if hypot(states.x[i] - x, states.y[i] - y) > 1.2 * BUBBLE and self._is_alone(
                 i, states, claimed
             ):
-                yield from self._put(i, states, claimed, area, Reason.FAR)
+                yield from self._claim_place(i, states, claimed, area, Reason.FAR)
 
-    def _put(
+    def _claim_place(
         self, i: int, states: ActorStates, claimed: Claimed, area: Area, reason: Reason
     ) -> Iterator[Move]:
         """Yields the move of vehicle i to a free place in the area, and claims it; none if none is free."""

@@ -23,8 +23,8 @@ from skidpad.recording.campaign.results import read_results
 from skidpad.recording.run.log_files import log_hash, read_log
 from skidpad.recording.run.motion import motion_hash
 from skidpad.report.matrix.page import write_report
+from skidpad.stack.adas import SpeedCaps
 from skidpad.stack.configurations import functions_of
-from skidpad.stack.control.resume import SpeedCaps
 
 ONE = Climate(weather="clear-noon")
 

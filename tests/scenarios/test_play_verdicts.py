@@ -222,10 +222,10 @@ def test_the_terminal_shows_a_table_of_80_columns_the_answer_and_the_next_comman
 
 
 def test_a_name_that_is_too_long_keeps_its_ends():
-    from skidpad.cli.scenarios.played_table import _fit
+    from skidpad.cli.scenarios.played_table import _pad_text
 
-    assert _fit("a" * 20 + "b" * 20, 12) == "aaaaa..bbbbb"
-    assert _fit("short", 8) == "short   "
+    assert _pad_text("a" * 20 + "b" * 20, 12) == "aaaaa..bbbbb"
+    assert _pad_text("short", 8) == "short   "
 
 
 def test_the_page_has_curves_events_and_a_replay_of_a_run_without_a_crash(tmp_path):

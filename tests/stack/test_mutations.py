@@ -89,14 +89,14 @@ GUARDS = (
         "SMOOTHING_TIME SMOOTHING_RATE",
     ),
     Guard(
-        "control.resume",
+        "adas",
         f"{CAPS}::test_timer_counts_from_the_last_tick_at_a_stop",
         "STOPPED_BELOW_KMH",
     ),
-    Guard("control.resume", f"{CAPS}::test_cap_ends_after_15_s_whatever_happens",
+    Guard("adas", f"{CAPS}::test_cap_ends_after_15_s_whatever_happens",
           "RESUME_DURATION"),
-    Guard("control.resume", f"{CAPS}::test_caps_by_configuration", "RESUME_KMH"),
-    Guard("control.resume", f"{CAPS}::test_spatial_cap_ends_behind_the_first_curve", "CURVE"),
+    Guard("adas", f"{CAPS}::test_caps_by_configuration", "RESUME_KMH"),
+    Guard("adas", f"{CAPS}::test_spatial_cap_ends_behind_the_first_curve", "CURVE"),
     Guard("perception.lane_view", f"{CORRIDOR}::test_curvature_is_read_at_one_point_30_m_ahead",
           "REFERENCE_DISTANCE"),
     Guard(

@@ -33,7 +33,8 @@ from skidpad.report.elements.page import (
     Text,
     write_report_page,
 )
-from skidpad.report.search import driver_text, law_text
+from skidpad.report.search import law_text
+from skidpad.report.search_sentences import driver_text
 
 CRASH = (
     "A crash is a contact above 5 km/h (with a person or a two-wheeler any), or a departure with all "

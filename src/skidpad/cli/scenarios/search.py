@@ -119,7 +119,7 @@ def _tell_monitor(out: Path, folder: Path, id: str) -> None:
     from skidpad.recording.channels.monitored import SUMMARY
     from skidpad.recording.hazards.searched import add_search
     from skidpad.report.channels.page import write_drive_report
-    from skidpad.report.search import hazard_sentences
+    from skidpad.report.search_sentences import hazard_sentences
 
     hazard = read_hazard(out)
     assert hazard is not None

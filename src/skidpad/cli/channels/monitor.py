@@ -7,12 +7,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from msgspec import Meta, Struct
+
+from skidpad.cli.options.spread import spread_fields
 
 if TYPE_CHECKING:
     import polars as pl
 
     from skidpad.core.vocabulary import HazardType
     from skidpad.evidence.channels.indicators.catalogue import AnyIndicator
+    from skidpad.evidence.channels.monitor import MonitorSettings
     from skidpad.evidence.channels.summary import Watched
     from skidpad.recording.channels.mcap_files import ChannelSource
 
@@ -47,45 +51,110 @@ class Wire(str, Enum):
     ros2 = "ros2"
 
 
+class Judged(Struct, frozen=True):
+    """By what rules and formulas the channels are judged."""
+
+    rules: Annotated[
+        Rules,
+        Meta(
+            description="Hazard rules: safe distances of tracked objects, the published rules corrected, "
+            "or as printed."
+        ),
+    ] = Rules.tracked
+    forms: Annotated[
+        Forms | None,
+        Meta(
+            description="Formulas of the indicators; default: corrected, with as_printed rules completed."
+        ),
+    ] = None
+    rules_file: Annotated[Path | None, Meta(description="Own hazard rules (YAML).")] = None
+    thresholds: Annotated[Path | None, Meta(description="Own thresholds (YAML).")] = None
+    identifier: Annotated[
+        Identifier,
+        Meta(
+            description="What finds the three scored hazards: the rules, the trained model, both."
+        ),
+    ] = Identifier.rules
+    model: Annotated[
+        Path | None,
+        Meta(description="Trained model (.npz) of `skidpad channels train`; default: ours."),
+    ] = None
+    grip: Annotated[
+        float | None,
+        Meta(
+            description="Friction of the road (0.05 to 1.5) that the rules tracked are told; 0.9: dry."
+        ),
+    ] = None
+
+    def to_settings(self) -> MonitorSettings:
+        """Returns the monitor's settings, with the files that are named read."""
+        from skidpad.evidence.channels.hazards import Profile, default_form, load_rules
+        from skidpad.evidence.channels.identifier.model import Identify, load_model
+        from skidpad.evidence.channels.indicators.catalogue import load_thresholds
+        from skidpad.evidence.channels.indicators.comfort import Form
+        from skidpad.evidence.channels.indicators.settings import IndicatorSettings
+        from skidpad.evidence.channels.monitor import MonitorSettings
+
+        profile = Profile(self.rules.value)
+        form = Form(self.forms.value) if self.forms else default_form(profile)
+        is_by_rules = self.identifier is Identifier.rules
+        return MonitorSettings(
+            indicators=IndicatorSettings(form=form),
+            profile=profile,
+            rules=load_rules(profile, self.rules_file),
+            thresholds=load_thresholds(self.thresholds),
+            identify=Identify(self.identifier.value),
+            detectors={} if is_by_rules else load_model(self.model).identifier(),
+            grip=self.grip,
+        )
+
+
+class Listening(Struct, frozen=True):
+    """Where channels that drive now are heard."""
+
+    mapping: Annotated[
+        Path | None, Meta(description="YAML that says which topics of a ROS 2 bag are what.")
+    ] = None
+    listen: Annotated[
+        Wire | None,
+        Meta(description="ros2: watch topics over DDS as they come, named by --mapping."),
+    ] = None
+    domain: Annotated[
+        int, Meta(ge=0, le=232, description="DDS domain of --listen (ROS_DOMAIN_ID).")
+    ] = 0
+    wait: Annotated[
+        float,
+        Meta(ge=0.0, description="Seconds that --listen waits for writers, and in silence."),
+    ] = 60.0
+
+    def open_source(self, file: Path | None) -> ChannelSource:
+        """Returns the recording, or the topics where no file is given."""
+        from skidpad.core.errors import ConfigError, FileError
+        from skidpad.recording.sources import open_channels
+
+        if (file is None) is (self.listen is None):
+            raise ConfigError("monitor takes a FILE or --listen ros2, and one of them")
+        if file is not None:
+            if not file.exists():
+                raise FileError(f"{file}: no such file")
+            return open_channels(file, self.mapping, truth=False)
+        if self.mapping is None:
+            raise ConfigError("--listen needs --mapping FILE, which says which topics are what")
+        from skidpad.live.ros2.listener import RosTopics
+        from skidpad.recording.formats.ros_bag import load_mapping
+
+        mapping = load_mapping(self.mapping)
+        return RosTopics(mapping, self.domain, patience=self.wait, silence=self.wait)
+
+
+@spread_fields()
 def monitor(
     out: Annotated[Path, typer.Option(help="Folder for indicators, hazards and the summary.")],
+    judged: Judged,
+    listening: Listening,
     file: Annotated[
         Path | None,
         typer.Argument(help="A channel recording (.mcap), or a ROS 2 bag with --mapping."),
-    ] = None,
-    mapping: Annotated[
-        Path | None, typer.Option(help="YAML that says which topics of a ROS 2 bag are what.")
-    ] = None,
-    rules: Annotated[
-        Rules,
-        typer.Option(
-            help="Hazard rules: safe distances of tracked objects, the published rules corrected, "
-            "or as printed."
-        ),
-    ] = Rules.tracked,
-    forms: Annotated[
-        Forms | None,
-        typer.Option(
-            help="Formulas of the indicators; default: corrected, with as_printed rules completed."
-        ),
-    ] = None,
-    rules_file: Annotated[Path | None, typer.Option(help="Own hazard rules (YAML).")] = None,
-    thresholds: Annotated[Path | None, typer.Option(help="Own thresholds (YAML).")] = None,
-    identifier: Annotated[
-        Identifier,
-        typer.Option(
-            help="Who finds the three scored hazards: the rules, the trained model, both."
-        ),
-    ] = Identifier.rules,
-    model: Annotated[
-        Path | None,
-        typer.Option(help="Trained model (.npz) of `skidpad channels train`; default: ours."),
-    ] = None,
-    grip: Annotated[
-        float | None,
-        typer.Option(
-            help="Friction of the road (0.05 to 1.5) that the rules tracked are told; 0.9: dry."
-        ),
     ] = None,
     timing: Annotated[
         bool, typer.Option("--timing", help="Measure each module and print the table.")
@@ -99,53 +168,22 @@ def monitor(
     junit: Annotated[
         Path | None, typer.Option(help="Also write the verdicts of --fail-if as JUnit XML.")
     ] = None,
-    listen: Annotated[
-        Wire | None,
-        typer.Option(help="ros2: watch topics over DDS as they come, named by --mapping."),
-    ] = None,
-    domain: Annotated[
-        int, typer.Option(min=0, max=232, help="DDS domain of --listen (ROS_DOMAIN_ID).")
-    ] = 0,
-    wait: Annotated[
-        float,
-        typer.Option(min=0.0, help="Seconds that --listen waits for writers, and in silence."),
-    ] = 60.0,
 ) -> None:
     """Watch what driving channels say: indicators, violations, hazardous scenes."""
     import sys
     import time
 
-    from skidpad.core.errors import ConfigError, FileError
-
-    if (file is None) is (listen is None):
-        raise ConfigError("monitor takes a FILE or --listen ros2, and one of them")
-    if file is not None and not file.exists():
-        raise FileError(f"{file}: no such file")
-    from skidpad.evidence.channels.hazards import Profile, default_form, load_rules
-    from skidpad.evidence.channels.identifier.model import Identify, load_model
-    from skidpad.evidence.channels.indicators.catalogue import load_thresholds
-    from skidpad.evidence.channels.indicators.comfort import Form
-    from skidpad.evidence.channels.indicators.settings import IndicatorSettings
-    from skidpad.evidence.channels.monitor import MonitorSettings
+    from skidpad.core.errors import ConfigError
     from skidpad.evidence.channels.timing import time_by_objects, timing_statistics
     from skidpad.live.watch import Alarms, Timer, watch_whole
     from skidpad.recording.sources import file_hash
     from skidpad.report.channels.page import write_drive_report
 
+    source = listening.open_source(file)
     wanted = {name: _rule(name) for name in fail_if or []}
     if junit is not None and not wanted:
         raise ConfigError("--junit writes the verdicts of --fail-if, and none is given")
-    source = _source(file, mapping, domain, wait)
-    profile = Profile(rules.value)
-    settings = MonitorSettings(
-        indicators=IndicatorSettings(form=Form(forms.value) if forms else default_form(profile)),
-        profile=profile,
-        rules=load_rules(profile, rules_file),
-        thresholds=load_thresholds(thresholds),
-        identify=Identify(identifier.value),
-        detectors={} if identifier is Identifier.rules else load_model(model).identifier(),
-        grip=grip,
-    )
+    settings = judged.to_settings()
     timer = Timer(time.thread_time_ns) if timing else None
     told, digest = (Alarms(sys.stdout), "") if file is None else (None, file_hash(file))
     found = watch_whole(source, out, settings, timer, digest, told)
@@ -157,21 +195,6 @@ def monitor(
     _print(found, out)
     if wanted:
         _gate({name: _events(found, rule) for name, rule in wanted.items()}, junit)
-
-
-def _source(file: Path | None, mapping: Path | None, domain: int, wait: float) -> ChannelSource:
-    """The recording, or the topics."""
-    from skidpad.core.errors import ConfigError
-    from skidpad.recording.sources import open_channels
-
-    if file is not None:
-        return open_channels(file, mapping, truth=False)
-    if mapping is None:
-        raise ConfigError("--listen needs --mapping FILE, which says which topics are what")
-    from skidpad.live.ros2.listener import RosTopics
-    from skidpad.recording.formats.ros_bag import load_mapping
-
-    return RosTopics(load_mapping(mapping), domain, patience=wait, silence=wait)
 
 
 def _rule(name: str) -> HazardType | AnyIndicator:

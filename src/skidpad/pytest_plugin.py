@@ -27,7 +27,7 @@ CLIENT_TIMEOUT = 30.0  # s
 
 @dataclass(frozen=True)
 class CarlaSession:
-    """What a test gets."""
+    """Holds the client, the world and the ports that a test uses."""
 
     client: Any  # carla.Client
     world: Any  # carla.World, a fresh episode in asynchronous mode

@@ -85,7 +85,7 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True)
 class Campaign(Generic[T, K, M]):
-    """Runs of one kind.
+    """Holds the runs of one kind and how each is driven.
 
     alone: they need a simulator that drives one run at a time.
     distinct: where the first runs of cells moved alike, drive the further runs of one cell only.

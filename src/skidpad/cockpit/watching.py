@@ -100,7 +100,7 @@ def standing(folder: Path) -> Standing:
 
 
 def has_crashed(line: Line) -> bool:
-    """The ego hit something."""
+    """Whether the ego hit something in this run."""
     if line.key.outcome == Outcome.COLLISION.value:
         return True
     metrics = line.metrics or {}

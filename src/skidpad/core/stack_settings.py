@@ -86,7 +86,7 @@ class BranchChoice(str, Enum):
 
 
 class Follower(str, Enum):
-    """D-039: what actuates following."""
+    """What actuates following (D-039)."""
 
     ZONES = "zones"
     DISTANCE_PID = "distance_pid"

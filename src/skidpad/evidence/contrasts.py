@@ -255,7 +255,7 @@ class Never:
 
     @property
     def amounts(self) -> tuple[Amount, ...]:
-        """Returns no amount."""
+        """Returns nothing, as counting has no amount."""
         return ()
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:

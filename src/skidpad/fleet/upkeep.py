@@ -29,7 +29,7 @@ class Upkeep:
         self._rounds = Rounds("upkeep", self.work, LOOK_S)
 
     def start(self) -> None:
-        """Begin."""
+        """Starts the thread that does the rounds."""
         self._rounds.start()
 
     def close(self) -> None:

@@ -60,7 +60,7 @@ class RoadOption(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Vector:
-    """x, y, z."""
+    """Stands for CARLA's Vector3D: x, y, z."""
 
     x: float
     y: float
@@ -69,7 +69,7 @@ class Vector:
 
 @dataclass(frozen=True, slots=True)
 class Rotation:
-    """Degrees."""
+    """Stands for CARLA's Rotation, in degrees."""
 
     pitch: float
     yaw: float

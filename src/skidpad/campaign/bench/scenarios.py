@@ -66,7 +66,7 @@ class ScenarioCost:
 
     @property
     def is_met(self) -> bool:
-        """The target is reached."""
+        """Whether the measured cost reaches its target."""
         return self.value <= self.target if self.most else self.value >= self.target
 
 

@@ -125,7 +125,7 @@ class Task:
 
     @property
     def name(self) -> str:
-        """Name of the run."""
+        """Returns the run's name, by which its folder is found."""
         return self.run.name
 
     @property

@@ -142,7 +142,7 @@ class ChannelRecorder(Sink):
         self._t: float | None = None  # of the cycle under way, once cycles are written
 
     def begin(self, table: ActorTable) -> None:
-        """Say what is recorded."""
+        """Writes what is recorded, before the first message."""
         about = _about(self.crew.spec, self.crew.segment)
         self._say(Context(0.0, about | weights_of(self.crew.spec, table)))
 
@@ -181,7 +181,7 @@ class Street:
 
     @property
     def ended(self) -> bool:
-        """Nothing more is recorded."""
+        """Whether the recording takes no more messages."""
         return self.recording.ended
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:

@@ -64,7 +64,7 @@ class Referee:
             self.over, self.ended = True, Ending.OFF_ROUTE
 
     def note_contacts(self, t: float, truth: WorldTruth) -> None:
-        """Contacts of one tick."""
+        """Notes the contacts of one tick."""
         s = truth.states
         for contact in truth.contacts:
             key = (contact.actor, contact.static)

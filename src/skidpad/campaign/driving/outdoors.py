@@ -73,7 +73,7 @@ class ChangedBackend:
         self.inner.change(outside)
 
     def close(self) -> None:
-        """Releases the backend inside."""
+        """Releases the backend that this one wraps."""
         self.inner.close()
 
 

@@ -40,7 +40,7 @@ class Brake(Sink):
         self.seconds = seconds
 
     def see(self, moment: Moment) -> None:
-        """Wait."""
+        """Waits for a fixed time after each tick."""
         del moment
         sleep(self.seconds)
 

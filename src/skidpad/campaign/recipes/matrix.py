@@ -159,7 +159,7 @@ def time_of_day(weather: Weather) -> str:
 
 
 def is_unharmed(metrics: Metrics) -> bool | None:
-    """No fatal collision."""
+    """Whether no collision was fatal; None where that was not judged."""
     return None if metrics.fatal_collisions is None else metrics.fatal_collisions == 0
 
 

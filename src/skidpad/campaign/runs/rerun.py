@@ -183,7 +183,7 @@ class Film:
         self._writer.write(picture)
 
     def finish(self) -> None:
-        """Put it in place."""
+        """Puts the finished film in its place."""
         self._writer.release()
         try:
             os.replace(self.part, self.path)

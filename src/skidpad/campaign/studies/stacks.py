@@ -38,7 +38,7 @@ class Changed:
         self.report = self.stack.report
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
-        """Drive."""
+        """Drives as the stack does, and keeps its report."""
         command = self.stack.tick(frame)
         self.report = self.stack.report
         return command
@@ -58,7 +58,7 @@ class Handbraked(Changed):
     """It pulls the handbrake in tiers 1 to 3, at any speed (F-29)."""
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
-        """Drive, and pull."""
+        """Drives, and pulls the handbrake in some tiers."""
         command = super().tick(frame)
         return replace(command, handbrake=True) if self.report.tier in HELD_IN else command
 
@@ -74,7 +74,7 @@ class Blinking(Changed):
         self.blind = stretches(seed, "dropout", share, DROPOUT_S / self.stack.config.dt)
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
-        """Drive, blind or not."""
+        """Drives, without sensors in the ticks that are blind."""
         if self.blind[frame.tick % self.blind.size]:
             frame = replace(frame, images={}, segments={}, radar=RadarPoints.none())
         return super().tick(frame)

@@ -79,7 +79,7 @@ class Recorded:
         return False
 
     def at(self, tick: int) -> Sequence[Input]:
-        """What was done then."""
+        """Returns the inputs that were recorded for a tick."""
         return self._by_tick.get(tick, ())
 
 
@@ -166,7 +166,7 @@ class DeskDriver:
         return self.inner.mode
 
     def begin(self, table: ActorTable) -> None:
-        """The run begins."""
+        """Passes the begin of a run on to the driver."""
         self.inner.begin(table)
 
     def act(self, frame: SensorFrame) -> VehicleCommand:
@@ -220,7 +220,7 @@ class DeskScript:
 
     @property
     def ended(self) -> bool:
-        """It is over."""
+        """Whether the person or the script has ended the drive."""
         return self.desk.source.ended or self.inner.ended
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:

@@ -30,7 +30,7 @@ T = TypeVar("T")
 def list_(
     folder: Dir,
 ) -> None:
-    """One line per hazard."""
+    """Print one line per hazard record."""
     from skidpad.recording.hazards.records import read_index
 
     for line in lines(read_index(folder)):

@@ -51,7 +51,7 @@ class Shown(Progress):
         self.update(self.bar, total=total)
 
     def note_end(self, entry: Entry[Any, Any]) -> None:
-        """A run has ended."""
+        """Adds a run that has ended to the bars and the lines."""
         cell = cell_of(entry.run)
         runs = self.runs[cell]
         runs.append(entry)

@@ -58,7 +58,7 @@ def compare_runs(a: Path, b: Path) -> None:
 
 
 def show(run: Path) -> None:
-    """Print it."""
+    """Prints a run's log as tables."""
     log, road_map = open_run(run)
     console = table_console()
     console.print(f"[bold]{run.name}[/] on {log.header.map}, {len(log) * log.header.dt:g} s")

@@ -107,7 +107,7 @@ _OPERATORS: dict[str, Callable[[float, float], bool]] = {
 
 @dataclass(frozen=True, slots=True)
 class Clause:
-    """`signal operator value`."""
+    """Compares a signal with a value, written `signal operator value`."""
 
     signal: Signal
     operator: str

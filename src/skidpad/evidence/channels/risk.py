@@ -40,7 +40,7 @@ SAME_WAY = 0.866  # cosine of 30 deg, less turned vehicles follow each other
 
 
 class RiskForm(str, Enum):
-    """How times become risk."""
+    """Names the formula by which times become a risk."""
 
     AS_PRINTED = "as_printed"  # max(1 - TTC/4 s, 1 - PET/2 s, 0), C-094
     RECOMMENDED = "recommended"

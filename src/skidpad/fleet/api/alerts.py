@@ -72,7 +72,7 @@ async def list_alerts(
 
 @router.post("/{alert}/acknowledge")
 def acknowledge(request: Request, who: Answerer, alert: str) -> dict[str, Any]:
-    """Take it up."""
+    """Notes that a person takes the alert up."""
     return keep_answer(fleet_of(request), who, alert, What.ACKNOWLEDGED)
 
 

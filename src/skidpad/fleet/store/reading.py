@@ -22,7 +22,7 @@ PAGE = 200  # rows of one answer
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """Which hazards; None: any."""
+    """Says which hazards are wanted; None leaves a property open."""
 
     type: str | None = None
     vehicle: str | None = None

@@ -31,7 +31,7 @@ class Repository:
 
     @property
     def there(self) -> bool:
-        """It was begun."""
+        """Whether the repository has its first root of trust."""
         return (self.folder / "metadata" / "1.root.json").exists()
 
     def begin(self, root: bytes, targets: bytes) -> None:

@@ -275,7 +275,7 @@ class Section:
 
     @property
     def anchor(self) -> str:
-        """Identifier for links."""
+        """Returns the identifier by which links find the block."""
         return self.id or anchor(self.title)
 
 

@@ -39,7 +39,7 @@ COLUMNS = {"collisions": "fatal_collisions", "speed_kmh": "mean_speed_kmh"}
 
 
 def read_published(source: Source) -> pl.DataFrame:
-    """A table as copied."""
+    """Returns a published table as it was copied."""
     text = (files(__name__) / f"{source.value}.csv").read_bytes()
     return pl.read_csv(text, infer_schema_length=None)
 

@@ -31,7 +31,7 @@ SLACK = 1e-6  # s before the last point that is there
 
 @dataclass(frozen=True, slots=True)
 class Teleport:
-    """Be somewhere else."""
+    """Moves an actor to a position at once."""
 
     position: Position
 

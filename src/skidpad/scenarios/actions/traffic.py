@@ -25,7 +25,7 @@ RIM = 0.7  # of the ellipse, beyond which a swarm's later vehicles appear; assum
 
 @dataclass(frozen=True, slots=True)
 class StartTraffic:
-    """Traffic begins."""
+    """Lets a traffic action begin under its name."""
 
     name: str
     flow: Callable[[str, Scene], Sourcing | Sinking | Filling]

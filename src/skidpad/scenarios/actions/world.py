@@ -19,7 +19,7 @@ from skidpad.scenarios.scene import DONE, Running, Scene
 
 @dataclass(frozen=True, slots=True)
 class AddEntity:
-    """Appear."""
+    """Lets an entity appear at a position."""
 
     name: str
     position: Position
@@ -40,7 +40,7 @@ class AddEntity:
 
 @dataclass(frozen=True, slots=True)
 class DeleteEntity:
-    """Vanish."""
+    """Takes an entity out of the world."""
 
     name: str
 

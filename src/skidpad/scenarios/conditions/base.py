@@ -32,7 +32,7 @@ class EntityCondition(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """Compares with a number."""
+    """Compares a quantity with a number, as OpenSCENARIO rules do."""
 
     rule: str
     value: float

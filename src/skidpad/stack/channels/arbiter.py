@@ -29,7 +29,7 @@ class Reason(str, Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ArbiterSettings:
-    """Decision C-9."""
+    """Holds the limits by which the arbiter chooses a channel (decision C-9)."""
 
     preferred: str | None = None  # channel; None: the most progressing
     safe: float = 0.8

@@ -9,7 +9,7 @@ INTEGRAL_LIMIT = 50.0  # of the error times s (A-104)
 
 @dataclass(frozen=True, slots=True)
 class Gains:
-    """Gains and output limits."""
+    """Holds a controller's gains and the limits of its output."""
 
     kp: float
     ki: float

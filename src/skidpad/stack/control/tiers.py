@@ -83,7 +83,7 @@ RESET_BY = frozenset({Tier.HARD_STOP, Tier.EMERGENCY})  # (A-109)
 
 
 class Lead(NamedTuple):
-    """The detected target."""
+    """Holds the detected target ahead, and whether it is sure."""
 
     distance: float
     gap: float  # s, time gap
@@ -114,7 +114,7 @@ NO_ACTION = Request(Tier.NONE)
 
 
 class SpeedControl(Protocol):
-    """What holds a speed."""
+    """Holds a speed: what any speed controller offers."""
 
     def reset(self) -> None:
         """Resets what the controller has summed up."""
@@ -126,7 +126,7 @@ class SpeedControl(Protocol):
 
 
 class Rule(Protocol):
-    """A tier."""
+    """Makes the request of one tier, or passes."""
 
     def __call__(self, s: Situation) -> Request | None:
         """Returns a request, or None to leave it to the next tier."""

@@ -25,7 +25,7 @@ A_MAX, A_SIGMA, A_RANGE = 1.4, 0.25, (0.7, 2.1)  # m/s^2
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """One driver."""
+    """Holds the traits of one driver."""
 
     reaction: float  # s
     headway: float  # s

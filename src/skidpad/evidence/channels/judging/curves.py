@@ -49,7 +49,7 @@ _OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
 
 
 class Point(NamedTuple):
-    """Counts at one limit."""
+    """Holds the counts of matched and unmatched hazards at one limit."""
 
     limit: float
     tp: int

@@ -20,5 +20,5 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Facts are never removed."""
+    """Raises NotImplementedError, as facts are never removed."""
     raise NotImplementedError("facts of the fleet are only ever added")

@@ -218,7 +218,7 @@ class _Wheel:
 
     @property
     def report(self) -> StackReport:
-        """What the stack says."""
+        """Returns what the stack says of itself."""
         return self.inner.report
 
     @property
@@ -227,7 +227,7 @@ class _Wheel:
         return self.inner.mode
 
     def begin(self, table: ActorTable) -> None:
-        """The run begins."""
+        """Passes the begin of the run on to the driver."""
         self.inner.begin(table)
 
     def act(self, frame: SensorFrame) -> VehicleCommand:
@@ -245,7 +245,7 @@ class _SentCommands:
 
     @property
     def ended(self) -> bool:
-        """The script has ended."""
+        """Whether the script has come to its end."""
         return self.inner.ended
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:

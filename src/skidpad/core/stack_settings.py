@@ -86,7 +86,7 @@ class BranchChoice(str, Enum):
 
 
 class Follower(str, Enum):
-    """What actuates following (D-039)."""
+    """What actuates the following of a lead (D-039)."""
 
     ZONES = "zones"
     DISTANCE_PID = "distance_pid"

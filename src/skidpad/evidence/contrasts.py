@@ -171,7 +171,7 @@ class Outweighs:
 
     @property
     def amounts(self) -> tuple[Amount, ...]:
-        """Returns the margin alone."""
+        """Returns the margin, the only amount here."""
         return (self.margin,)
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:
@@ -222,7 +222,7 @@ class Mean:
 
     @property
     def amounts(self) -> tuple[Amount, ...]:
-        """Returns the margin alone."""
+        """Returns the margin, the only amount here."""
         return (self.margin,)
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:

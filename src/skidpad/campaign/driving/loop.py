@@ -96,7 +96,7 @@ class Sink:
         """Further sensors or functions are recorded; `latest` says what they said last, in words."""
 
     def see(self, moment: Moment) -> None:
-        """Takes in one moment."""
+        """Takes in what happened in one tick."""
         raise NotImplementedError
 
 
@@ -104,7 +104,7 @@ class Unsupervised:
     """No supervisor: the driver's command is what happens, to the end of the run."""
 
     def observe(self, truth: WorldTruth) -> Supervision:
-        """The driver drives."""
+        """Returns that the driver drives, always."""
         del truth
         return Supervision.NONE
 
@@ -126,7 +126,7 @@ class Timer:
         return self.left <= 0 or (self.script is not None and self.script.ended)
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
-        """Counts one tick down."""
+        """Counts one tick down and returns the script's commands."""
         self.left -= 1
         return () if self.script is None else self.script.step(truth)
 

@@ -170,7 +170,7 @@ class Log(Sink):
         self.header, self.weather, self.ticks = header, weather, ticks
 
     def begin(self, table: ActorTable) -> None:
-        """Make room."""
+        """Makes room for as many ticks as the run may have."""
         self.log = TickLog(table, self.header, self.weather, self.ticks)
 
     def see(self, moment: Moment) -> None:
@@ -298,7 +298,7 @@ class OpenRun:
         checkpoint.restore(self)
 
     def close(self) -> None:
-        """Release the backend."""
+        """Releases the backend and what it holds."""
         self.backend.close()
 
     def finish(self) -> Run:

@@ -30,7 +30,7 @@ class IndicatorPanel:
         self.reset()
 
     def reset(self) -> None:
-        """Forgets all earlier cycles."""
+        """Forgets all cycles before, for a new drive."""
         self.channels = [ChannelIndicators(self.settings) for _ in self.layout.channels]
         self.pairs = [
             PairIndicators(self.channels[a], self.channels[b], self.settings)

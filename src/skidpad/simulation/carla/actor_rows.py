@@ -59,17 +59,6 @@ class ActorRow:
         )
 
 
-def place_of(map: RoadMap, place: Pose | LanePosition) -> Pose:
-    """Returns a pose on the map; a lane position becomes one along its lane, at its lateral offset.
-
-    ConfigError for a lane position that the map has not.
-    """
-    if isinstance(place, Pose):
-        return place
-    point = map.place(place)
-    return point.pose.moved(left=point.offset)
-
-
 def spawn_setup(carla: Any, world: Any, map: RoadMap, setup: ActorSetup) -> ActorRow:
     """Spawns an actor of the set-up and returns its row; BackendError when something stands in its place.
 

@@ -360,9 +360,9 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         """Returns the wall time in s after which the run counts as hanging."""
         return DEADLINE_BASE_S + DEADLINE_PER_SIMULATED_S * self.duration
 
-    def resolved(self) -> dict[str, Any]:
+    def to_identity(self) -> dict[str, Any]:
         """Returns everything that decides the run, as plain data (A-260); an address does not."""
-        return self.to_plain() | {"backend": self.backend.resolved()}
+        return self.to_plain() | {"backend": self.backend.to_identity()}
 
     def to_plain(self) -> dict[str, Any]:
         """Returns the whole value as plain data, as it stands in config.yaml."""

@@ -43,7 +43,7 @@ class BackendChoice(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         int, Meta(ge=0, description="CARLA: runs after which that server is started anew.")
     ] = 0  # 0: never
 
-    def resolved(self) -> dict[str, Any]:
+    def to_identity(self) -> dict[str, Any]:
         """Returns what of it decides a run, as plain data; an address does not."""
         plain: dict[str, Any] = msgspec.to_builtins(self)
         return {name: value for name, value in plain.items() if name not in ADDRESS}

@@ -114,7 +114,7 @@ class KeepGap:
             return max(min(its) - own.forward - own.length / 2.0, 0.0)
         return min(max(its) - own.forward + own.length / 2.0, 0.0)
 
-    def wanted(self, scene: Scene, side: Displacement) -> float:
+    def wanted_gap(self, scene: Scene, side: Displacement) -> float:
         """Returns how far the other one should be ahead, m; negative where the entity is to lead."""
         v = abs(scene.actors[self.other].v_told)
         size = abs(self.distance if self.distance is not None else (self.time_gap or 0.0) * v)

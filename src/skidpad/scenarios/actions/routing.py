@@ -159,7 +159,7 @@ class FollowTrajectory:
 
         Absolute times count from the begin of the scenario.
         """
-        line = self.trajectory.traced(scene, actor.pose)
+        line = self.trajectory.trace(scene, actor.pose)
         guide = actor.guide
         led: Paced | Timed | Steered
         if self.is_steered(actor.entity) and actor.placed_by_file:

@@ -37,7 +37,7 @@ class Rule:
     rule: str
     value: float
 
-    def met(self, quantity: float) -> bool:
+    def is_met(self, quantity: float) -> bool:
         """Returns whether the quantity stands so to the value; infinity is beyond every number.
 
         They are equal where they differ by less than SAME.

@@ -239,7 +239,7 @@ class Clearance:
             return False
         return not any(self._inside(scene, here, base, place.along, n) for n in others)
 
-    def _wanted(self, lane: int, sign: int) -> set[int]:
+    def _find_lanes(self, lane: int, sign: int) -> set[int]:
         """Returns the OpenDRIVE ids of the lanes asked for, seen from `lane`; sign: 1 towards higher ids."""
         return {
             next_lane_id(lane, sign * k) if k else lane
@@ -249,7 +249,7 @@ class Clearance:
 
     def _has_lane(self, scene: Scene, base: LanePoint, sign: int) -> bool:
         """Returns whether a lane of those asked for is beside the entity; none is no room."""
-        wanted = self._wanted(base.lane_id, sign) or {base.lane_id}
+        wanted = self._find_lanes(base.lane_id, sign) or {base.lane_id}
         if not self.opposite:
             wanted = {i for i in wanted if (i > 0) == (base.lane_id > 0)}
         return any(i == base.lane_id or scene.network.beside(base, i) for i in wanted)

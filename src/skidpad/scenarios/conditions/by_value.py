@@ -159,7 +159,7 @@ class TimeOfDay:
 
     def probe(self) -> Probe:
         """Returns a function of the scene: whether its time of day meets the comparison now."""
-        return lambda s: s.clock is not None and self.rule.met(s.clock.now(s.t))
+        return lambda s: s.clock is not None and self.rule.is_met(s.clock.now(s.t))
 
 
 def _time_of_day(node: Node, ctx: Context) -> Condition:

@@ -83,7 +83,7 @@ class Sheet:
         """Returns whether the file is written as version 1.0."""
         return self.version is OscVersion.V1_0
 
-    def parked(self, k: int) -> tuple[float, float, float]:
+    def parking_place(self, k: int) -> tuple[float, float, float]:
         """Returns a parking place of its own for entity k: x, y in m, heading in rad."""
         x, y, h = self.parking
         return x + 8.0 * k * cos(h), y + 8.0 * k * sin(h), h

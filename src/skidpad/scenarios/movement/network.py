@@ -245,7 +245,7 @@ class Network:
                 return point
             point, left = further, left - STEP
 
-    def _wanted(self, lane: int, forward: bool, roads: tuple[int, ...]) -> int | None:
+    def _next_lane(self, lane: int, forward: bool, roads: tuple[int, ...]) -> int | None:
         """Returns the lane after this one that is on the way; else one through a junction to a road of it.
 
         forward: after in the sense of the traffic, else before. None where neither is.

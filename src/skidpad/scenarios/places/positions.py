@@ -43,7 +43,7 @@ class Orientation:
     heading: float | None
     frame: Frame
 
-    def turned(self, base: float) -> float:
+    def to_world_heading(self, base: float) -> float:
         """Returns the heading in the world in rad, where `base` is that of what it may be relative to."""
         if self.heading is None:
             return base

@@ -33,7 +33,7 @@ class ScenarioRoute:
 
 def compile_route(node: Node, ctx: Context) -> ScenarioRoute:
     """Compiles a <Route> or a reference to one; waypoints must not depend on what moves."""
-    node = ctx.catalogs.resolved(node, "Route")
+    node = ctx.catalogs.resolve(node, "Route")
     points = []
     for waypoint in node.children("Waypoint"):
         at = position(waypoint.child("Position"), ctx)

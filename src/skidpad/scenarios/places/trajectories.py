@@ -34,7 +34,7 @@ class Trajectory:
     from_here: bool = False  # it begins where the entity is that follows it
     tangential: bool = False  # its headings are those of the line
 
-    def traced(self, scene: Scene, here: Pose = ORIGIN) -> Line:
+    def trace(self, scene: Scene, here: Pose = ORIGIN) -> Line:
         """Returns the line as things are now, for an entity that is here."""
         if self.line is not None or self.shape is None:
             return self.line or Line([Vertex(0.0, 0.0, 0.0)])
@@ -45,7 +45,7 @@ class Trajectory:
 
 def compile_trajectory(node: Node, ctx: Context) -> Trajectory:
     """Compiles a <Trajectory>, or a reference to one; its line at once where nothing in it moves."""
-    node = ctx.catalogs.resolved(node, "Trajectory")
+    node = ctx.catalogs.resolve(node, "Trajectory")
     closed = node.flag("closed", default=False)
     shape = node.child("Shape").only()
     name = node.label()

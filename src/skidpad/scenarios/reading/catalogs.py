@@ -84,7 +84,7 @@ class Catalogs:
         values = read_declarations(found, reference.values, given)
         return found.with_parameters(values | given)
 
-    def resolved(self, node: Node, kind: str | None = None) -> Node:
+    def resolve(self, node: Node, kind: str | None = None) -> Node:
         """Returns the node itself, or the entry where it is a reference; its own parameters are in scope.
 
         kind: the element it must be, else a Fault; None for any.

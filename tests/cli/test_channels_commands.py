@@ -246,7 +246,9 @@ def test_a_drive_with_its_monitor_says_what_it_found_how_late_and_draws_it(tmp_p
     done = invoke("channels", "drive", *words, "--monitor")
     assert done.exit_code == 0, done.output
     said = done.output.replace("\n", " ")
-    assert re.search(r"1 segment, 0\.00 h, .* 0 collisions, .* Next: skidpad monitor \S+\.mcap", said)
+    assert re.search(
+        r"1 segment, 0\.00 h, .* 0 collisions, .* Next: skidpad monitor \S+\.mcap", said
+    )
     assert re.search(r"route-4-00000\.monitor: 20 cycles; complete; judged [\d.]+ ms after", said)
     (page,) = out.glob("*/*.monitor/report.html")
     assert "<html" in page.read_text(encoding="utf-8")

@@ -33,7 +33,8 @@ T = TypeVar("T")
 FOREIGN = (Exception, SystemExit)  # what foreign code may raise; Ctrl-C remains the user's
 SWITCHES = (bool, np.bool_)
 REPORTED = tuple(field.name for field in fields(StackReport))
-OWN = "skidpad.stack.adas"  # a module of stacks that need no guarding: they run no foreign code
+# modules of stacks that need no guarding: they run no foreign code
+OWN = frozenset({"skidpad.stack.adas", "skidpad.env.wheel"})
 INT_MAX = 2**31 - 1  # the log's whole numbers have 32 bits
 LONGEST_MODE = 200  # characters
 NO_REPORT = StackReport()
@@ -126,7 +127,7 @@ class GuardedStack:
         settings: Mapping[str, Any],
     ) -> None:
         self.name = kind.__name__
-        self._is_own = kind.__module__ == OWN and not _has_added(settings)
+        self._is_own = kind.__module__ in OWN and not _has_added(settings)
         self._tick = -1  # the last one
         self._taken = frozenset(spec.id for spec in specs)
         self._process, self._folder = os.getpid(), _folder()

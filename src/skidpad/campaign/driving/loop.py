@@ -153,6 +153,8 @@ class Stepper:
     """The loop, stopped after each tick: what the script says of the tick is known by then.
 
     Attributes:
+        frame: of this tick.
+        truth: of this tick.
         failure: how the driver failed, which ended the run; None: it did not.
     """
 
@@ -166,43 +168,45 @@ class Stepper:
         sinks: Sequence[Sink],
     ) -> None:
         self.backend, self.driver, self.supervisor = backend, driver, supervisor
-        self.script, self.sinks = script, sinks
-        self._first: SensorFrame | None = frame
+        self.script, self.sinks, self.frame = script, sinks, frame
+        self.truth = backend.truth()
         self.failure: StackError | None = None
         self.action: Action | None = None  # of the last tick; None before the first one
         self.words: Sequence[ActorCommand] = ()  # what the script said in it
-        table = backend.truth().table
-        driver.begin(table)
+        driver.begin(self.truth.table)
         for sink in sinks:
-            sink.begin(table)
+            sink.begin(self.truth.table)
 
     def step(self) -> Moment | None:
         """Drives one tick and returns its moment; None when the run is over."""
-        if self.failure is not None:
-            return None
+        return self.answer() if self.sense() else None
+
+    def sense(self) -> bool:
+        """Steps the world to the next tick; returns False when the run is over."""
         action = self.action
-        if action is None:
-            assert self._first is not None
-            frame, self._first = self._first, None
-        else:
-            if self.script.ended:
-                return None
+        if self.failure is not None or (action is not None and self.script.ended):
+            return False
+        if action is not None:
             if action.relocate is not None:
                 self.backend.relocate(action.relocate.pose, action.relocate.v)
-            frame = self.backend.step(action.command, self.words)
-        truth = self.backend.truth()
-        phase = self.supervisor.observe(truth)
+            self.frame = self.backend.step(action.command, self.words)
+            self.truth = self.backend.truth()
+        phase = self.supervisor.observe(self.truth)
         if phase is not Supervision.NONE:
-            frame = replace(frame, supervision=phase)
+            self.frame = replace(self.frame, supervision=phase)
+        return True
+
+    def answer(self) -> Moment | None:
+        """Lets driver and script answer the frame of this tick; None when the driver fails."""
         try:
-            command = self.driver.act(frame)
+            command = self.driver.act(self.frame)
             report = self.driver.report
         except StackError as failure:
             self.failure = failure
             return None
-        self.action = self.supervisor.act(command, report)
-        moment = Moment(frame, truth, self.driver, command, report, self.action)
+        action = self.action = self.supervisor.act(command, report)
+        moment = Moment(self.frame, self.truth, self.driver, command, report, action)
         for sink in self.sinks:
             sink.see(moment)
-        self.words = self.script.step(truth)
+        self.words = self.script.step(self.truth)
         return moment

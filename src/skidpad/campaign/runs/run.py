@@ -274,11 +274,22 @@ class OpenRun:
 
     def step(self) -> Moment | None:
         """Go on by one tick; None when the run is over; a stack that fails ends it with a notice."""
+        return self.answer() if self.sense() else None
+
+    def sense(self) -> bool:
+        """Steps the world to the next tick, which `answer` completes; False when the run is over."""
         if self.over:
-            return None
+            return False
         if self.stepper is None:
             self.stepper = self._begin()
-        moment = None if self.stepper is None else self.stepper.step()
+        if self.stepper is None or not self.stepper.sense():
+            self._end()
+        return not self.over
+
+    def answer(self) -> Moment | None:
+        """Lets the driver answer the tick that `sense` began; None where it fails."""
+        assert self.stepper is not None, "sense() comes first"
+        moment = self.stepper.answer()
         if moment is None:
             self._end()
         return moment

@@ -198,6 +198,11 @@ def in_wind(**also: Any) -> Outcome:
     return lambda s: short_drive("rain-noon")(s.with_values({"wind": True, **also}))
 
 
+def with_radar(settings: Settings) -> str:
+    """A short drive with a radar that has noise and clutter."""
+    return short_drive("clear-noon")(settings.with_values({"radar_model": "physical"}))
+
+
 def pictures(settings: Settings, weather: str, *ids: str) -> list[bytes]:
     """What some cameras show at the start."""
     ready = cell(settings, weather, sensors=SensorLevel.PIXELS)
@@ -282,6 +287,8 @@ OTHERS: dict[str, Scenario] = {
     "lidar": Scenario("physical", lidar),
     "spray": Scenario(True, sprayed),
     "radar_model": Scenario("physical", short_drive("clear-noon")),
+    "radar_multipath": Scenario(True, with_radar),
+    "radar_output": Scenario("tracks", with_radar),
     "lane_material": Scenario(True, lane_friction),
     "esc": Scenario(False, short_drive("icy_30")),
     "anti_lock": Scenario("wheel_speeds", full_brake),

@@ -78,6 +78,24 @@ class RadarPoints(NamedTuple):
         return cls(*(np.empty(0, dtype=np.float32) for _ in range(4)))
 
 
+class RadarObjects(NamedTuple):
+    """What an object list of a radar adds to its n rows of `RadarPoints`."""
+
+    snr: Float32  # dB, power over the noise
+    section: Float32  # dBsm, radar cross section by the radar equation
+
+
+class RadarTracks(NamedTuple):
+    """What tracks add to n rows: places and velocities in the radar's axes (x forward, y left)."""
+
+    number: NDArray[np.int64]  # the same from tick to tick
+    x: Float32  # m
+    y: Float32
+    vx: Float32  # m/s, over ground
+    vy: Float32
+    age: NDArray[np.int64]  # ticks since it began
+
+
 class LidarPoints(NamedTuple):
     """n returns in the lidar's frame (x forward, y left, z up)."""
 
@@ -136,6 +154,8 @@ class SensorFrame:
     # readings of the sensors that the stack asked for, by id: plain data and
     # arrays as their type in `core.sensor_types` says; each is made when it is first read
     extra: Mapping[str, Any] = field(default_factory=dict)
+    radar_objects: RadarObjects | None = None  # of each row of `radar`: setting radar_output
+    radar_tracks: RadarTracks | None = None
 
 
 # A backend's frame is the ego's sensor frame.

@@ -27,6 +27,7 @@ from skidpad.core.vocabulary import (
     Headways,
     LidarModel,
     RadarModel,
+    RadarOutput,
     RangeModel,
     StabilityControl,
 )
@@ -131,6 +132,12 @@ class SensorSettings(SettingsPart):
     )
     radar_model: RadarModel = setting_field(
         RadarModel.GEOMETRIC, "M-1, T-11", "echoes of the radar: noise, clutter, rain, wet radome"
+    )
+    radar_multipath: bool = setting_field(
+        False, "M-1, T-11", "rails, walls and road mirror the radar, with radar_model=physical"
+    )
+    radar_output: RadarOutput = setting_field(
+        RadarOutput.POINTS, "M-1, T-11", "rows of the radar, with radar_model=physical"
     )
     camera: bool = setting_field(True, "M-4", "weather acts on RGB images")
     night_rain: NightRain = setting_field(

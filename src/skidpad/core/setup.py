@@ -18,6 +18,7 @@ from skidpad.core.vocabulary import (
     Headways,
     LidarModel,
     RadarModel,
+    RadarOutput,
     RangeModel,
     Scenery,
     SensorLevel,
@@ -108,6 +109,8 @@ class Setup:
     lidar: LidarModel = LidarModel.EXACT  # of the lidars that a stack asks for (embedded backend)
     spray: bool = False  # behind vehicles, for such lidars (embedded backend)
     radar_model: RadarModel = RadarModel.GEOMETRIC  # of the common radar (embedded backend)
+    radar_multipath: bool = False  # of such a radar
+    radar_output: RadarOutput = RadarOutput.POINTS  # of such a radar
     stability: bool = False  # all vehicles have stability and traction control (embedded backend)
     anti_lock: AntiLock = AntiLock.IDEAL  # of vehicles that have them (embedded backend)
     stability_control: StabilityControl = StabilityControl.IDEAL  # where there is one

@@ -227,6 +227,14 @@ class RadarModel(str, Enum):
     PHYSICAL = "physical"
 
 
+class RadarOutput(str, Enum):
+    """What a physical radar hands on: `points` of its cells, `detections` of objects, their `tracks`."""
+
+    POINTS = "points"
+    DETECTIONS = "detections"
+    TRACKS = "tracks"
+
+
 class AntiLock(str, Enum):
     """How anti-lock brakes work: `ideal` knows the grip, `wheel_speeds` cycles without knowing it."""
 

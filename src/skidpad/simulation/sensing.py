@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.frames import CameraImage, RadarPoints, Segments
+from skidpad.core.frames import CameraImage, RadarObjects, RadarPoints, RadarTracks, Segments
 from skidpad.core.inputs import Outside
 from skidpad.core.setup import Setup
 from skidpad.core.specs import RadarSpec
@@ -30,6 +30,8 @@ class CameraRadarReadings(NamedTuple):
     images: Mapping[str, CameraImage]
     segments: Mapping[str, Segments]
     radar: RadarPoints
+    radar_objects: RadarObjects | None = None
+    radar_tracks: RadarTracks | None = None
 
 
 class Sensing(Protocol):
@@ -136,7 +138,16 @@ class WithPhysicalRadar:
     ) -> None:
         weather = setup.weather if setup.range_model is RangeModel.PHYSICAL else None
         self.suite = suite
-        self.radar = PhysicalRadar(spec, map.roadside, table, seed, weather)
+        self.radar = PhysicalRadar(
+            spec,
+            map.roadside,
+            table,
+            seed,
+            weather,
+            multipath=setup.radar_multipath,
+            output=setup.radar_output,
+            dt=setup.dt,
+        )
 
     def read(
         self,
@@ -147,7 +158,10 @@ class WithPhysicalRadar:
     ) -> CameraRadarReadings:
         """Readings of the suite with the radar's detections."""
         seen = self.suite.read(tick, states, lights, braking)
-        return seen._replace(radar=self.radar.measure(tick, states))
+        found = self.radar.read(tick, states)
+        return seen._replace(
+            radar=found.points, radar_objects=found.objects, radar_tracks=found.tracks
+        )
 
     def change(self, outside: Outside) -> None:
         """Weather and headlights are others from the next reading on."""

@@ -284,6 +284,8 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
         lidar=sensors.lidar,
         spray=sensors.spray,
         radar_model=sensors.radar_model,
+        radar_multipath=sensors.radar_multipath,
+        radar_output=sensors.radar_output,
         stability=world.esc,
         anti_lock=world.anti_lock,
         stability_control=world.stability,

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from skidpad.core.arrays import Floats
 from skidpad.core.jit import inner_kernel
 from skidpad.core.states import ActorStates
+from skidpad.physics.mirrors import two_ray_gain
 from skidpad.sensors.noise import uniform
 from skidpad.sensors.object_level.boxes import WallGroups, Walls, walls_in_view
 from skidpad.sensors.physical_radar.cells import Cells, add_echo, normal_pair
-from skidpad.sensors.physical_radar.setup import BEAM_STEP, DB, RadarSetup
+from skidpad.sensors.physical_radar.mirrors import Mirrors
+from skidpad.sensors.physical_radar.setup import BEAM_STEP, DB, WAVE_NUMBER, RadarSetup
 from skidpad.sensors.physical_radar.targets import LOBES, Sites, Targets
 
 NEAR = 1.0  # m, nearest echo
@@ -30,6 +32,7 @@ class RadarWorld(NamedTuple):
     sites: Sites
     walls: Walls
     groups: WallGroups
+    mirrors: Mirrors
 
 
 class Screens(NamedTuple):
@@ -86,7 +89,23 @@ def find_screens(
 
 
 @inner_kernel
-def _is_hidden(
+def crosses_box(
+    o: tuple[float, float, float], d: tuple[float, float, float], half: tuple[float, float, float]
+) -> bool:
+    """Whether the way d from a point o meets a box about the origin with these half sizes."""
+    enter, leave = 0.0, 1.0
+    for axis in range(3):
+        if d[axis] == 0.0:
+            if abs(o[axis]) > half[axis]:
+                leave = -1.0
+            continue
+        t0, t1 = (-half[axis] - o[axis]) / d[axis], (half[axis] - o[axis]) / d[axis]
+        enter, leave = max(enter, min(t0, t1)), min(leave, max(t0, t1))
+    return enter < leave
+
+
+@inner_kernel
+def is_hidden(
     world: RadarWorld,
     states: ActorStates,
     origin: Floats,
@@ -103,21 +122,13 @@ def _is_hidden(
         o = (screens.x[k], screens.y[k], origin[2] - states.z[i] - world.height[i] / 2.0)
         d = (c * way[0] + s * way[1], -s * way[0] + c * way[1], way[2])
         half = (world.length[i] / 2.0, world.width[i] / 2.0, world.height[i] / 2.0)
-        enter, leave = 0.0, 1.0
-        for axis in range(3):
-            if d[axis] == 0.0:
-                if abs(o[axis]) > half[axis]:
-                    leave = -1.0
-                continue
-            t0, t1 = (-half[axis] - o[axis]) / d[axis], (half[axis] - o[axis]) / d[axis]
-            enter, leave = max(enter, min(t0, t1)), min(leave, max(t0, t1))
-        if enter < leave:
+        if crosses_box(o, d, half):
             return True
     return False
 
 
 @inner_kernel
-def _is_behind_wall(
+def is_behind_wall(
     walls: Walls, chosen: NDArray[np.int64], origin: Floats, way: tuple[float, float, float]
 ) -> bool:
     """Whether a wall crosses the way from the antenna to a point that is `way` m off."""
@@ -136,7 +147,7 @@ def _is_behind_wall(
 
 
 @inner_kernel
-def _echo(
+def echo_of(
     radar: RadarSetup, sensor: Sensor, way: tuple[float, float, float], vx: float, vy: float
 ) -> Echo:
     """What a point of 1 m^2 that moves so returns; SNR 0: it is not met."""
@@ -157,7 +168,7 @@ def _echo(
 
 
 @inner_kernel
-def _deposit(
+def deposit_echo(
     radar: RadarSetup, cells: Cells, echo: Echo, section: float, tick: int, index: int
 ) -> None:
     """Add the echo of a point of this section to its cells."""
@@ -182,7 +193,7 @@ def lobe_section(side: int, azimuth: float, zenith: float) -> float:
 
 
 @inner_kernel
-def _draw_spread(radar: RadarSetup, tick: int, index: int, db: float) -> float:
+def draw_spread(radar: RadarSetup, tick: int, index: int, db: float) -> float:
     """A factor with mean 1 whose logarithm has this standard deviation in dB."""
     z, _ = normal_pair(radar.key, tick, 2 * index)
     return exp(DB * (db * z - 0.5 * DB * db * db))
@@ -217,20 +228,30 @@ def add_actors(
             x, y = states.x[i] + px - origin[0], states.y[i] + py - origin[1]
             way = (x, y, states.z[i] + targets.rise[i] - origin[2])
             rate = states.yaw_rate[i]
-            echo = _echo(radar, sensor, way, states.vx[i] - rate * py, states.vy[i] + rate * px)
+            echo = echo_of(radar, sensor, way, states.vx[i] - rate * py, states.vy[i] + rate * px)
             if echo.snr == 0.0:
                 continue
-            if _is_hidden(world, states, origin, screens, i, way):
+            if is_hidden(world, states, origin, screens, i, way):
                 continue
-            if _is_behind_wall(world.walls, rails, origin, way):
+            if is_behind_wall(world.walls, rails, origin, way):
                 continue
             section = targets.area[i, side]
             if targets.lobed[i]:
                 zenith = 90.0 + np.degrees(np.arctan2(way[2], np.hypot(x, y)))
                 section *= lobe_section(side, np.degrees(np.arctan2(ay, ax)), zenith)
             index = 4 * i + side
-            section *= _draw_spread(radar, tick, index, targets.spread[i])
-            _deposit(radar, cells, echo, section, tick, index)
+            section *= draw_spread(radar, tick, index, targets.spread[i])
+            if radar.multipath:
+                section *= _road_gain(radar, np.hypot(x, y), targets.rise[i])
+            deposit_echo(radar, cells, echo, section, tick, index)
+
+
+@inner_kernel
+def _road_gain(radar: RadarSetup, ground: float, high: float) -> float:
+    """What the road's reflection makes of an echo from `ground` m off and `high` m over the road."""
+    antenna = radar.mount.origin[2]
+    near, far = np.hypot(ground, antenna - high), np.hypot(ground, antenna + high)
+    return two_ray_gain(near, far, (antenna + high) / far, WAVE_NUMBER)
 
 
 @inner_kernel
@@ -250,8 +271,8 @@ def add_sites(
         if abs(x) + abs(y) > 1.5 * radar.reach or x * sites.nx[j] + y * sites.ny[j] > 0.0:
             continue
         way = (x, y, sites.z[j] - origin[2])
-        echo = _echo(radar, sensor, way, 0.0, 0.0)
+        echo = echo_of(radar, sensor, way, 0.0, 0.0)
         if echo.snr * sites.section[j] < 1.0:
             continue
-        if not _is_hidden(world, states, origin, screens, 0, way):
-            _deposit(radar, cells, echo, sites.section[j], tick, 4 * states.x.size + j)
+        if not is_hidden(world, states, origin, screens, 0, way):
+            deposit_echo(radar, cells, echo, sites.section[j], tick, 4 * states.x.size + j)

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from math import exp, log, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.frames import RadarPoints
+from skidpad.core.frames import RadarObjects, RadarPoints, RadarTracks
 from skidpad.core.jit import Held, hold, inner_kernel, kernel
 from skidpad.core.randomness import stream_key
+from skidpad.core.setup import DT
 from skidpad.core.specs import RadarSpec
 from skidpad.core.states import ActorStates, ActorTable
+from skidpad.core.vocabulary import RadarOutput
 from skidpad.core.weather import Weather
 from skidpad.roads.roadside import Roadside
 from skidpad.sensors.noise import uniform
@@ -35,6 +38,9 @@ from skidpad.sensors.physical_radar.echoes import (
     add_sites,
     find_screens,
 )
+from skidpad.sensors.physical_radar.ghosts import add_ghosts
+from skidpad.sensors.physical_radar.lists import POWER, SECTION, add_sections, join_rows
+from skidpad.sensors.physical_radar.mirrors import mirrors_of
 from skidpad.sensors.physical_radar.setup import (
     FASTEST,
     MAX_SPEED,
@@ -45,8 +51,23 @@ from skidpad.sensors.physical_radar.setup import (
     setup_of,
 )
 from skidpad.sensors.physical_radar.targets import sites_of, targets_of
+from skidpad.sensors.physical_radar.tracks import (
+    MOST_TRACKS,
+    Tracks,
+    make_tracks,
+    update_tracks,
+    write_tracks,
+)
 
 MOST_FOUND = 512
+
+
+class Reading(NamedTuple):
+    """One tick of a radar: rows that every stack reads, and what an object list adds."""
+
+    points: RadarPoints
+    objects: RadarObjects | None = None  # detections and tracks alone have it
+    tracks: RadarTracks | None = None
 
 
 class PhysicalRadar:
@@ -59,29 +80,81 @@ class PhysicalRadar:
         table: ActorTable,
         seed: int,
         weather: Weather | None = None,
+        *,
+        multipath: bool = False,
+        output: RadarOutput = RadarOutput.POINTS,
+        dt: float = DT,
     ) -> None:
-        """weather: acts on the waves; None: it does not."""
+        """Builds the radar's targets, mirrors and cells.
+
+        Args:
+            spec: mounting and reach.
+            roadside: what stands beside the roads.
+            table: sizes and kinds of the actors.
+            seed: of the run.
+            weather: acts on the waves; None: it does not.
+            multipath: walls, rails and the road mirror the waves.
+            output: cells, objects or tracks.
+            dt: s between two ticks.
+        """
         self.spec, self._key = spec, np.uint64(stream_key(seed, "physical radar", spec.id))
+        self._multipath, self._output, self._dt = multipath, output, dt
         walls = walls_of(roadside)
         self._world = hold(
             RadarWorld(
                 table.length, table.width, table.height, targets_of(table), sites_of(roadside),
-                walls, group_walls(walls),
+                walls, group_walls(walls), mirrors_of(roadside if multipath else Roadside()),
             )
         )  # fmt: skip
         self._cells = hold(make_cells())
-        self._out = np.empty((MOST_FOUND, 4), np.float32)
+        self._tracks = hold(make_tracks())
+        self._out = np.empty((MOST_FOUND, 6), np.float32)
+        self._more = np.empty((MOST_TRACKS, 6))
         self.change(weather)
 
     def change(self, weather: Weather | None) -> None:
         """Weather is another from the next tick on."""
-        self.setup = setup_of(self.spec, self._key, weather)
+        self.setup = setup_of(self.spec, self._key, weather, self._multipath)
         self._held = hold(self.setup)
 
     def measure(self, tick: int, states: ActorStates) -> RadarPoints:
         """Detections of this state, valid until the next call; actor 0 carries the radar."""
+        return self.read(tick, states).points
+
+    def read(self, tick: int, states: ActorStates) -> Reading:
+        """Detections of this state as the output asks for, valid until the next call."""
         count = find_detections(self._held, self._world, self._cells, states, tick, self._out)
-        return RadarPoints(*self._out[:count].T)
+        if self._output is RadarOutput.POINTS:
+            return Reading(RadarPoints(*self._out[:count, :4].T))
+        count = join_cells(self._held, self._out, count)
+        if self._output is RadarOutput.TRACKS:
+            count = follow_objects(
+                self._held, self._tracks, states, self._dt, self._out, self._more, count
+            )
+        rows = self._out[:count]
+        points = RadarPoints(*rows[:, :4].T)
+        decibels = 10.0 * np.log10(np.maximum(rows[:, POWER:], 1e-9))
+        objects = RadarObjects(decibels[:, 0], decibels[:, SECTION - POWER])
+        if self._output is RadarOutput.DETECTIONS:
+            return Reading(points, objects)
+        m = self._more[:count]
+        motion = (m[:, k].astype(np.float32) for k in range(1, 5))
+        return Reading(
+            points,
+            objects,
+            RadarTracks(m[:, 0].astype(np.int64), *motion, m[:, 5].astype(np.int64)),
+        )
+
+
+@inner_kernel
+def _sensor_of(radar: RadarSetup, states: ActorStates) -> Sensor:
+    """Where the antenna is, and how it moves."""
+    seat = placed(radar.mount, states)
+    vx = states.vx[0] - states.yaw_rate[0] * (seat.origin[1] - states.y[0])
+    vy = states.vy[0] + states.yaw_rate[0] * (seat.origin[0] - states.x[0])
+    speed = np.hypot(vx, vy)
+    wet = radar.air.radome[min(int(speed + 0.5), FASTEST - 1)]
+    return Sensor(seat.origin, seat.rotation, vx, vy, wet)
 
 
 @kernel
@@ -93,37 +166,77 @@ def find_detections(
     tick: int,
     out: NDArray[np.float32],
 ) -> int:
-    """Write range, azimuth, altitude and range rate of what is found; returns how many."""
+    """Write range, azimuth, altitude, range rate and power of the cells found; returns how many."""
     radar, world, cells = held.value, surroundings.value, state.value
-    seat = placed(radar.mount, states)
-    vx = states.vx[0] - states.yaw_rate[0] * (seat.origin[1] - states.y[0])
-    vy = states.vy[0] + states.yaw_rate[0] * (seat.origin[0] - states.x[0])
-    speed = np.hypot(vx, vy)
-    wet = radar.air.radome[min(int(speed + 0.5), FASTEST - 1)]
-    sensor = Sensor(seat.origin, seat.rotation, vx, vy, wet)
+    sensor = _sensor_of(radar, states)
     clear(cells)
-    screens = find_screens(radar, world, states, seat.origin)
+    screens = find_screens(radar, world, states, sensor.origin)
     add_actors(radar, world, cells, states, sensor, screens, tick)
     add_sites(radar, world, cells, states, sensor, screens, tick)
-    _add_noise(radar, cells, sensor, tick)
-    n = _select(radar, cells, sensor, tick, out)
+    if radar.multipath:
+        add_ghosts(radar, world, cells, states, sensor, screens, tick)
+    aims = _aim_beams(radar, sensor)
+    _add_noise(radar, cells, aims, tick)
+    n = _select(radar, cells, aims, tick, out)
     return _add_false_alarm(radar, tick, n, out)
 
 
-@inner_kernel
-def _clutter(radar: RadarSetup, sensor: Sensor, distance: int, speed: int, beam: int) -> float:
-    """Clutter over noise in a cell: ground where what stands has this Doppler, rain around it."""
-    azimuth = (beam - 0.5 * (radar.grid.beams - 1)) * radar.grid.beam_step
+@kernel
+def join_cells(held: Held[RadarSetup], out: NDArray[np.float32], count: int) -> int:
+    """Replace the rows of cells by the objects that they form; returns how many."""
+    count = join_rows(out, count)
+    add_sections(held.value, out, count)
+    return count
+
+
+@kernel
+def follow_objects(
+    held: Held[RadarSetup],
+    followed: Held[Tracks],
+    states: ActorStates,
+    dt: float,
+    out: NDArray[np.float32],
+    more: NDArray[np.float64],
+    count: int,
+) -> int:
+    """Carry the tracks on to this tick's objects and write the confirmed ones; returns how many."""
+    sensor = _sensor_of(held.value, states)
     r = sensor.rotation
-    c, s = np.cos(azimuth), np.sin(azimuth)
-    dx, dy = r[0, 0] * c + r[0, 1] * s, r[1, 0] * c + r[1, 1] * s
-    off = abs(speed * radar.grid.speed_step + sensor.vx * dx + sensor.vy * dy)
+    own = (
+        r[0, 0] * sensor.vx + r[1, 0] * sensor.vy,
+        r[0, 1] * sensor.vx + r[1, 1] * sensor.vy,
+        states.yaw_rate[0],
+    )
+    update_tracks(followed.value, out, count, own, dt)
+    return write_tracks(followed.value, own, out, more)
+
+
+@inner_kernel
+def _aim_beams(radar: RadarSetup, sensor: Sensor) -> NDArray[np.float64]:
+    """For each beam: the antenna's speed along it in two parts, and what its lobe leaves of clutter."""
+    aims = np.empty((radar.grid.beams, 3))
+    r = sensor.rotation
+    for beam in range(radar.grid.beams):
+        azimuth = (beam - 0.5 * (radar.grid.beams - 1)) * radar.grid.beam_step
+        c, s = np.cos(azimuth), np.sin(azimuth)
+        aims[beam, 0] = sensor.vx * (r[0, 0] * c + r[0, 1] * s)
+        aims[beam, 1] = sensor.vy * (r[1, 0] * c + r[1, 1] * s)
+        aims[beam, 2] = exp(-8.0 * log(2.0) * (azimuth / radar.wide) ** 2 - sensor.wet)
+    return aims
+
+
+@inner_kernel
+def _clutter(
+    radar: RadarSetup, aims: NDArray[np.float64], distance: int, speed: int, beam: int
+) -> float:
+    """Clutter over noise in a cell: ground where what stands has this Doppler, rain around it."""
+    off = abs(speed * radar.grid.speed_step + aims[beam, 0] + aims[beam, 1])
     power = 0.0
     if off <= radar.grid.speed_step:
         power += radar.air.ground[distance]
     if off <= RAIN_SPREAD:
         power += radar.air.rain[distance]
-    return float(power * exp(-8.0 * log(2.0) * (azimuth / radar.wide) ** 2 - sensor.wet))
+    return float(power * aims[beam, 2])
 
 
 @inner_kernel
@@ -134,21 +247,25 @@ def _bins(number: int) -> tuple[int, int, int]:
 
 
 @inner_kernel
-def _add_noise(radar: RadarSetup, cells: Cells, sensor: Sensor, tick: int) -> None:
+def _add_noise(radar: RadarSetup, cells: Cells, aims: NDArray[np.float64], tick: int) -> None:
     """Noise and clutter of the cells that an echo reached."""
     key = radar.key + np.uint64(1)
     for k in range(cells.reached[0]):
         slot = cells.taken[k]
         distance, speed, beam = _bins(cells.number[slot])
         z, w = normal_pair(key, tick, cells.number[slot])
-        rms = sqrt(0.5 * (1.0 + _clutter(radar, sensor, distance, speed, beam)))
+        rms = sqrt(0.5 * (1.0 + _clutter(radar, aims, distance, speed, beam)))
         re, im = cells.re[slot] + rms * z, cells.im[slot] + rms * w
         cells.power[slot] = re * re + im * im
 
 
 @inner_kernel
 def _select(
-    radar: RadarSetup, cells: Cells, sensor: Sensor, tick: int, out: NDArray[np.float32]
+    radar: RadarSetup,
+    cells: Cells,
+    aims: NDArray[np.float64],
+    tick: int,
+    out: NDArray[np.float32],
 ) -> int:
     """Write the peaks that pass the threshold."""
     grid, n = radar.grid, 0
@@ -160,7 +277,7 @@ def _select(
         if n == MOST_FOUND or power < SLACK * grid.threshold or not is_peak(numbers, powers, slot):
             continue
         distance, speed, beam = _bins(number)
-        clutter = _clutter(radar, sensor, distance, speed, beam)
+        clutter = _clutter(radar, aims, distance, speed, beam)
         if power < grid.threshold * noise_mean(
             numbers, powers, grid.ranges, number, clutter, key, tick
         ):
@@ -173,6 +290,7 @@ def _select(
         out[n, 1] = away * grid.beam_step
         out[n, 2] = rise
         out[n, 3] = (speed + centre(numbers, powers, number, RANGES)) * grid.speed_step
+        out[n, 4] = power
         n += 1
     return n
 
@@ -187,4 +305,5 @@ def _add_false_alarm(radar: RadarSetup, tick: int, n: int, out: NDArray[np.float
     out[n, 1] = radar.wide * (uniform(key, tick, 2) - 0.5)
     out[n, 2] = radar.high * (uniform(key, tick, 3) - 0.5)
     out[n, 3] = MAX_SPEED * (2.0 * uniform(key, tick, 4) - 1.0)
+    out[n, 4] = radar.grid.threshold
     return n + 1

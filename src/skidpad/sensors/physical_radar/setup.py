@@ -19,6 +19,7 @@ from skidpad.core.arrays import Floats
 from skidpad.core.specs import RadarSpec
 from skidpad.core.weather import Weather
 from skidpad.physics.grip import rain_rate
+from skidpad.physics.mirrors import LIGHT, concrete_permittivity
 from skidpad.physics.optics import RADAR_GHZ, rain_attenuation_db_km
 from skidpad.physics.radio import rain_scatter, wet_radome_db
 from skidpad.sensors.object_level.boxes import Mount, mount_of
@@ -31,6 +32,7 @@ REFERENCE, DETECTED, FALSE_ALARMS = 10.0, 0.9, 1e-8  # m^2 (TIDUEN5A); the other
 GAMMA = 10.0**-2.5  # of the road, sigma_0 = gamma sin(grazing angle): an assumption
 RAIN_SPREAD = 1.0  # m/s, of the drops' Doppler to each side: an assumption
 DB = log(10.0) / 10.0  # nepers of power in a decibel
+WAVE_NUMBER = 2.0 * pi * RADAR_GHZ * 1e9 / LIGHT  # 1/m
 FASTEST = 71  # entries of the table of radome losses by speed in m/s
 
 
@@ -55,9 +57,13 @@ class RadarSetup(NamedTuple):
     high: float
     false: float  # mean number of false alarms per tick
     air: RadarAir
+    multipath: bool  # mirrors in walls, rails and the road
+    concrete: complex  # permittivity of walls
 
 
-def setup_of(spec: RadarSpec, key: np.uint64, weather: Weather | None) -> RadarSetup:
+def setup_of(
+    spec: RadarSpec, key: np.uint64, weather: Weather | None, multipath: bool = False
+) -> RadarSetup:
     """Returns the constants of a radar in a weather."""
     wide, high = radians(spec.horizontal_fov_deg), radians(spec.vertical_fov_deg)
     beams = max(1, ceil(wide / BEAM_STEP))
@@ -67,8 +73,9 @@ def setup_of(spec: RadarSpec, key: np.uint64, weather: Weather | None) -> RadarS
     cells = ranges * beams * 2.0 * MAX_SPEED / SPEED_STEP
     air = _air(spec, factor, ranges, high, 0.0 if weather is None else rain_rate(weather))
     return RadarSetup(
-        mount_of(spec.mount), key, grid, spec.range, factor, wide, high, cells * FALSE_ALARMS, air
-    )
+        mount_of(spec.mount), key, grid, spec.range, factor, wide, high, cells * FALSE_ALARMS, air,
+        multipath, concrete_permittivity(RADAR_GHZ),
+    )  # fmt: skip
 
 
 def _air(spec: RadarSpec, factor: float, ranges: int, high: float, rain: float) -> RadarAir:

@@ -148,6 +148,8 @@ class EmbeddedBackend:
             contacts=w.contacts,
             invasions=w.invasions,
             extra=extra,
+            radar_objects=seen.radar_objects,
+            radar_tracks=seen.radar_tracks,
         )
 
     def _estimate(self) -> EgoEstimate:

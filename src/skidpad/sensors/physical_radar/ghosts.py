@@ -94,7 +94,7 @@ def add_ghosts(
 
 
 @inner_kernel
-def _mirrored(found: Reflection, x: float, y: float) -> tuple[float, float]:
+def _mirror_vector(found: Reflection, x: float, y: float) -> tuple[float, float]:
     """A horizontal vector as the mirror shows it."""
     along = x * found.nx + y * found.ny
     return x - 2.0 * along * found.nx, y - 2.0 * along * found.ny
@@ -161,14 +161,14 @@ def _add_images(
         ahead, left = (1.0, 0.0, -1.0, 0.0)[side], (0.0, 1.0, 0.0, -1.0)[side]
         half = world.length[i] / 2.0 if side % 2 == 0 else world.width[i] / 2.0
         px, py = half * (c * ahead - s * left), half * (s * ahead + c * left)
-        mx, my = _mirrored(found, px, py)
+        mx, my = _mirror_vector(found, px, py)
         image = (found.way[0] + mx, found.way[1] + my, found.way[2])
         vx, vy = states.vx[i] - states.yaw_rate[i] * py, states.vy[i] + states.yaw_rate[i] * px
-        by_mirror = echo_of(radar, sensor, image, *_mirrored(found, vx, vy))
+        by_mirror = echo_of(radar, sensor, image, *_mirror_vector(found, vx, vy))
         if by_mirror.snr == 0.0:
             continue
         # from the point back to the antenna's image, as the actor has it
-        bx, by = _mirrored(found, -image[0], -image[1])
+        bx, by = _mirror_vector(found, -image[0], -image[1])
         spread = draw_spread(radar, tick, index + 2 * side, targets.spread[i])
         section = spread * _section(world, i, side, c, s, bx, by, -image[2])
         if section > 0.0:

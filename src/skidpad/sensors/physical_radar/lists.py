@@ -37,7 +37,8 @@ def _is_one(rows: Rows, a: int, b: int) -> bool:
     """Whether two rows may be of one object."""
     if abs(rows[a, RANGE] - rows[b, RANGE]) > APART or abs(rows[a, RATE] - rows[b, RATE]) > FASTER:
         return False
-    return abs(rows[a, AZIMUTH] - rows[b, AZIMUTH]) * min(rows[a, RANGE], rows[b, RANGE]) <= ASIDE
+    across = abs(rows[a, AZIMUTH] - rows[b, AZIMUTH]) * min(rows[a, RANGE], rows[b, RANGE])
+    return bool(across <= ASIDE)
 
 
 @inner_kernel

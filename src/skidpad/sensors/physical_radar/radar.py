@@ -133,17 +133,20 @@ class PhysicalRadar:
             )
         rows = self._out[:count]
         points = RadarPoints(*rows[:, :4].T)
-        decibels = 10.0 * np.log10(np.maximum(rows[:, POWER:], 1e-9))
-        objects = RadarObjects(decibels[:, 0], decibels[:, SECTION - POWER])
+        snr, section = (
+            (10.0 * np.log10(np.maximum(rows[:, k], 1e-9))).astype(np.float32)
+            for k in (POWER, SECTION)
+        )
+        objects = RadarObjects(snr, section)
         if self._output is RadarOutput.DETECTIONS:
             return Reading(points, objects)
-        m = self._more[:count]
-        motion = (m[:, k].astype(np.float32) for k in range(1, 5))
-        return Reading(
-            points,
-            objects,
-            RadarTracks(m[:, 0].astype(np.int64), *motion, m[:, 5].astype(np.int64)),
-        )
+        return Reading(points, objects, self._tracks_of(count))
+
+    def _tracks_of(self, count: int) -> RadarTracks:
+        """Returns what the last call wrote about the first `count` tracks."""
+        more = self._more[:count]
+        x, y, vx, vy = more[:, 1:5].T.astype(np.float32)
+        return RadarTracks(more[:, 0].astype(np.int64), x, y, vx, vy, more[:, 5].astype(np.int64))
 
 
 @inner_kernel

@@ -81,18 +81,18 @@ class RadarPoints(NamedTuple):
 class RadarObjects(NamedTuple):
     """What an object list of a radar adds to its n rows of `RadarPoints`."""
 
-    snr: Float32  # dB, power over the noise
-    section: Float32  # dBsm, radar cross section by the radar equation
+    snr: Floats32  # dB, power over the noise
+    section: Floats32  # dBsm, radar cross section by the radar equation
 
 
 class RadarTracks(NamedTuple):
     """What tracks add to n rows: places and velocities in the radar's axes (x forward, y left)."""
 
     number: NDArray[np.int64]  # the same from tick to tick
-    x: Float32  # m
-    y: Float32
-    vx: Float32  # m/s, over ground
-    vy: Float32
+    x: Floats32  # m
+    y: Floats32
+    vx: Floats32  # m/s, over ground
+    vy: Floats32
     age: NDArray[np.int64]  # ticks since it began
 
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.jit import inner_kernel
 from skidpad.physics.mirrors import RAIL_SHARE, WALL_ROUGHNESS, fresnel_across, smooth_share
 from skidpad.roads.roadside import Barrier, BarrierKind, Box, Roadside, Shape
@@ -18,8 +19,6 @@ from skidpad.sensors.object_level.boxes import (
     walls_in_view,
     walls_of,
 )
-
-Floats = NDArray[np.float64]
 
 HOUSES = (Shape.BOX, Shape.BLOCK, Shape.HOUSE)
 LEAST_SIDE = 5.0  # m, sides of boxes that are long enough to mirror: an assumption

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.jit import inner_kernel
 from skidpad.sensors.physical_radar.lists import (
     ALTITUDE,
@@ -26,9 +27,6 @@ from skidpad.sensors.physical_radar.lists import (
     SECTION,
     Rows,
 )
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 MOST_TRACKS = 128
 GATE = 11.34

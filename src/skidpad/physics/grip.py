@@ -229,7 +229,7 @@ def _on_ice(surface: RoadSurface, tyres: Tyres, *, wet: bool) -> float:
 def _on_snow(tyres: Tyres) -> float:
     """Returns the friction on packed snow.
 
-    At 1.6 mm of tread that of a summer tyre, linear between (assumed).
+    With wear it falls to that of a summer tyre, linear: an assumption.
     """
     worn = min(tyres.snow, find_tyres("summer").snow)
     return tyres.snow + (worn - tyres.snow) * tyres.wear

@@ -73,7 +73,7 @@ STIFFNESS, WATER, FEEL = 4, 8, 12
 def vehicle_params(types: Sequence[VehicleType]) -> VehicleParams:
     """Returns the parameters of these vehicles, in their order.
 
-    Cycling, stability, sensed and tips are off.
+    cycling, stability, sensed and tips are off; the fleet sets them.
     """
 
     def column(values: list[float]) -> Floats:

@@ -63,9 +63,9 @@ def all_presets() -> dict[str, Weather]:
 
 
 def preset_name(text: str) -> str | None:
-    """Returns the preset's own spelling of `text`, in which case and `-` or `_` do not matter.
+    """Returns the preset's own spelling of `text`; None where there is no such preset.
 
-    None: unknown.
+    Case does not matter, and `-` and `_` are one.
     """
     wanted = text.strip().lower().replace("_", "-")
     return next((name for name in WEATHERS.names() if name.replace("_", "-") == wanted), None)
@@ -111,7 +111,10 @@ class WeatherManager:
         return self.weathers[self.index]
 
     def apply(self, name: str) -> bool:
-        """Switch to the weather with this name or title; False, and no change, if unknown."""
+        """Switches to the weather with this name or title and returns True.
+
+        False, and no change, if unknown.
+        """
         wanted = name.replace("_", "-")
         for index, weather in enumerate(self.weathers):
             if wanted in (weather.name.replace("_", "-"), weather.title):
@@ -120,6 +123,6 @@ class WeatherManager:
         return False
 
     def cycle(self) -> Weather:
-        """Switch to the next weather, after the last to the first."""
+        """Switches to the next weather, after the last to the first, and returns it."""
         self.index = (self.index + 1) % len(self.weathers)
         return self.current

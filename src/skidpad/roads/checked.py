@@ -18,7 +18,7 @@ MAYBE_NAN = ("limit", "value")
 
 
 def check_arrays(samples: LaneSamples, lanes: LaneTable, signals: SignalTable, where: str) -> None:
-    """Raises FileError, beginning with `where`, unless every index points into its table and numbers are.
+    """Raises FileError, beginning with `where`, where an index points outside its table or a value is off.
 
     Kernels read arrays without looking at bounds, so this is what keeps a file from doing harm. Numbers are
     at most EXTENT; NaN is allowed in MAYBE_NAN only.

@@ -118,7 +118,7 @@ class RoadMap:
         return RoadEdge(self.samples, self.lanes)
 
     def project(self, x: float, y: float, z: float, driving: bool = True) -> LanePoint | None:
-        """Returns the nearest lane centre at about this height; None beyond 20 m or for no numbers.
+        """Returns the nearest lane centre at about this height; None beyond 20 m, and for NaN or inf.
 
         driving: only driving lanes and ramps.
         """

@@ -69,7 +69,7 @@ class Crowd:
         self.riders = _riders(map, cyclists, stream(seed, "crowd", "cyclists"))
 
     def actors(self) -> tuple[ActorSetup, ...]:
-        """Returns the actors as they begin."""
+        """Returns the actors as they begin: pedestrians, then cyclists."""
         walkers = [
             ActorSetup(
                 name=w.name, type="pedestrian", place=Pose(w.x, w.y), driver=Control.SCRIPTED
@@ -83,7 +83,10 @@ class Crowd:
         return (*walkers, *riders)
 
     def commands(self, t: float, truth: WorldTruth) -> list[ActorCommand]:
-        """Where everybody is next; call every PERIOD."""
+        """Moves all on by PERIOD and returns their commands; call it every PERIOD s.
+
+        t: s of the run.
+        """
         for signal, state in truth.lights.items():
             if state is not LightState.RED:
                 self._red_since.pop(signal, None)
@@ -115,7 +118,10 @@ class Crowd:
         return ActorCommand(w.name, place=Pose(w.x, w.y, yaw=atan2(dy, dx)), speed=w.speed)
 
     def _may_cross(self, w: _Walker, here: int, ahead: int, t: float, truth: WorldTruth) -> bool:
-        """Returns whether the cars' light is freshly red, where there is one, and no vehicle comes near."""
+        """Returns whether the cars' light is freshly red, where there is one, and no vehicle comes near.
+
+        here, ahead: points of the walker's way before and behind the crossing.
+        """
         if w.signal is not None:
             since = self._red_since.get(w.signal)
             if since is None or t - since > CROSS_WITHIN:
@@ -151,7 +157,10 @@ class Crowd:
         return pose.moved(left=-RIDE_RIGHT)
 
     def _gap_ahead(self, r: _Rider, truth: WorldTruth) -> float:
-        """m to the nearest actor in the way within 15 m, else a lot."""
+        """Returns the m to the nearest actor in the way within 20 m, less what is kept; 1000 for none.
+
+        Counted so that the cyclist stands at RIDE_STOP.
+        """
         pose, s = self._pose(r), truth.states
         dx, dy = s.x - pose.x, s.y - pose.y
         c, sn = cos(pose.yaw), sin(pose.yaw)
@@ -163,7 +172,10 @@ class Crowd:
         return float(gaps.min()) - 0.9 + RIDE_STOP - 2.0 if len(gaps) else 1e3
 
     def _line_ahead(self, r: _Rider, truth: WorldTruth) -> float:
-        """m to a line at which this rider has to stop, else a lot."""
+        """Returns the m to a line on its lane at which this rider has to stop, plus a margin; 1000 for none.
+
+        Counts its waiting at a stop or yield line.
+        """
         signals, lane = self.map.signals, r.lanes[0]
         for row in np.flatnonzero(signals.lane == lane):
             gap = float(signals.s[row]) - r.s
@@ -181,7 +193,7 @@ class Crowd:
         return 1e3
 
     def _free(self, r: _Rider, truth: WorldTruth) -> bool:
-        """Nobody moves near the junction ahead; after a while, nobody in it."""
+        """Returns whether nothing moves near the junction ahead; after YIELD_TIME, nothing in it."""
         end = self.map.at(r.lanes[0], float(self.map.lanes.length[r.lanes[0]])).pose
         x, y = end.x + 15.0 * cos(end.yaw), end.y + 15.0 * sin(end.yaw)
         s = truth.states
@@ -191,7 +203,10 @@ class Crowd:
 
 
 def _walkers(map: RoadMap, count: int, rng: np.random.Generator) -> list[_Walker]:
-    """Half of them cross at zebras, the others stroll along sidewalks; none without either."""
+    """Returns pedestrians, half of which cross at zebras while others stroll along sidewalks.
+
+    Fewer than `count`, or none, on maps without either.
+    """
     zebras, walks = map.roadside.crosswalks, np.flatnonzero(map.lanes.kind == LaneKind.SIDEWALK)
     found = []
     for i in range(count):
@@ -214,7 +229,10 @@ def _walkers(map: RoadMap, count: int, rng: np.random.Generator) -> list[_Walker
 
 
 def _over(map: RoadMap, zebra: Floats, side: float) -> tuple[Floats, int | None]:
-    """Way over a zebra and on along the street on both sides; the signal of its cars."""
+    """Returns the way (4, 2) over a zebra and on along the street on both sides, and the signal of its cars.
+
+    side: 0 to 1, how far along the street; the signal is None where no light is near.
+    """
     corners = zebra[:4, :2]
     edges = np.roll(corners, -1, axis=0) - corners
     lengths = np.hypot(edges[:, 0], edges[:, 1])
@@ -248,7 +266,7 @@ def _along(map: RoadMap, lane: int, side: float) -> Floats:
 
 
 def _riders(map: RoadMap, count: int, rng: np.random.Generator) -> list[_Rider]:
-    """Returns at most `count` cyclists on lanes with town limits."""
+    """Returns `count` cyclists on lanes with town limits; [] where the map has none."""
     lanes = _streets(map)
     found: list[_Rider] = []
     for i in range(count if len(lanes) else 0):
@@ -263,7 +281,7 @@ def _riders(map: RoadMap, count: int, rng: np.random.Generator) -> list[_Rider]:
 
 
 def _streets(map: RoadMap) -> NDArray[np.intp]:
-    """Lanes outside junctions whose limit is at most 50 km/h and that are long enough."""
+    """Returns the lanes outside junctions with a limit of 50 km/h at most that are long enough."""
     limit = np.nan_to_num(map.samples.limit[map.lanes.first], nan=50.0 / 3.6)
     return np.flatnonzero(
         (map.lanes.kind == LaneKind.DRIVING)
@@ -274,7 +292,10 @@ def _streets(map: RoadMap) -> NDArray[np.intp]:
 
 
 def _onward(map: RoadMap, lane: int, rng: np.random.Generator) -> int:
-    """A following lane, not onto fast roads where there is a choice."""
+    """Returns a lane that follows, drawn, not onto fast roads where there is a choice.
+
+    ValueError at a dead end.
+    """
     ways = [n for n in map.successors(lane) if map.arrays.drivable[n]]
     limits = [float(map.samples.limit[map.lanes.first[n]]) for n in ways]
     slow = [n for n, v in zip(ways, limits, strict=True) if not v > 14.0] or ways

@@ -40,11 +40,14 @@ class Pacer:
         self.restart()
 
     def restart(self) -> None:
-        """The next tick begins now, as after a pause."""
+        """Lets the next tick begin now, as after a pause."""
         self._due = self.clock()
 
     def tick(self, period: float) -> None:
-        """A tick is done: collect, and wait until it has taken `period` s; 0: do not wait."""
+        """Ends a tick: collects garbage, and waits until it has taken `period` s; 0: does not wait.
+
+        A tick that took longer counts as late.
+        """
         self._ticks += 1
         self._due += period
         left = self._due - self.clock() if period > 0.0 else 0.0
@@ -61,7 +64,7 @@ class Pacer:
                 self.restart()
 
     def end(self) -> None:
-        """Garbage collection is as it was before `begin`; safe to call twice."""
+        """Sets garbage collection as it was before `begin`; safe to call twice."""
         if self._running and self.own_gc and self._was_enabled:
             gc.enable()
         self._running = False

@@ -132,7 +132,10 @@ class Supervisor:
         self.last: LanePoint | None = None  # nearest lane, as long as there was one
 
     def observe(self, truth: WorldTruth) -> Supervision:
-        """The phase of the tick that `truth` begins."""
+        """Returns the phase of the tick that `truth` begins, a new one where it is due.
+
+        Call it once per tick.
+        """
         self.truth, self._lane = truth, None
         self.contacts_seen += len(truth.contacts)
         self.over |= 0 in truth.rolled
@@ -149,7 +152,10 @@ class Supervisor:
         return self.phase
 
     def act(self, command: VehicleCommand, report: StackReport | None = None) -> Action:
-        """What is applied in this tick, given the stack's own command and report."""
+        """Returns what is applied in this tick, given the stack's own command and report; after `observe`.
+
+        Counts the tick down; may begin a relocation of an ego that is stuck.
+        """
         assert self.truth is not None, "observe() comes first"
         self.cool_down, self.grace = max(self.cool_down - 1, 0), max(self.grace - 1, 0)
         self.left = max(self.left - 1, 0)
@@ -187,9 +193,12 @@ class Supervisor:
         return self.map.project(x, y, z)
 
     def _reverse(self, states: ActorStates) -> VehicleCommand:
-        """Backwards towards the lane (A-182): by the cross product of the heading and the vector to
-        the lane in m, the lane's lateral distance. The published one is CARLA-handed: in ISO 8855
-        both it and the steer change sign, so the formula keeps its form."""
+        """Returns the command that drives backwards towards the lane, straight without one (A-182).
+
+        By the cross product of the heading and the vector to the lane in m, the lane's lateral distance.
+        The published one is CARLA-handed: in ISO 8855 both it and the steer change sign, so the formula
+        keeps its form.
+        """
         place = self._find_lane(states)
         steer = 0.0
         if place is not None:
@@ -200,7 +209,10 @@ class Supervisor:
         return VehicleCommand(throttle=REVERSE_THROTTLE, steer=steer, reverse=True)
 
     def _realign(self, states: ActorStates) -> Action:
-        """Put the ego on the lane (A-183 to A-186, A-198); without a lane, wait (A-192)."""
+        """Returns the action that puts the ego on the lane; without a lane, one that waits (A-192).
+
+        Begins the warm-up (A-183 to A-186, A-198).
+        """
         assert self.truth is not None
         nearest = self._find_lane(states)
         if self.reason is RelocationReason.ROAD_END:
@@ -231,7 +243,10 @@ class Supervisor:
         return Action(ROLLING, Relocate(pose, self.settings.release_speed))
 
     def _clear_place(self, nearest: LanePoint) -> tuple[LanePoint, float, bool]:
-        """The place, the distance moved back to it, and whether it is clear (A-184, D-080)."""
+        """Returns the place, the m moved back to it, and whether it is clear (A-184, D-080).
+
+        Where none is, the last one looked at.
+        """
         place, shift = nearest, 0.0
         if self.settings.clearance is Clearance.NONE:
             return place, shift, self._is_clear(place)
@@ -253,7 +268,7 @@ class Supervisor:
             yield place, k * SHIFT_BACK
 
     def _is_clear(self, place: LanePoint) -> bool:
-        """No other vehicle in the box ahead of the place, nor where the ego's own box would be."""
+        """Returns whether no other vehicle is in the box ahead of the place, nor where the ego would be."""
         assert self.truth is not None
         states, table = self.truth.states, self.truth.table
         vehicle = states.present & (table.kind <= ActorKind.MOTORCYCLE)
@@ -269,7 +284,10 @@ class Supervisor:
         return not bool((blocking | touching)[1:].any())
 
     def _astray(self, truth: WorldTruth) -> RelocationReason | None:
-        """Why the ego is put back although it touched nothing: wrong way, or off the road."""
+        """Returns why the ego is put back although it touched nothing, None where it is not.
+
+        Wrong way, off the road, or over the end of the map. Notes the lane of the moment.
+        """
         states = truth.states
         place = self._lane = self._find_lane(states)
         if place is not None:
@@ -283,7 +301,10 @@ class Supervisor:
         return RelocationReason.ROAD_END if ended else RelocationReason.OFF_ROAD
 
     def _has_left(self, truth: WorldTruth, place: LanePoint | None) -> bool:
-        """All wheels off every lane for a second, or the car far beyond the edge (R-6)."""
+        """Returns whether all wheels are off every lane for a second, or the car far beyond the edge (R-6).
+
+        Counts the ticks.
+        """
         states, table = truth.states, truth.table
         x, y, z, yaw = states.x[:1], states.y[:1], states.z[:1], states.yaw[:1]
         inside = place is not None and hypot(x[0] - place.x, y[0] - place.y) < 0.5 * place.width
@@ -296,7 +317,7 @@ class Supervisor:
         return self.off * self.dt >= OFF_ROAD_TIME or beyond > OFF_ROAD_LIMIT
 
     def _is_past_the_end(self, states: ActorStates, last: LanePoint) -> bool:
-        """It left over the end of a lane that leads nowhere: there the map ends, not the road."""
+        """Returns whether the ego left over the end of a lane that leads nowhere: there the map ends."""
         lanes, drivable = self.map.lanes, self.map.arrays.drivable
         if last.s < lanes.length[last.lane] - 0.01 or any(
             drivable[lane] for lane in self.map.successors(last.lane)
@@ -307,7 +328,10 @@ class Supervisor:
         return ahead > abs(dy * cos(last.heading) - dx * sin(last.heading))
 
     def _is_stuck(self, truth: WorldTruth, report: StackReport | None) -> bool:
-        """Near standstill for too long without a reason to stand (A-200)."""
+        """Returns whether the ego is near standstill for too long without a reason to stand (A-200).
+
+        Counts the ticks.
+        """
         states = truth.states
         slow = hypot(float(states.vx[0]), float(states.vy[0])) < self.settings.stuck_speed
         if not slow or self.grace > 0 or self._has_reason(truth, report):
@@ -317,7 +341,7 @@ class Supervisor:
         return self.standing * self.dt >= self.settings.stuck_time
 
     def _has_reason(self, truth: WorldTruth, report: StackReport | None) -> bool:
-        """The stack says that it holds, or a vehicle or a red light stands ahead."""
+        """Returns whether the stack says that it holds, or an actor or a red light stands ahead."""
         if report is not None and report.tier in HOLDING:
             return True
         ego = self._lane or self._find_lane(truth.states)
@@ -348,7 +372,10 @@ class Supervisor:
 
 @kernel
 def has_actor_ahead(held: Held[ActorStates], x: float, y: float, z: float, heading: float) -> bool:
-    """Tells whether an actor besides the ego is in the box ahead of a place."""
+    """Returns whether an actor besides the ego is in the box ahead of a place.
+
+    The box is CLEAR_ASIDE m to both sides and CLEAR_AHEAD m long; heading: rad.
+    """
     s = held.value
     c, sn = cos(heading), sin(heading)
     for i in range(1, len(s.x)):

@@ -98,7 +98,7 @@ class ActorDriver:
         )
 
     def command(self, motion: Motion, demand: Demand) -> VehicleCommand:
-        """Pedals and steer for the coming step."""
+        """Returns pedals and steer for the coming step."""
         d = demand
         if d.reverse and motion.speed < V_STANDING:
             return self._backwards(motion, d)
@@ -110,7 +110,7 @@ class ActorDriver:
         )  # fmt: skip
 
     def _backwards(self, motion: Motion, d: Demand) -> VehicleCommand:
-        """Pedals as forwards, seen the other way round; the steering brings the rear axle to the path.
+        """Returns pedals as forwards, seen the other way round; steer leads the rear axle to the path.
 
         Over the way driven the offset obeys e'' = -2 (e + L e') / L^2, as in pure pursuit.
         """
@@ -136,7 +136,7 @@ def drive_forwards(
     error_rate: float,
     a_lateral: float,
 ) -> tuple[float, float, float]:
-    """Throttle, brake and steer for a motion and what is asked, as in `Motion` and `Demand`."""
+    """Returns throttle, brake and steer for a motion and what is asked, as in `Motion` and `Demand`."""
     h = held.value
     speed = vx * cos(yaw) + vy * sin(yaw)
     v, w = max(speed, V_LATERAL_MIN), h.omega
@@ -151,7 +151,10 @@ def drive_forwards(
 
 @kernel
 def press_pedals(held: Held[Hands], v: float, v_told: float, a_told: float) -> tuple[float, float]:
-    """Throttle and brake at speed v, m/s, for a speed and its rate that are asked."""
+    """Returns throttle and brake at speed v, m/s, for a speed and its rate that are asked.
+
+    HOLD_BRAKE where both speeds are below V_STANDING.
+    """
     h = held.value
     if v_told < V_STANDING and v < V_STANDING:
         return 0.0, HOLD_BRAKE
@@ -165,7 +168,10 @@ def press_pedals(held: Held[Hands], v: float, v_told: float, a_told: float) -> t
 
 
 def nearest_type(kind: ActorKind, length: float, width: float, height: float) -> str:
-    """Id of the vehicle type of this kind whose body is nearest in size."""
+    """Returns the id of the vehicle type of this kind whose body is nearest in size, m.
+
+    ConfigError for a kind that no type has.
+    """
     of_kind = {k: t for k, t in vehicle_types().items() if t.actor_kind is kind}
     if not of_kind:
         raise ConfigError(f"there is no vehicle type of kind {kind.name.lower()}")

@@ -49,7 +49,7 @@ class RpcConnection(asyncio.Protocol):
             transport.close()
 
     def data_received(self, data: bytes) -> None:
-        """Answer every request that is complete; close on anything else."""
+        """Answers every request that is complete; closes the connection on what is none."""
         assert self._transport is not None
         waiting, broken = bool(self._queue), False
         try:
@@ -63,7 +63,10 @@ class RpcConnection(asyncio.Protocol):
             self._transport.close()
 
     def _work(self) -> None:
-        """Answer what was asked; a tick and what follows it wait for streams on their way."""
+        """Answers the queued requests; a tick and what follows it wait for streams on their way.
+
+        While they wait, no more is read from the client.
+        """
         transport = self._transport
         assert transport is not None
         while self._queue and not transport.is_closing():
@@ -97,7 +100,7 @@ class RpcConnection(asyncio.Protocol):
             transport.abort()
 
     def pause_writing(self) -> None:
-        """The client reads slowly: take no more requests from it."""
+        """Stops reading from a client that is slow to fetch its answers."""
         if self._transport is not None:
             self._transport.pause_reading()
 
@@ -112,7 +115,7 @@ class RpcConnection(asyncio.Protocol):
         self._server.release(self)
 
     def _rouse(self, port: int) -> None:
-        """Wake the client's Traffic Manager at this port of its machine."""
+        """Wakes the client's Traffic Manager at this port of its machine, in a task."""
         assert self._transport is not None
         peer = self._transport.get_extra_info("peername")
         if peer:
@@ -157,7 +160,7 @@ class CarlaServer:
         return None if settings.synchronous else settings.step
 
     def admit(self, client: RpcConnection) -> bool:
-        """Count a client in; False when there are too many."""
+        """Adds a client to those that are connected; returns False when there are MAX_CLIENTS."""
         if len(self._clients) >= MAX_CLIENTS:
             return False
         self._clients.add(client)
@@ -168,19 +171,22 @@ class CarlaServer:
         self._clients.discard(client)
 
     def answer(self, request: Request) -> bytes:
-        """The answer to a request, which is written down when calls are recorded."""
+        """Returns the answer to a request, which is written down when calls are recorded."""
         if self._calls is not None:
             line = [self.served.clock.frame, request.method, request.arguments]
             self._calls.write(json.dumps(line, default=repr) + "\n")
         return self.dispatcher.answer(request)
 
     def rest_before(self, request: Request) -> float:
-        """s by which the answer to a tick is held back while a Traffic Manager listens."""
+        """Returns the s by which an answer is held back; 0 but for ticks with a Traffic Manager."""
         held = request.method == "tick_cue" and self.served.managers.by_port
         return MANAGER_REST if held else 0.0
 
     async def open(self) -> Ports:
-        """Listen on the port pair; the streaming port is the next one."""
+        """Listens on the port pair and returns it; the streaming port is the next one.
+
+        ConfigError when no such pair is free.
+        """
         host = self.options.host
         loop = asyncio.get_running_loop()
         for rpc_socket, stream_socket in _socket_pair(host, self.options.port):
@@ -194,7 +200,11 @@ class CarlaServer:
         raise ConfigError(f"no free port pair on {host} at {self.options.port}")
 
     async def run(self, ready: Callable[[Ports], Any], helper: Helper | None) -> None:
-        """Serves until cancelled or idle for too long. helper: the process that compiles at a first start."""
+        """Serves until cancelled or idle for too long; then closes.
+
+        ready: called with the ports when clients may come. helper: the process that compiles at a first
+        start.
+        """
         if self.options.record_calls is not None:
             self._calls = self.options.record_calls.open("w", encoding="utf-8")
         warm_up(self.options, helper)
@@ -216,7 +226,7 @@ class CarlaServer:
             self._calls = None
 
     def complaints(self) -> list[str]:
-        """Unknown calls and how often they came, for --strict."""
+        """Returns a sentence for each unknown call and how often it came, for --strict."""
         return [f"unknown call {n} ({k} times)" for n, k in self.dispatcher.unknown.items()]
 
 
@@ -234,7 +244,10 @@ def _bind_socket(host: str, port: int) -> socket.socket:
 
 
 def _socket_pair(host: str, port: int) -> list[tuple[socket.socket, socket.socket]]:
-    """Two bound sockets on neighbouring ports; empty when they cannot be had."""
+    """Returns one pair of bound sockets on neighbouring ports in a list; [] when they cannot be had.
+
+    port 0: any; several are tried.
+    """
     for _ in range(PORT_TRIES if port == 0 else 1):
         try:
             first = _bind_socket(host, port)

@@ -115,7 +115,7 @@ class Rows:
         self.walkers: NDArray[Any] = self._buffer.view(WALKER_ROW)
 
     def add(self, actor: int) -> int:
-        """A new row at the end; its index holds until another row is removed."""
+        """Adds a new row at the end and returns its index, which holds until another row is removed."""
         if self.count == len(self._buffer):
             grown = np.zeros(2 * self.count, dtype=BYTES)
             grown[: self.count] = self._buffer
@@ -130,7 +130,7 @@ class Rows:
         return row
 
     def remove(self, row: int) -> None:
-        """Close the gap: later rows move up by one."""
+        """Removes a row; later rows move up by one."""
         raw = self._buffer.view(np.uint8).reshape(-1, ROW_BYTES)
         raw[row : self.count - 1] = raw[row + 1 : self.count].copy()
         del self._ids[row]
@@ -146,12 +146,15 @@ class Rows:
 
 
 def header(kind: SensorType, frame: int, time: float, pose: tuple[float, ...] | None) -> bytes:
-    """The 48 bytes before every payload; pose: x, y, z, pitch, yaw, roll in CARLA's axes."""
+    """Returns the 48 bytes before every payload; pose: x, y, z, pitch, yaw, roll in CARLA's axes.
+
+    time: s; zeros without a pose.
+    """
     return HEADER.pack(kind, frame, time, *(pose or (0.0,) * 6))
 
 
 def message(clock: Clock, rows: Rows, platform_time: float, bits: int) -> bytes:
-    """Encodes one snapshot, ready to send."""
+    """Returns one snapshot, ready to send; platform_time: s of the wall; bits: MAP_CHANGED and alike."""
     return b"".join(
         (
             header(SensorType.WORLD, clock.frame, clock.elapsed, None),

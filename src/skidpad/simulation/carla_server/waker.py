@@ -74,7 +74,7 @@ class Waker:
             self._timer = None
 
     def _silent(self) -> None:
-        """Wakes every Traffic Manager after a missed wake-up, and waits again while tries are left."""
+        """Wakes this client's Traffic Managers after a missed wake-up; waits again while tries are left."""
         log.warning("a Traffic Manager has missed its wake-up; it is woken")
         for port in sorted(self.ports):
             self.wake(port)
@@ -93,7 +93,7 @@ def _port(method: str, arguments: list[Any]) -> int | None:
 
 
 async def rouse(host: str, port: int) -> None:
-    """Notify the Traffic Manager that listens there; one that is gone is none to be woken."""
+    """Notifies the Traffic Manager that listens there; does nothing where none answers."""
     with suppress(OSError, asyncio.TimeoutError, EOFError):
         reader, writer = await asyncio.wait_for(asyncio.open_connection(host, port), ANSWER_S)
         try:

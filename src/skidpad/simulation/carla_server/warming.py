@@ -45,7 +45,7 @@ class EverybodyListens(StreamHub):
 
 
 def start_compiling(options: ServerOptions, say: Say) -> Helper | None:
-    """Compiles what the first tick needs, then sensors in a child; None when all is kept. say: what is done.
+    """Returns a helper that compiles beside this process, after saying so; None when all is kept.
 
     To be called before anything is made of a map, for that compiles too.
     """
@@ -56,7 +56,7 @@ def start_compiling(options: ServerOptions, say: Say) -> Helper | None:
 
 
 def warm_up(options: ServerOptions, helper: Helper | None) -> None:
-    """Make ticks ready and, unless a helper makes them so, sensors."""
+    """Makes ticks ready and, unless a helper makes them so, sensors; returns when they are."""
     if helper is None:
         a_tick(options, sensors=True)
     else:
@@ -67,7 +67,10 @@ def warm_up(options: ServerOptions, helper: Helper | None) -> None:
 def a_tick(
     options: ServerOptions, sensors: bool, before_step: Callable[[], object] = lambda: None
 ) -> None:
-    """A tick of a world that is thrown away, with a car and, if asked, every sensor on it."""
+    """Runs a tick of a world that is thrown away, with a car and, if asked, every sensor on it.
+
+    before_step: called before the parts of a step are needed.
+    """
     served = Served(options, EverybodyListens())
     episode = served.episode
     name = next(id for id, b in served.stock.catalogue.items() if b.family is Family.VEHICLE)
@@ -98,19 +101,19 @@ class Helper:
         there.close()
 
     def hear(self) -> None:
-        """Wait until the parts of a step are on the disk."""
+        """Waits until the parts of a step are on the disk, LIMIT s at most."""
         with suppress(EOFError, OSError):
             if self._pipe.poll(LIMIT):
                 self._pipe.recv()
 
     def tell(self) -> None:
-        """The rest of a tick is on the disk."""
+        """Tells the child that the rest of a tick is on the disk, and says so."""
         with suppress(OSError):
             self._pipe.send(None)
         self._say("ticks are compiled; sensors are being compiled beside the first of them")
 
     def finish(self) -> None:
-        """Waits until the sensors are compiled."""
+        """Waits until the sensors are compiled, LIMIT s at most."""
         self._process.join(LIMIT)
 
 

@@ -46,14 +46,17 @@ class Sky:
         return [*(self.values[name] for name in PACKED), self.dust_storm]
 
     def apply(self, value: Any) -> None:
-        """Set from a call; values beyond their range act as the nearest one inside."""
+        """Sets the weather from a call; values beyond their range act as the nearest one inside.
+
+        WireError for another shape.
+        """
         numbers = wire.numbers(value, "weather", len(PACKED) + 1)
         self.values = dict(zip(PACKED, numbers[:-1], strict=True))
         self.dust_storm = numbers[-1]
         self._derive()
 
     def set_ice(self, thickness: float | None) -> None:
-        """Ice in percent of 20 mm, None: as the server was started."""
+        """Sets ice in percent of 20 mm; None: as the server was started."""
         self.client_ice = thickness
         self._derive()
 

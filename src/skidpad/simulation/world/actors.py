@@ -76,7 +76,10 @@ class Role:
     reserve: bool = False  # and not before it is called
 
     def newcomer(self, i: int, paint_seed: int | None = None) -> Newcomer:
-        """How it enters as the i-th; paint_seed: its paint is drawn, else it is that of its place."""
+        """Returns the actor as it enters as the i-th.
+
+        paint_seed: its paint is drawn, else it is that of its place; its own colour comes before both.
+        """
         a = self.actor
         body = SHAPES[a.type] if a.type in SHAPES else vehicle_type(a.type)
         if a.tyres and isinstance(body, VehicleType):
@@ -86,12 +89,15 @@ class Role:
 
 
 def draw_paint(seed: int, name: str) -> tuple[int, int, int]:
-    """Returns the paint of the actor of this name, as often as cars have it."""
+    """Returns the paint of the actor of this name, drawn as often as cars have it."""
     return PALETTE[int(stream(seed, "paint", name).choice(len(PALETTE), p=PAINT_SHARES))]
 
 
 def place_of(map: RoadMap, place: Pose | LanePosition) -> Pose:
-    """A pose on the map; lane positions look along the lane."""
+    """Returns a pose on the map; a lane position becomes one along its lane, at its lateral offset.
+
+    ConfigError for a lane position that the map has not.
+    """
     if isinstance(place, Pose):
         return place
     point = map.place(place)
@@ -99,7 +105,10 @@ def place_of(map: RoadMap, place: Pose | LanePosition) -> Pose:
 
 
 def cast_of(map: RoadMap, setup: Setup, seed: int) -> list[Role]:
-    """Ego, scripted and background actors, checked: vehicles first, the ego before all."""
+    """Returns ego, scripted and background actors, checked: vehicles first, the ego before all.
+
+    ConfigError for unknown types, equal names, an ego that is no vehicle, or traffic without room.
+    """
     roles = [Role(setup.ego), *(Role(actor) for actor in setup.actors)]
     roles += _traffic(map, setup, seed)
     known = vehicle_types()
@@ -142,7 +151,10 @@ def _traffic(map: RoadMap, setup: Setup, seed: int) -> list[Role]:
 
 
 def _reserve(traffic: TrafficSetup, types: Sequence[str], first: int, seed: int) -> list[Role]:
-    """Who waits to be called; they want to go as fast as random traffic does."""
+    """Returns the roles of vehicles that wait to be called; they go as fast as the traffic does.
+
+    first: number of vehicles that are there before them.
+    """
     total = traffic.vehicles + traffic.reserve
     factors = np.ones(total) if traffic.variety else random_factors(total, seed)
     pack = traffic.mode is TrafficStart.PACK

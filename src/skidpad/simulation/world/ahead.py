@@ -18,7 +18,7 @@ from skidpad.simulation.world.rows import Rows, bodies_of
 
 
 def vehicles_of_nobody() -> tuple[Any, ...]:
-    """What a step of no vehicles is called with."""
+    """Returns what `step_vehicles` is called with for no vehicles."""
     rows = Rows.of([], 0)
     fleet = Fleet([], DT, states=rows.states)
     active = np.zeros(0, dtype=np.bool_)
@@ -29,7 +29,7 @@ def vehicles_of_nobody() -> tuple[Any, ...]:
 
 
 def contacts_of_nobody() -> tuple[Any, ...]:
-    """What contacts between nobody and nothing are called with."""
+    """Returns what `resolve_contacts` is called with for no bodies and no obstacles."""
     nothing = static_segments(np.zeros((0, 4)), np.zeros(0), np.zeros(0))
     return Rows.of([], 0).states, bodies_of([]), nothing, CONTACT_LAW, DT, Contacts.room()
 

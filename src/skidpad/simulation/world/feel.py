@@ -14,7 +14,7 @@ Felt = tuple[
 
 @kernel
 def feel_motion(arena: Held[Arena], i: int) -> Felt:
-    """Of vehicle i: x, y, z, roll, pitch, yaw; speed, yaw rate, ax, ay; rim speeds FL, FR, RL, RR.
+    """Returns x, y, z, roll, pitch, yaw; speed, yaw rate, ax, ay; rim speeds FL, FR, RL, RR of vehicle i.
 
     As `Fleet.speed` and `Fleet.wheel_speeds` have them.
     """

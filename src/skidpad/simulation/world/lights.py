@@ -57,18 +57,18 @@ class Group:
         return (light for phase in self.phases for light in phase)
 
     def reset(self) -> None:
-        """The first phase has green, all timers start anew."""
+        """Gives the first phase green; all timers start anew."""
         self.begin(0, LightState.GREEN, 0.0)
 
     def begin(self, turn: int, state: LightState, elapsed: float) -> None:
-        """Phase `turn` is in `state` since `elapsed` s, all others are red."""
+        """Sets phase `turn` as in `state` since `elapsed` s, all others as red."""
         self.turn = turn
         for i, phase in enumerate(self.phases):
             for light in phase:
                 light.show(state if i == turn else LightState.RED, elapsed)
 
     def advance(self, dt: float) -> bool:
-        """Time passes; True when a lamp changed."""
+        """Lets dt s pass and returns whether a lamp changed; frozen, only the timers go on."""
         for phase in self.phases:
             for light in phase:
                 light.elapsed += dt
@@ -111,7 +111,7 @@ class Lights:
 
     @classmethod
     def build_pretimed(cls, map: RoadMap, seed: int, dt: float) -> Lights:
-        """Groups with the published cycle whose position is part of the seed (decision M-2)."""
+        """Returns a map's lights with the published cycle, whose position the seed draws (decision M-2)."""
         lights = cls(map)
         for group in lights.groups.values():
             n = len(group.phases)
@@ -128,7 +128,7 @@ class Lights:
         return lights
 
     def advance(self, dt: float) -> bool:
-        """Time passes; True when a lamp changed."""
+        """Lets dt s pass and returns whether a lamp changed; frozen, only the timers go on."""
         if self.frozen:
             for light in self.lights:
                 light.elapsed += dt
@@ -141,7 +141,7 @@ class Lights:
         return changed
 
     def set_state(self, light: Light, state: LightState) -> None:
-        """Sets one lamp; its group's clock goes on from there."""
+        """Sets one lamp; its group's clock goes on from there. Other lamps stay."""
         light.show(state)
         group = self.groups[light.group]
         for i, phase in enumerate(group.phases):
@@ -150,9 +150,9 @@ class Lights:
         self._show()
 
     def hold(self, held: Iterable[tuple[int, LightState]]) -> None:
-        """Lights, by signal id, show what they are told and nothing else.
+        """Sets lights, by signal id, to states that they keep; unknown ids are ignored.
 
-        The cycle of their junctions ends: the other lights there are red until they are told, too.
+        The cycle of their junctions ends: the other lights there are red until they are held, too.
         """
         by_signal = {light.signal: light for light in self.lights}
         for signal, state in held:
@@ -168,7 +168,7 @@ class Lights:
         self._show()
 
     def phase_of(self, light: Light) -> list[Light]:
-        """The lights that change together with this one; they share their times."""
+        """Returns the lights that change together with this one, itself included; they share their times."""
         return next(phase for phase in self.groups[light.group].phases if light in phase)
 
     def is_frozen(self, light: Light) -> bool:
@@ -176,7 +176,7 @@ class Lights:
         return self.frozen or self.groups[light.group].frozen
 
     def reset(self, group: Group | None = None) -> None:
-        """A group from the beginning; None: all."""
+        """Starts a group from the beginning; None: all."""
         for each in self.groups.values() if group is None else (group,):
             each.reset()
         self._show()
@@ -189,7 +189,7 @@ class Lights:
 
 
 def _set_clock(group: Group, turn: int, elapsed: float) -> None:
-    """`elapsed` s after phase `turn` got green."""
+    """Sets a group's lights as `elapsed` s after phase `turn` got green."""
     elapsed += ROUNDING
     if elapsed < GREEN_S:
         group.begin(turn, LightState.GREEN, elapsed - ROUNDING)
@@ -200,7 +200,10 @@ def _set_clock(group: Group, turn: int, elapsed: float) -> None:
 
 
 def _groups(map: RoadMap, rows: NDArray[np.intp], arms: bool) -> dict[int, Group]:
-    """Lights by junction, in phases; a light without a junction is with those of its controller."""
+    """Returns lights by junction, in phases; a light without a junction is with those of its controller.
+
+    A light without either is a group of its own, of id -1 - signal.
+    """
     signals = map.signals
     by_id: dict[int, list[int]] = {}
     for row in rows.tolist():
@@ -217,9 +220,12 @@ def _groups(map: RoadMap, rows: NDArray[np.intp], arms: bool) -> dict[int, Group
 
 
 def _phase(junction: int, controller: int, heading: float, arms: bool) -> tuple[int, int, int]:
-    """What lights of one junction share whose green comes together: the controller that the file
-    names, if asked for only on one arm; without one the arm, as left-turners of facing arms would
-    block each other. Away from junctions nobody crosses: one phase per axis."""
+    """Returns a key that lights of one junction share whose green comes together.
+
+    It is the controller that the file names, if asked for only on one arm; without one the arm, as
+    left-turners of facing arms would block each other. Away from junctions nothing crosses: one
+    phase per axis.
+    """
     named = junction >= 0 and controller >= 0 and controller != junction
     turn = pi if junction < 0 else 2.0 * pi
     arm = round((heading % turn) / SECTOR) % round(turn / SECTOR)
@@ -227,7 +233,7 @@ def _phase(junction: int, controller: int, heading: float, arms: bool) -> tuple[
 
 
 def _junction(map: RoadMap, row: int) -> int:
-    """The junction in which a signal's lane lies, or into which it leads; -1: none."""
+    """Returns the junction in which a signal's lane lies, or into which it leads; -1: none."""
     lanes, lane = map.lanes, int(map.signals.lane[row])
     following = map.successors(lane)[:1]
     return next((j for j in lanes.junction[[lane, *following]].tolist() if j >= 0), -1)

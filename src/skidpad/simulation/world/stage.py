@@ -18,7 +18,10 @@ from skidpad.simulation.world.world import EGO, Conditions, World
 
 
 def build_world(setup: Setup, seed: int) -> World:
-    """A world at the beginning of a run."""
+    """Returns the world of a set-up at the beginning of a run: actors placed, traffic engaged.
+
+    ConfigError or FileError for a set-up that cannot be.
+    """
     map = dress_map(load_map(setup.map), setup.scenery)
     roles = cast_of(map, setup, seed)
     road = road_of(setup)
@@ -63,7 +66,10 @@ def build_world(setup: Setup, seed: int) -> World:
 
 
 def lane_frictions(setup: Setup) -> LaneFrictions:
-    """Return what the map's materials make of the friction that the set-up gives every lane."""
+    """Returns what the map's materials make of the friction that the set-up gives every lane.
+
+    {} where the set-up does not ask; ConfigError where the map says none.
+    """
     if setup.material_base is None:
         return {}
     from skidpad.roads.opendrive.materials import read_materials  # lxml comes with it

@@ -38,7 +38,7 @@ class ContactBook:
         self.last: dict[tuple[int, int | str], int] = {}
 
     def arrange(self, rows: Mapping[int, int]) -> None:
-        """The actors have other rows; rows: the new one by the old one of those who stay."""
+        """Carries what is noted over to other rows; rows: the new one by the old one of actors that stay."""
         self.last = {
             (rows[i], j if isinstance(j, str) else rows[j]): tick
             for (i, j), tick in self.last.items()
@@ -46,7 +46,10 @@ class ContactBook:
         }
 
     def update(self, tick: int, contacts: Contacts, count: int) -> Touches:
-        """Contacts that began in this tick; for the ego's the largest impulse speaks."""
+        """Returns the contacts that began in this tick; for the ego's the largest impulse speaks.
+
+        count: rows of `contacts` that are valid. Touching again within HOLD s begins no contact.
+        """
         events: dict[tuple[int, int | str], ContactEvent] = {}
         others: list[TrafficContact] = []
         touched: set[tuple[int, int | str]] = set()
@@ -92,13 +95,16 @@ def markings_of(map: RoadMap) -> Markings:
 
 
 def forget(markings: Markings) -> None:
-    """The ego was put somewhere else: what it stands across there is no invasion."""
+    """Forgets what the ego stands across, as it was put elsewhere: that is no invasion there."""
     markings.standing[0] = -1
 
 
 @inner_kernel
 def cross_markings(m: Markings, lanes: LaneArrays, placed: Places) -> int:
-    """Markings that the ego's outline began to cross (A-030): LEFT and RIGHT as bits."""
+    """Returns the markings that the ego's outline began to cross (A-030): LEFT and RIGHT as bits.
+
+    Keeps in `m.standing` what it now stands across.
+    """
     if len(placed) == 0:
         return 0
     ego, standing = placed[EGO], m.standing

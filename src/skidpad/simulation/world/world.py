@@ -100,30 +100,30 @@ class World:
     # --- who is there
 
     def enter(self, newcomers: Sequence[Newcomer]) -> list[int]:
-        """Let actors enter, not yet present; their ids."""
+        """Lets actors enter, not yet present, and returns their ids; rows of others may move."""
         ids = range(self._next_id, self._next_id + len(newcomers))
         self._next_id += len(newcomers)
         self._arrange([*self.members, *map(Member, ids, newcomers)])
         return list(ids)
 
     def add(self, newcomer: Newcomer, pose: Pose, v: float = 0.0) -> int:
-        """One more actor at `pose` with speed v along it; its id."""
+        """Lets one more actor enter at `pose` with speed v along it, present, and returns its id."""
         (id,) = self.enter([newcomer])
         self.put(self.row(id), pose, v)
         self.settle()
         return id
 
     def remove(self, id: int) -> None:
-        """Take an actor out; all others go on as they were."""
+        """Takes an actor out; all others go on as they were, in other rows."""
         gone = self.row(id)
         self._arrange([m for i, m in enumerate(self.members) if i != gone])
 
     def row(self, id: int) -> int:
-        """Where an actor's values stand at present."""
+        """Returns the row of an actor's values at present; KeyError for an unknown id."""
         return self._rows_by_id[id]
 
     def reshape(self, id: int, body: VehicleType) -> None:
-        """A vehicle's physics changes: mass, brakes, wheels; it goes on moving."""
+        """Replaces a vehicle's physics, mass, brakes and wheels; it goes on moving."""
         i = self.row(id)
         old = self.members[i].actor
         new = Newcomer(body, old.name, old.type, old.rgb)
@@ -153,7 +153,7 @@ class World:
         self.bodies = bodies_of(members)
 
     def _arrange(self, members: Sequence[Member]) -> None:
-        """New rows for these actors; who was there goes on from its old row."""
+        """Makes new rows for these actors; those that were there go on from their old rows."""
         old, fleet, tyres, was = self.rows, self.fleet, self.tyres, self._rows_by_id
         self._begin(sorted(members, key=lambda m: not m.is_wheeled))
         kept = [(i, was[m.id]) for i, m in enumerate(self.members) if m.id in was]
@@ -175,7 +175,7 @@ class World:
         self._outfit()
 
     def _outfit(self) -> None:
-        """The arrays of a step for the present actors."""
+        """Makes the arrays of a step for the present actors."""
         n, w, traffic = len(self.members), self.wheeled, self.traffic
         self.moved = np.zeros(n, dtype=np.bool_)
         self.patched = np.ones((w, 4))
@@ -217,7 +217,7 @@ class World:
         self.arena = hold(arena)
 
     def let_drive(self, traffic: Traffic) -> None:
-        """Lets actors have drivers from now on."""
+        """Gives the actors drivers of this traffic from now on."""
         self.traffic = traffic
         if self.members:  # else the first ones to enter come to it
             self._arrange(self.members)
@@ -244,7 +244,7 @@ class World:
             self.patches.lay(road)
 
     def blow(self, speed: float, towards: float) -> None:
-        """From now on the mean wind is this, in m/s and rad, where wind pushes vehicles."""
+        """Sets the mean wind, in m/s and rad, from now on; nothing changes where wind pushes no vehicles."""
         if self.gusts is not None:
             self.gusts.wind = replace(self.gusts.wind, speed=speed, towards=towards)
 
@@ -261,11 +261,11 @@ class World:
         self._outfit()
 
     def command(self, id: int, c: VehicleCommand) -> None:
-        """Pedals and steer of a vehicle from now on."""
+        """Sets pedals and steer of a vehicle from now on."""
         self._drive(self.row(id), c)
 
     def put(self, i: int, pose: Pose, v: float) -> None:
-        """The actor of row i stands at `pose` and moves along it with speed v."""
+        """Puts the actor of row i at `pose`, present, moving along it with speed v."""
         s = self.states
         if i < self.wheeled:
             self.fleet.place(i, pose, v)
@@ -279,14 +279,14 @@ class World:
             forget(self.markings)
 
     def teleport(self, id: int, pose: Pose) -> None:
-        """Put an actor elsewhere; its velocity is kept."""
+        """Puts an actor elsewhere; its velocity is kept. Call `settle` afterwards."""
         s, i = self.states, self.row(id)
         s.x[i], s.y[i], s.z[i] = pose.x, pose.y, pose.z
         s.yaw[i], s.pitch[i], s.roll[i] = wrap_angle(pose.yaw), pose.pitch, pose.roll
         self.placed["lane"][i] = -1
 
     def set_velocity(self, id: int, vx: float, vy: float) -> None:
-        """m/s in world axes; wheels roll with it."""
+        """Sets an actor's velocity, m/s in world axes; wheels roll with it."""
         s, i = self.states, self.row(id)
         s.vx[i], s.vy[i] = vx, vy
         if i < self.wheeled:
@@ -294,7 +294,7 @@ class World:
             self.fleet.wheels.omega[i] = along / self.fleet.params.wheel_radius[i]
 
     def walk(self, id: int, vx: float, vy: float) -> None:
-        """A body without wheels moves with this velocity from now on, looking where it goes."""
+        """Lets a body without wheels move with this velocity from now on, looking where it goes."""
         self.set_velocity(id, vx, vy)
         if vx or vy:
             self.states.yaw[self.row(id)] = atan2(vy, vx)
@@ -302,7 +302,7 @@ class World:
     def push(
         self, id: int, impulse: tuple[float, float], point: tuple[float, float] | None = None
     ) -> None:
-        """N s on a vehicle at a point of the world, None: its centre of gravity."""
+        """Applies N s to a vehicle at a point of the world, None: its centre of gravity."""
         s, i = self.states, self.row(id)
         if point is None:
             x_cog = self.fleet.params.x_cog[i]
@@ -310,12 +310,12 @@ class World:
         self.fleet.apply_impulse(i, impulse, point)
 
     def twist(self, id: int, moment: float) -> None:
-        """An angular impulse on a vehicle about the vertical in N m s."""
+        """Applies an angular impulse about the vertical in N m s to a vehicle."""
         i = self.row(id)
         self.states.yaw_rate[i] += moment / self.fleet.params.yaw_inertia[i]
 
     def hold_velocity(self, id: int, velocity: tuple[float, float] | None) -> None:
-        """Forward and left speed of a vehicle, kept against all forces; None: physics again."""
+        """Holds forward and left speed of a vehicle against all forces; None: physics again."""
         self.rows.held[self.row(id)] = np.nan if velocity is None else velocity
 
     def set_simulated(self, id: int, on: bool) -> None:
@@ -324,7 +324,7 @@ class World:
         self._weigh()
 
     def _weigh(self) -> None:
-        """What is not simulated cannot be pushed."""
+        """Sets the inverse masses of the bodies; what is not simulated cannot be pushed."""
         for column, original in zip(self.bodies, bodies_of(self.members), strict=True):
             column[:] = original
         self.bodies.inverse_mass[~self.rows.simulated] = 0.0
@@ -339,19 +339,23 @@ class World:
         self.rows.grounded[self.row(id)] = on
 
     def set_tyres(self, id: int, friction: Sequence[float]) -> None:
-        """tire_friction of a vehicle at FL, FR, RL, RR outside friction zones."""
+        """Sets tire_friction of a vehicle at FL, FR, RL, RR outside friction zones."""
         i = self.row(id)
         self.tyres[i] = self.fleet.tire_friction[i] = friction
 
     def set_step(self, dt: float) -> None:
-        """s by which one step advances from now on."""
+        """Sets the s by which one step advances from now on."""
         self.dt = dt
         self.fleet.set_step(dt)
 
     # --- time
 
     def step(self, words: Sequence[ActorCommand] = ()) -> None:
-        """Advance by dt. words: what a scenario tells actors for this step."""
+        """Advances the world by dt.
+
+        words: what a scenario tells actors for this step; ConfigError for an unknown actor or a speed that
+        is not finite.
+        """
         self.tick += 1
         stages = MOVE | SETTLE
         if self.traffic is not None:
@@ -396,7 +400,7 @@ class World:
             )
 
     def _feel_road(self) -> None:
-        """Patches under the wheels, and zones in which tyres are others."""
+        """Writes what patches under the wheels do, and the tyres' friction in zones."""
         if self.patches is not None:
             w = self.on_wheels
             self.patches.fill(self.states, w.patched, w.patch_stiffness, w.patch_film)
@@ -407,18 +411,18 @@ class World:
         self._zoned = bool(self.zones)
 
     def feel_grip(self) -> None:
-        """The road's friction where everybody stands, before the first step."""
+        """Writes the road's friction where all actors stand into `mu`, before the first step."""
         self._feel_road()
         feel_grip(self.rows, self.on_wheels)
         self.mu[: self.wheeled] = self.on_wheels.road_mu
 
     def settle(self) -> None:
-        """Find the road under every actor, after some were moved between steps."""
+        """Finds the road under every actor, after some were moved between steps; that is no lane invasion."""
         self._advance(SETTLE)
         self.invasions = ()
 
     def relocate(self, pose: Pose, v: float) -> None:
-        """Put the ego somewhere else between two steps."""
+        """Puts the ego somewhere else between two steps, v in m/s along `pose`."""
         self.put(EGO, pose, v)
         self.settle()
 
@@ -429,7 +433,7 @@ class World:
         return self.commands[:, 1] > BRAKING
 
     def signs(self) -> RoadSigns:
-        """Speed limit and governing traffic light of every actor."""
+        """Returns speed limit and governing traffic light of every actor."""
         return read_signs(self.map, self.placed)
 
     def _drive(self, i: int, c: VehicleCommand) -> None:
@@ -437,7 +441,11 @@ class World:
         self.commands[i] = (c.throttle, c.brake, c.steer, c.handbrake, c.reverse)
 
     def _obey(self, word: ActorCommand) -> None:
-        """Carries out the command of an actor; raises ConfigError for an actor that the run lacks."""
+        """Carries out the command of an actor: presence, pedals, then place.
+
+        One that is kept back only begins to wait for room. ConfigError for an actor that the run lacks or a
+        speed that is not finite.
+        """
         i = self.index.get(word.actor)
         if i is None:
             raise ConfigError(f"there is no actor {word.actor!r} in this run")
@@ -470,7 +478,7 @@ class World:
             self.traffic.release(i)
 
     def _put_vehicles(self, traffic: Traffic) -> None:
-        """Traffic that enters, is respawned, or is put back as a wreck (decision M-7)."""
+        """Puts traffic that enters, is respawned, or is put back as a wreck (decision M-7), and notes it."""
         notes, back, onward = [], [], []
         for move in traffic.moves(self.states, self.placed, self.tick):
             self.put(move.actor, move.pose, move.v)

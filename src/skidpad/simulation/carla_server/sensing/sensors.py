@@ -57,9 +57,9 @@ class SensorSet:
         return any(_is_heard(sensor, hub) for sensor in self._sensors.values())
 
     def produce(self, around: Surroundings, clock: Clock, hub: StreamHub) -> None:
-        """Reads and publishes every sensor that is due and listened to.
+        """Reads and publishes every sensor that is due and listened to, one tick.
 
-        Before that radios send, in each tick.
+        Before that all radios send.
         """
         time = clock.elapsed
         for sensor in self._sensors.values():

@@ -53,7 +53,10 @@ class AckermannTarget:
 
 
 def parse_target(value: Any) -> AckermannTarget:
-    """Reads a target from a call; newer clients send a time stamp, which is not used."""
+    """Returns the target of a call in ISO axes; newer clients send a time stamp, which is not used.
+
+    WireError for another shape.
+    """
     v = wire.items(value, "ackermann control")[:5]
     steer, steer_speed, speed, acceleration, jerk = wire.numbers(v, "ackermann control", 5)
     return AckermannTarget(wire.iso_steer(steer), abs(steer_speed), speed, abs(acceleration), jerk)
@@ -70,7 +73,10 @@ class AckermannDriver:
         self._angle = 0.0
 
     def drive(self, control: Control, fleet: Fleet, slot: int, dt: float) -> None:
-        """Write throttle, brake and steer for the coming tick."""
+        """Writes throttle, brake, reverse and steer for the coming tick of dt s into `control`.
+
+        slot: row of the vehicle in the fleet.
+        """
         v = fleet.speed(slot)
         target = self.target
         backwards = target.speed < 0.0
@@ -94,7 +100,7 @@ class AckermannDriver:
 
 
 def _towards(value: float, target: float, step: float) -> float:
-    """`value` moved to `target` by at most `step`; step 0 is no limit."""
+    """Returns `value` moved to `target` by at most `step`; a step of 0 is no limit."""
     if step <= 0.0:
         return target
     return value + min(max(target - value, -step), step)

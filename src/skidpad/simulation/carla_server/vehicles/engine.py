@@ -72,7 +72,7 @@ class Engine:
 
 
 def parse_engine(value: Sequence[Any]) -> Engine:
-    """Reads an engine from the members of a call; WireError names what is not possible."""
+    """Returns an engine from the first members of a call; WireError names what is not possible."""
     name = "physics control"
     curve = [wire.numbers(p, f"{name}.torque_curve", 2) for p in wire.items(value[0], "curve")]
     gears = [wire.numbers(g, f"{name}.forward_gears", 3) for g in wire.items(value[10], "gears")]
@@ -98,7 +98,7 @@ def parse_engine(value: Sequence[Any]) -> Engine:
 
 
 def engine_of(model: VehicleType) -> Engine:
-    """An engine and gears that come to the force and power of this type."""
+    """Returns an engine and gears that come to the force and power of this type."""
     low, high = RANGE_HEAVY if model.actor_kind in HEAVY else RANGE
     knots = [0.0, *np.linspace(low, high, 9).tolist()]
     curve = [(rpm, model.power / (max(rpm, low) * RPM)) for rpm in knots]
@@ -114,7 +114,7 @@ def engine_of(model: VehicleType) -> Engine:
 
 
 def _fastest(model: VehicleType) -> float:
-    """m/s at which all power goes into air and rolling drag on the level."""
+    """Returns the m/s at which all power goes into air and rolling drag on the level."""
     air, rolling = 0.5 * AIR_DENSITY * model.drag_area, model.rolling_resistance * model.mass * G
     roots = np.roots([air, 0.0, rolling, -model.power])
     return float(roots[np.isreal(roots)].real.max())
@@ -129,7 +129,7 @@ class Traction(NamedTuple):
 
 
 def at_wheels(engine: Engine, radius: float) -> Traction:
-    """Returns the traction at wheels of this radius in m; without a ratio or revolutions there is none."""
+    """Returns the traction at wheels of this radius in m; all 0 without a ratio or revolutions."""
     ratios = [g[0] * engine.final_ratio for g in engine.gears if g[0] > 0.0]
     if not ratios or not engine.is_told or engine.max_rpm * engine.final_ratio <= 0.0:
         return Traction(0.0, 0.0, 0.0)
@@ -143,14 +143,14 @@ def at_wheels(engine: Engine, radius: float) -> Traction:
 
 
 def _curve_until(curve: Curve, max_rpm: float) -> list[tuple[float, float]]:
-    """The curve's knots up to these revolutions, and its end there."""
+    """Returns the curve's knots below these revolutions, and its end there."""
     rpm, torque = np.array(curve).T
     end = float(np.interp(max_rpm, rpm, torque))
     return [*((r, t) for r, t in curve if r < max_rpm), (max_rpm, end)]
 
 
 def _power(curve: Curve, max_rpm: float) -> float:
-    """Greatest power in W: at a knot, or where torque times revolutions of a falling line is greatest."""
+    """Returns the greatest power in W up to max_rpm: at a knot, or inside a falling line."""
     knots = _curve_until(curve, max_rpm)
     best = max(rpm * torque for rpm, torque in knots)
     for (r, t), (r_next, t_next) in pairwise([(0.0, knots[0][1]), *knots]):
@@ -163,7 +163,10 @@ def _power(curve: Curve, max_rpm: float) -> float:
 
 
 def shift_speeds(engine: Engine, radius: float) -> tuple[float, ...]:
-    """m/s up to which an automatic box stays in each gear but the highest; wheels of this radius in m."""
+    """Returns the m/s up to which an automatic box stays in each gear but the highest; inf: it stays.
+
+    radius: of the wheels in m.
+    """
     speeds, highest = [], 0.0
     for ratio, _, up in engine.gears[:-1]:
         turns = ratio * engine.final_ratio
@@ -174,12 +177,15 @@ def shift_speeds(engine: Engine, radius: float) -> tuple[float, ...]:
 
 
 def gear_at(shifts: tuple[float, ...], speed: float) -> int:
-    """The lowest gear that does not shift up yet at this speed in m/s."""
+    """Returns the lowest gear, from 1, that does not shift up yet at this speed in m/s."""
     return 1 + bisect_left(shifts, abs(speed))
 
 
 def revolutions(engine: Engine, gear: int, speed: float, radius: float) -> float:
-    """rpm at this speed in m/s with wheels of this radius in m; 0 out of gear, at most the limit."""
+    """Returns the rpm at this speed in m/s with wheels of this radius in m.
+
+    0 out of gear, at most the limit.
+    """
     if gear == 0 or not engine.gears:
         return 0.0
     ratio = engine.gears[min(abs(gear), len(engine.gears)) - 1][0] * engine.final_ratio

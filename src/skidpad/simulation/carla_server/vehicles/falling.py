@@ -26,7 +26,7 @@ FALLS = (Family.VEHICLE, Family.WALKER)
 
 
 def ground_below(roads: RoadMap, x: float, y: float, z: float) -> float | None:
-    """Height of the ground under a point, m; None when there is no lane within 200 m below.
+    """Returns the height in m of the ground under a point; None without a lane within DEEPEST m below.
 
     The highest lane that carries the point; where none does, the nearest lane's height.
     """
@@ -52,17 +52,20 @@ class Falling:
         self._weightless: set[int] = set()
 
     def _floats(self, actor: Actor) -> bool:
-        """Returns whether the actor has no weight or moves upwards."""
+        """Returns whether the actor has no weight or is in the air."""
         return actor.id in self._weightless or actor.id in self._actors.rising
 
     def _above(self, actor: Actor) -> float | None:
-        """m over the ground; None when there is none."""
+        """Returns the m of an actor's feet over the ground; None when there is none."""
         s, i = self._moving.states, self._moving.row(actor.body or 0)
         ground = ground_below(self._roads, float(s.x[i]), float(s.y[i]), float(s.z[i]))
         return None if ground is None else float(s.z[i]) - ground
 
     def start_fall(self, actor: Actor) -> None:
-        """Begins a fall when the actor was placed above the ground; on the ground it stands."""
+        """Begins a fall when the actor was placed more than DROP m above the ground; else it stands.
+
+        Does nothing for others than vehicles and walkers, and without gravity.
+        """
         if actor.family not in FALLS or actor.body is None or actor.id in self._weightless:
             return
         self._actors.rising.pop(actor.id, None)
@@ -79,7 +82,7 @@ class Falling:
             self.start_fall(actor)
 
     def push(self, actor: Actor, change: float) -> None:
-        """Change its speed upwards by so many m/s."""
+        """Changes an actor's speed upwards by so many m/s; from the ground only beyond LIFT_OFF."""
         if actor.family not in FALLS or actor.body is None or not self._is_simulated(actor):
             return
         speed = self._actors.rising.get(actor.id, 0.0) + change
@@ -88,7 +91,7 @@ class Falling:
             self._hold(actor)
 
     def weigh(self, actor: Actor, on: bool) -> None:
-        """Switch gravity on or off; without it a body keeps its height, and its tyres grip nothing."""
+        """Switches gravity on or off; without it a body keeps its height, and its tyres grip nothing."""
         if actor.family not in FALLS or actor.body is None:
             return
         if on:
@@ -105,7 +108,7 @@ class Falling:
         self._actors.rising.pop(id, None)
 
     def tick(self, dt: float) -> None:
-        """Move all that are in the air by dt s, after everything else has moved."""
+        """Moves all that are in the air by dt s, after everything else has moved, and lands them."""
         self._leave_bridges()
         for id, speed in list(self._actors.rising.items()):
             actor = self._actors.alive[id]
@@ -120,7 +123,7 @@ class Falling:
                 self._hold(actor)
 
     def _leave_bridges(self) -> None:
-        """Vehicles beside their lane with another lane below them."""
+        """Begins the fall of vehicles that are beside their lane with another lane below them."""
         s, offset = self._moving.states, self._moving.placed["offset"][: self._moving.wheeled]
         for i in np.flatnonzero(np.abs(offset) > CENTRED).tolist():
             actor = self._actors.in_row(i)

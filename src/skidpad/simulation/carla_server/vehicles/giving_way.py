@@ -35,7 +35,7 @@ class Line:
     watched: dict[int, Span]  # by lane
 
     def is_taken(self, lane: int, rear: float, front: float) -> bool:
-        """Whether a vehicle there is to be waited for."""
+        """Returns whether a vehicle with its body from `rear` to `front` m on a lane is to be waited for."""
         begins, ends = self.watched.get(lane, (inf, -inf))
         return front > begins and rear < ends
 
@@ -50,7 +50,10 @@ class GivingWay:
         self._since: dict[int, float] = {}  # s by actor
 
     def shown_red(self, vehicles: Vehicles, dt: float) -> NDArray[np.bool_]:
-        """(n,) whom a sign shows red, dt s after the last time."""
+        """Returns (n,) whether a sign shows each vehicle red, dt s after the last time.
+
+        To be called once a tick: it counts how long each has waited.
+        """
         n = len(vehicles)
         placed, red = vehicles.moving.placed[:n], np.zeros(n, dtype=np.bool_)
         along = np.cos(placed["yaw"] - placed["heading"]) > ALONG
@@ -86,8 +89,11 @@ def _lines(roads: RoadMap) -> Iterator[tuple[int, Line]]:
 
 
 def _watched_lanes(roads: RoadMap, lane: int) -> dict[int, Span]:
-    """Lanes of the junction that cross or join the ways on from a lane, the ends of those before and
-    the beginnings of those behind; what comes from the same road is not watched."""
+    """Returns the stretches to be watched, by lane, from a stop or yield line at the end of a lane.
+
+    Lanes of the junction that cross or join the ways on from it, the ends of those before and
+    the beginnings of those behind; what comes from the same road is not watched.
+    """
     entry, conflict, _, _ = priority_of(roads)
     lanes = roads.lanes
     crossing: set[int] = set()

@@ -46,7 +46,7 @@ class PhysicsControl:
 
     @classmethod
     def of(cls, model: VehicleType) -> PhysicsControl:
-        """What a fresh vehicle of this type reports."""
+        """Returns what a fresh vehicle of this type reports."""
         wheels = tuple(
             (
                 model.tire_friction,
@@ -87,7 +87,10 @@ class PhysicsControl:
 
 
 def parse_physics(value: Any) -> PhysicsControl:
-    """Reads physics from a call; two wheels of a two-wheeler count for both sides."""
+    """Returns the physics of a call.
+
+    Two wheels of a two-wheeler count for both sides. WireError for others.
+    """
     v = wire.items(value, "physics control", MEMBERS)
     wheels = [wire.items(w, "wheel", 10) for w in wire.items(v[15], "wheels")]
     if len(wheels) == 2:
@@ -116,12 +119,15 @@ def parse_physics(value: Any) -> PhysicsControl:
 
 
 def with_engine(new: PhysicsControl, old: PhysicsControl) -> PhysicsControl:
-    """The new one, with the old one's engine where it tells none."""
+    """Returns the new physics, with the old one's engine where it tells none."""
     return new if new.engine.is_told else replace(new, engine=old.engine)
 
 
 def apply_control(model: VehicleType, old: PhysicsControl, new: PhysicsControl) -> VehicleType:
-    """Returns the physics type after a client changed members that act; unchanged ones stay exact."""
+    """Returns the physics type after a client changed members that act; unchanged ones stay exact.
+
+    The same object where none changed. WireError for a wheel that is too small or does not steer.
+    """
     front, rear = new.wheels[0], new.wheels[2]
     if front[3] < RADIUS_LEAST or front[2] <= 0.0:
         raise wire.WireError("wheel: radius must be >= 10 cm and max_steer_angle > 0")

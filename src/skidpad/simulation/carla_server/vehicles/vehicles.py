@@ -63,19 +63,23 @@ class Vehicle:
     speed_limit: float = 30.0 / 3.6  # m/s; CARLA's default until the first sign
 
     def command(self, slow: bool, dt: float) -> tuple[float, float, float, bool, bool]:
-        """Throttle, brake, steer, handbrake, reverse of the coming tick of dt s."""
+        """Returns throttle, brake, steer, handbrake, reverse of the coming tick of dt s.
+
+        Call it once per tick.
+        slow: below STICKY_SPEED, where it is held without throttle unless it was pushed.
+        """
         c = self.control
         throttle = 0.0 if c.manual and c.gear == 0 else c.throttle
         brake = 1.0 if throttle == 0.0 and self._sticks(slow, dt) else c.brake
         return throttle, brake, c.steer, c.hand_brake, c.reverse or (c.manual and c.gear < 0)
 
     def gear(self, speed: float) -> int:
-        """Gear that is in at this speed in m/s, -1 in reverse."""
+        """Returns the gear that is in at this speed in m/s, -1 in reverse."""
         c = self.control
         return c.gear if c.manual else -1 if c.reverse else gear_at(self.shifts, speed)
 
     def _sticks(self, slow: bool, dt: float) -> bool:
-        """Whether it stands, so that a slope does not set it rolling."""
+        """Returns whether it is held, so that no slope sets it rolling; a push frees it for some dt s."""
         if self.pushed > 0.0:
             self.pushed -= dt
             return False
@@ -83,7 +87,7 @@ class Vehicle:
 
 
 def model_of(blueprint: Blueprint) -> VehicleType:
-    """The physics type of a blueprint: its class's type, scaled to the blueprint's size."""
+    """Returns the physics type of a blueprint: its class's type, scaled to the blueprint's size."""
     base = vehicle_type(MODELS[blueprint.kind])
     length, width, height = blueprint.size
     scale = length / base.length
@@ -128,7 +132,7 @@ class Vehicles:
         return actor in self._by_actor
 
     def of(self, actor: int) -> Vehicle:
-        """Returns the vehicle that is this actor."""
+        """Returns the vehicle that is this actor; KeyError where there is none."""
         return self._by_actor[actor]
 
     def row(self, actor: int) -> int:
@@ -136,7 +140,7 @@ class Vehicles:
         return self.moving.row(self._by_actor[actor].body)
 
     def add(self, actor: int, blueprint: Blueprint, pose: Pose) -> Vehicle:
-        """Adds a vehicle at rest at the pose and returns it."""
+        """Adds a vehicle at rest at the pose, with a body in the moving world, and returns it."""
         model = model_of(blueprint)
         body = self.moving.add(Newcomer(model, type=blueprint.id), pose)
         vehicle = Vehicle(actor, body, model, PhysicsControl.of(model))
@@ -145,11 +149,11 @@ class Vehicles:
         return vehicle
 
     def remove(self, actor: int) -> None:
-        """Forget a vehicle; its body leaves with the actor's."""
+        """Forgets a vehicle; its body leaves with the actor's."""
         del self._by_actor[actor]
 
     def reshape(self, actor: int, physics: PhysicsControl, model: VehicleType) -> None:
-        """Other physics for a vehicle that keeps its motion."""
+        """Replaces physics, type and tyres of a vehicle, which keeps its motion."""
         vehicle = self._by_actor[actor]
         vehicle.physics = physics
         if model is not vehicle.type:
@@ -159,26 +163,26 @@ class Vehicles:
         self.moving.set_tyres(vehicle.body, physics.tire_friction.tolist())
 
     def set_velocity(self, actor: int, velocity: Vector) -> None:
-        """Set the velocity in world axes and let the wheels roll with it."""
+        """Sets the velocity in world axes, m/s, and lets the wheels roll with it."""
         vehicle = self._by_actor[actor]
         self.moving.set_velocity(vehicle.body, velocity[0], velocity[1])
         vehicle.pushed = STICKY_TIME if any(velocity) else 0.0
 
     def push(self, actor: int, impulse: Vector, point: Vector | None = None) -> None:
-        """An impulse in N s at a point of the world, the centre of gravity when None."""
+        """Applies an impulse in N s at a point of the world, the centre of gravity when None."""
         vehicle = self._by_actor[actor]
         at = None if point is None else (point[0], point[1])
         self.moving.push(vehicle.body, (impulse[0], impulse[1]), at)
         vehicle.pushed = STICKY_TIME
 
     def twist(self, actor: int, moment: float) -> None:
-        """An angular impulse about the vertical in N m s."""
+        """Applies an angular impulse about the vertical in N m s."""
         vehicle = self._by_actor[actor]
         self.moving.twist(vehicle.body, moment)
         vehicle.pushed = STICKY_TIME
 
     def command(self, dt: float) -> None:
-        """Hand the commands of the coming tick of dt s to the moving world."""
+        """Writes the commands of the coming tick of dt s into the moving world; call it once per tick."""
         if not self._by_actor:
             return
         fleet = self.moving.fleet
@@ -191,13 +195,13 @@ class Vehicles:
         self.moving.commands[: len(commands)] = commands
 
     def let_go(self) -> None:
-        """A tick is over: controls that are not sticky have acted."""
+        """Ends controls that are not sticky, after the tick in which they have acted."""
         for vehicle in self:
             if not vehicle.sticky:
                 vehicle.control = Control()
 
     def heed(self, limits: list[float]) -> None:
-        """Take note of the speed limits, m/s by row, where the road gives one."""
+        """Notes the speed limits, m/s by row, where the road gives one (not NaN)."""
         for vehicle, limit in zip(self, limits, strict=False):
             if limit == limit:
                 vehicle.speed_limit = limit

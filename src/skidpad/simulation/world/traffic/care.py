@@ -69,13 +69,13 @@ class Care(NamedTuple):
 
 
 def careless() -> Care:
-    """Drivers take every road for dry and every day for clear."""
+    """Returns the care of drivers that take every road for dry and every day for clear."""
     grip = grip_params(Weather(), GripModel.NONE)
     return Care(False, grip, inf, A_CHANGE_CARELESS, DRAWN_CARELESS)
 
 
 def care_of(setup: Setup, slow_in_weather: bool) -> Care:
-    """What the drivers of a set-up know."""
+    """Returns what the drivers of a set-up know of its weather; nothing unless they slow in it."""
     if not slow_in_weather:
         return careless()
     grip = road_of(setup).params()
@@ -84,7 +84,7 @@ def care_of(setup: Setup, slow_in_weather: bool) -> Care:
 
 @kernel
 def grip_at(care: Care, v: float) -> float:
-    """Friction times gravity at speed v in m/s^2."""
+    """Returns friction times gravity in m/s^2 at speed v in m/s."""
     return G * mu_at(care.grip, v)
 
 
@@ -92,7 +92,10 @@ def grip_at(care: Care, v: float) -> float:
 def character(
     care: Care, v: float, headway: float, a_max: float, is_exact: bool = False
 ) -> Character:
-    """How a driver with these habits follows at speed v; is_exact: the headway is that of the whole gap."""
+    """Returns how a driver with these habits follows at speed v in m/s.
+
+    headway: s on a dry road; a_max: m/s^2; is_exact: the headway is that of the whole gap.
+    """
     if not care.on:
         return Character(headway, a_max, B_COMFORT, A_EMERGENCY, False)
     g = grip_at(care, v)
@@ -109,19 +112,19 @@ def character(
 
 @kernel
 def braking(care: Care, v: float) -> float:
-    """Comfortable braking at speed v in m/s^2."""
+    """Returns comfortable braking in m/s^2 at speed v in m/s."""
     return min(B_COMFORT, COMFORT_SHARE * grip_at(care, v)) if care.on else B_COMFORT
 
 
 @inner_kernel
 def firm_braking(care: Care, v: float, dry: float) -> float:
-    """Braking in m/s^2 that is counted upon; `dry`: on a dry road."""
+    """Returns the braking in m/s^2 that is counted upon at v in m/s; `dry`: on a dry road."""
     return min(dry, FIRM_SHARE * grip_at(care, v)) if care.on else dry
 
 
 @kernel
 def speed_choice(care: Care, v: float) -> float:
-    """Desired speed over that on a dry road.
+    """Returns the desired speed over that on a dry road, at the grip of v in m/s.
 
     Source: SUMO's friction device, documentation "Simulation/Friction".
     """
@@ -133,7 +136,7 @@ def speed_choice(care: Care, v: float) -> float:
 
 @kernel
 def sight_speed(care: Care, v: float) -> float:
-    """Speed in m/s from which one stops within sight, at the friction of the present speed v."""
+    """Returns the m/s from which one stops within sight, at the friction of v in m/s; inf without care."""
     if not care.on:
         return np.inf
     b = FIRM_SHARE * grip_at(care, v)
@@ -143,9 +146,10 @@ def sight_speed(care: Care, v: float) -> float:
 
 @kernel
 def bend_speed_sq(care: Care, curvature: float, a_curve: float) -> float:
-    """Square of the speed in (m/s)^2 for a bend: v^2 |curvature| <= CURVE_SHARE mu_ref left(v) g.
+    """Returns the square of the speed in (m/s)^2 for a bend: v^2 |curvature| <= CURVE_SHARE mu_ref left(v) g.
 
-    a_curve in m/s^2 bounds it on a dry road. Grip falls with speed: by halving, from below.
+    curvature: 1/m, not 0. a_curve in m/s^2 bounds it on a dry road. Grip falls with speed: by halving,
+    from below.
     """
     bend = abs(curvature)
     free = a_curve / bend
@@ -167,15 +171,16 @@ def bend_speed_sq(care: Care, curvature: float, a_curve: float) -> float:
 
 @kernel
 def steering_limit(care: Care, v: float) -> float:
-    """Lateral acceleration in m/s^2 that is steered for at most."""
+    """Returns the lateral acceleration in m/s^2 that is steered for at most, at v in m/s."""
     return min(A_STEER, STEER_SHARE * grip_at(care, v)) if care.on else A_STEER
 
 
 @kernel
 def traction_limit(care: Care, v: float, carried: float, slide: float) -> float:
-    """Drive force over mass in m/s^2 that is asked for at most of wheels that carry this share.
+    """Returns the drive force over mass in m/s^2 that is asked for at most; inf without care.
 
-    slide: sideways over forward motion at the rear axle; who feels the tail step out lifts.
+    carried: share of the weight on the driven wheels; slide: sideways over forward motion at the rear
+    axle, beyond SLIDE drivers lift.
     """
     if not care.on:
         return np.inf
@@ -185,13 +190,13 @@ def traction_limit(care: Care, v: float, carried: float, slide: float) -> float:
 
 @inner_kernel
 def drive_limit(care: Care, v: float, a_max: float) -> float:
-    """Acceleration in m/s^2 that is asked for at most."""
+    """Returns the acceleration in m/s^2 that is asked for at most, at v in m/s."""
     return min(a_max, DRIVE_SHARE * grip_at(care, v)) if care.on else a_max
 
 
 @inner_kernel
 def change_pace(care: Care, v: float) -> float:
-    """How fast a change of lane goes, 1 in the dry; its lateral peak falls with the square."""
+    """Returns how fast a change of lane goes, 1 in the dry; its lateral peak falls with the square."""
     pace = min(1.0, max(v, 0.0) / V_CHANGE)
     if not care.on:
         return pace
@@ -200,7 +205,10 @@ def change_pace(care: Care, v: float) -> float:
 
 @kernel
 def reach(care: Care, v: float, least: float) -> float:
-    """m within which one looks for what one may have to stop for: `least`, or what stopping takes."""
+    """Returns the m within which one looks for what one may have to stop for.
+
+    `least`, or what stopping from v m/s takes where that is more.
+    """
     if not care.on:
         return least
     return max(least, v * v / (2.0 * FIRM_SHARE * grip_at(care, v)) + STOP_MARGIN)
@@ -208,7 +216,7 @@ def reach(care: Care, v: float, least: float) -> float:
 
 @kernel
 def speed_to_stop_within(care: Care, way: float, most: float) -> float:
-    """Speed in m/s, at most `most`, from which `way` m are enough to stop."""
+    """Returns the m/s, at most `most`, from which `way` m are enough to stop."""
     if not care.on:
         return most
     return min(most, sqrt(2.0 * FIRM_SHARE * grip_at(care, most) * way))

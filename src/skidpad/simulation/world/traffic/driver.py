@@ -67,7 +67,10 @@ WRONG_WAY = -0.5  # cosine of 120 deg
 
 @inner_kernel
 def follow_path(view: View, d: Drivers, i: int) -> None:
-    """Update where driver i is along its path; enter the next lane when it is reached."""
+    """Updates where driver i is along its path, entering the next lane when it is reached.
+
+    Writes its state; passing a speed sign ends its cap.
+    """
     net, path, me, body = view.streets.net, d.path[i], d.state[i], view.placed[i]
     start = me.at + 1
     at, t = along(net, path[0], me.at, body.x, body.y)
@@ -89,7 +92,7 @@ def follow_path(view: View, d: Drivers, i: int) -> None:
 
 @inner_kernel
 def turn_to(view: View, d: Drivers, i: int, lane: int, s: float) -> None:
-    """Follow `lane` from about s on, sliding over from the present lateral offset."""
+    """Sets driver i's path to `lane` from about s on, sliding over from the present lateral offset."""
     me, target = d.state[i], view.streets.net.lane[lane]
     cap = me.cap
     begin(d.path[i], lane)
@@ -103,7 +106,7 @@ def turn_to(view: View, d: Drivers, i: int, lane: int, s: float) -> None:
 
 @inner_kernel
 def character_of(view: View, d: Drivers, i: int, v: float) -> Character:
-    """How driver i follows at speed v on the road where it is."""
+    """Returns how driver i follows at speed v in m/s on the road where it is."""
     trait = d.trait[i]
     fast = view.streets.net.point[d.state[i].at].limit >= FAST_LIMIT
     headway = trait.headway if fast else trait.headway_town
@@ -114,7 +117,10 @@ def character_of(view: View, d: Drivers, i: int, v: float) -> Character:
 def acceleration_along(
     view: View, d: Drivers, i: int, path: Ints32, s: float, v_desired: float
 ) -> tuple[float, float, int]:
-    """IDM acceleration of i on `path` at `s`, the gap to its leader there, and that one."""
+    """Returns the IDM acceleration in m/s^2 of i on `path` at `s`, the gap in m to its leader, and its row.
+
+    inf and -1 where there is no leader within REACH_AHEAD.
+    """
     leader, gap = occ_.find_ahead(view.streets.net, view.occ, view.placed, path, s, i, REACH_AHEAD)
     v_lead = view.placed[leader].v if leader != NOBODY else 0.0
     v = view.placed[i].speed
@@ -123,7 +129,10 @@ def acceleration_along(
 
 @inner_kernel
 def follower_acceleration(view: View, d: Drivers, j: int, gap: float, v_lead: float) -> float:
-    """What follower j would do behind a vehicle at `gap`; it is taken to want its own speed."""
+    """Returns the m/s^2 of follower j behind a vehicle at `gap` m; 0 where j is -1.
+
+    It is taken to want its own speed.
+    """
     if j == NOBODY:
         return 0.0
     v = max(view.placed[j].v, 0.0)
@@ -132,7 +141,10 @@ def follower_acceleration(view: View, d: Drivers, j: int, gap: float, v_lead: fl
 
 @inner_kernel
 def change_gain(view: View, d: Drivers, i: int, lane: int, a_now: float, v_desired: float) -> float:
-    """MOBIL's advantage of moving to `lane` in m/s^2; -inf when it is not safe."""
+    """Returns MOBIL's advantage of moving to `lane` in m/s^2; -inf when it is not safe.
+
+    a_now: m/s^2 in the present lane; overwrites `d.aside`.
+    """
     me, v = d.state[i], view.placed[i].speed
     s = occ_.beside(view.streets.net, d.path[i, 0], me.s, lane)
     straight_path(view.streets.net, lane, d.aside)
@@ -154,7 +166,10 @@ def change_gain(view: View, d: Drivers, i: int, lane: int, a_now: float, v_desir
 
 @inner_kernel
 def may_enter(view: View, d: Drivers, i: int, lane: int, left: bool) -> bool:
-    """There is such a driving lane, it goes on, and the marking may be crossed: broken or none."""
+    """Returns whether there is such a driving lane, it goes on, and the marking may be crossed.
+
+    lane: index, -1 for none; broken markings and none may be crossed.
+    """
     if lane < 0 or view.streets.net.lane[lane].kind != 0 or view.streets.net.lane[lane].ahead < 0:
         return False  # LaneKind.DRIVING only: ramps are entered at forks
     here = view.streets.net.point[d.state[i].at]
@@ -165,8 +180,10 @@ def may_enter(view: View, d: Drivers, i: int, lane: int, left: bool) -> bool:
 def consider_change(
     view: View, d: Drivers, i: int, a_now: float, v_desired: float, gap_stop: float
 ) -> None:
-    """Begin a lane change when MOBIL, a draw or the lane's end says so; not on the way to a line
-    where one has to stop."""
+    """Begins a lane change when MOBIL, a draw or the lane's end says so.
+
+    Not on the way to a line where one has to stop, gap_stop m ahead (inf: none). a_now: m/s^2.
+    """
     me = d.state[i]
     if me.change < CHANGE_TIME + CHANGE_COOLDOWN or view.placed[i].speed < CHANGE_MIN_SPEED:
         return
@@ -202,10 +219,10 @@ def note_cause(
     stops: tuple[float, float, float, float],
     yielding: tuple[int, int],
 ) -> None:
-    """Note what of leader, merging traffic and places to stop is nearest and close, and whose it is.
+    """Notes in `me` what of leader, merging traffic and places to stop is nearest and close, and whose it is.
 
     leader, merging: gap in m and row. stops: gaps to light, road's end, right of way and zebra.
-    yielding: for what (`state.Held`) and whom the driver waits at the third of them.
+    yielding: for what (`state.Held`) and which row the driver waits at the third of them.
     """
     nearest, me.held, me.blocker = CAUSE_GAP, 0, NOBODY
     if leader[0] <= nearest:
@@ -221,7 +238,7 @@ def note_cause(
 
 @inner_kernel
 def plan(view: View, d: Drivers, i: int) -> None:
-    """Choose lane and acceleration of driver i; note how long it has been out of order."""
+    """Chooses lane and acceleration (`target`) of driver i; notes how long it has stood or been stuck."""
     me, trait, body = d.state[i], d.trait[i], view.placed[i]
     if (view.tick + i) % LOOK_PERIOD == 0 or me.v_desired == 0.0:
         me.v_desired = desired_speed(view.streets.net, me, trait, d.path[i], body.speed, view.care)
@@ -266,7 +283,7 @@ def plan(view: View, d: Drivers, i: int) -> None:
 
 @inner_kernel
 def keep_lane_if_pushed(view: View, d: Drivers, i: int) -> None:
-    """A vehicle that finds itself on another lane without having changed stays on that one."""
+    """Lets a vehicle that finds itself on another lane without having changed stay on that one."""
     me, body = d.state[i], view.placed[i]
     if me.change <= CHANGE_TIME or body.lane < 0 or body.lane == d.path[i, 0]:
         return
@@ -277,7 +294,7 @@ def keep_lane_if_pushed(view: View, d: Drivers, i: int) -> None:
 
 @inner_kernel
 def drive_all(view: View, d: Drivers, commands: Floats) -> None:
-    """One tick of all active drivers; writes throttle, brake, steer, ... into commands (n, 5)."""
+    """Moves all active drivers on by one tick; writes throttle, brake, steer, ... into commands (n, 5)."""
     occ_.fill(view.streets.net, view.placed, view.occ)
     for i in range(len(d.state)):
         if d.state[i].active and view.placed[i].present:

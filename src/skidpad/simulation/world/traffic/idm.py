@@ -36,7 +36,7 @@ class Character(NamedTuple):
 
 @kernel
 def improved(z: float, free: float, c: Character) -> float:
-    """Acceleration in m/s^2 of the improved model; z: wanted over real gap, free: without a leader.
+    """Returns the m/s^2 of the improved model; z: wanted over real gap, free: m/s^2 without a leader.
 
     Source: Treiber and Kesting (2013), eqs. 11.24 to 11.26.
     """
@@ -50,7 +50,10 @@ def improved(z: float, free: float, c: Character) -> float:
 
 @kernel
 def idm(v: float, v_desired: float, gap: float, v_lead: float, c: Character) -> float:
-    """Acceleration in m/s^2 in [c.a_min, c.a_max]; gap inf: no leader."""
+    """Returns the acceleration in m/s^2 behind a leader at `gap` m; gap inf: no leader.
+
+    At most c.a_max; with a leader at least c.a_min.
+    """
     if v <= v_desired:
         free = c.a_max * (1.0 - (v / max(v_desired, 0.1)) ** 4)
     else:

@@ -57,13 +57,13 @@ Claimed = Callable[[], Places]  # of `claims`, made at the first call
 
 @lru_cache(maxsize=8)
 def network_of(map: RoadMap) -> Network:
-    """The drivers' view of a map, made once per process."""
+    """Returns the drivers' view of a map, made once per process."""
     return network(map.samples, map.lanes, map.signals)
 
 
 @lru_cache(maxsize=8)
 def candidates_of(map: RoadMap) -> NDArray[np.intp]:
-    """Where vehicles can be put on a map, found once per process."""
+    """Returns the samples of a map at which vehicles can be put, found once per process."""
     return find_candidates(map, network_of(map))
 
 
@@ -71,19 +71,19 @@ def candidates_of(map: RoadMap) -> NDArray[np.intp]:
 def priority_of(
     map: RoadMap,
 ) -> tuple[NDArray[np.void], NDArray[np.void], NDArray[np.void], NDArray[np.float64]]:
-    """Right of way on a map, baked once per process."""
+    """Returns the right of way on a map as of `bake_priority`, baked once per process."""
     return bake_priority(map.samples, map.lanes, map.signals, map.roadside)
 
 
 def streets_of(map: RoadMap) -> Streets:
-    """What drivers know of a map; nobody walks."""
+    """Returns what drivers know of a map, without pedestrians."""
     entry, conflict, zebra, zebras = priority_of(map)
     nobody, free = np.empty(0, dtype=np.int64), np.zeros(len(zebras), dtype=np.bool_)
     return Streets(network_of(map), entry, conflict, zebra, zebras, nobody, free)
 
 
 def no_streets() -> Streets:
-    """Returns the streets of a world without drivers."""
+    """Returns the streets of a world without drivers: no lanes, conflicts or zebras."""
     lanes = np.empty(0, dtype=np.int32)
     net = Network(np.empty(0, POINT), np.empty(0, LANE), np.empty(0, STOP), lanes, lanes)
     rows = np.empty(0, ENTRY), np.empty(0, CONFLICT), np.empty(0, ZEBRA)
@@ -133,7 +133,10 @@ class Traffic:
         self.kept_back: set[int] = set()  # ids of those who do so once they are called
 
     def arrange(self, members: Sequence[Member], source: Mapping[int, int]) -> None:
-        """The actors have other rows; source: old row by new row of those who were there."""
+        """Carries the drivers over to other rows; source: old row by new row of those that were there.
+
+        New ones get traits of their vehicle, varied where the set-up says so, and are inactive.
+        """
         old, ids = self.drivers, [m.id for m in members]
         self.drivers = drivers(len(ids))
         self.drivers.state["key"] = [stream_key(self.seed, "traffic", "driver", id) for id in ids]
@@ -152,11 +155,14 @@ class Traffic:
 
     @property
     def free_choice(self) -> bool:
-        """Branches are drawn instead of taking the straightest."""
+        """Whether drivers draw branches instead of taking the straightest."""
         return self.setup.mode is TrafficStart.RANDOM
 
     def engage(self, i: int, lane: int, s: float, factor: float = 1.0) -> None:
-        """Actor i drives itself from here on, along `lane`."""
+        """Lets actor i drive itself from here on, along `lane` from s m on.
+
+        factor: multiplies its desired speed over the limit.
+        """
         me, row = self.drivers.state[i], self.net.lane[lane]
         begin(self.drivers.path[i], lane)
         me["active"] = True
@@ -167,17 +173,17 @@ class Traffic:
         me["cap"] = np.inf if limit is None else mps_from_kmh(limit)
 
     def await_room(self, id: int, factor: float) -> None:
-        """An actor enters as soon as there is a free place near the ego (A-209)."""
+        """Lets an actor enter as soon as there is a free place near the ego (A-209)."""
         self.drivers.trait["factor"][self.row[id]] *= factor
         self.waiting.append(id)
 
     def keep_back(self, id: int, factor: float) -> None:
-        """An actor waits for `call` before it waits for room."""
+        """Lets an actor wait for `call` before it waits for room."""
         self.drivers.trait["factor"][self.row[id]] *= factor
         self.kept_back.add(id)
 
     def call(self, id: int) -> bool:
-        """Whether this one was kept back: it enters as soon as there is a free place."""
+        """Returns whether an actor was kept back; if so, it enters as soon as there is a free place."""
         if id not in self.kept_back:
             return False
         self.kept_back.remove(id)
@@ -185,11 +191,14 @@ class Traffic:
         return True
 
     def release(self, i: int) -> None:
-        """Actor i is moved by commands from here on."""
+        """Ends the driving of actor i, which is moved by commands from here on."""
         self.drivers.state["active"][i] = False
 
     def moves(self, states: ActorStates, placed: Places, tick: int) -> Iterator[Move]:
-        """Vehicles to put somewhere in this tick; apply each before asking for the next."""
+        """Yields vehicles to put somewhere in this tick; apply each before asking for the next.
+
+        Only every CHECK_PERIOD ticks. Drivers of those that are yielded are set to their new place already.
+        """
         if tick % CHECK_PERIOD:
             return
         driver = self.drivers.state
@@ -274,7 +283,7 @@ class Traffic:
         yield Move(i, pose, v, reason)
 
     def _is_alone(self, i: int, states: ActorStates, claimed: Claimed) -> bool:
-        """Whether nobody is so near to vehicle i that its vanishing would be noticed."""
+        """Returns whether all others are LEAST_TIME s or more from vehicle i: none would see it vanish."""
         v = float(np.hypot(states.vx[i], states.vy[i]))
         found = claimed()
         rows = found[[i, i + len(found) // 2]]
@@ -287,7 +296,7 @@ class Traffic:
     def _has_room(
         self, i: int, at: int, d: NDArray[np.float64], states: ActorStates, claimed: Claimed
     ) -> bool:
-        """Whether vehicle i can be put on sample `at`, d m from every actor."""
+        """Returns whether vehicle i can be put on sample `at`, d (n,) m from every actor."""
         v = self._speed_at(i, at)
         if (states.present & (d < room(self.care, v, states))).any():
             return False
@@ -298,7 +307,7 @@ class Traffic:
         )
 
     def _speed_at(self, i: int, at: int) -> float:
-        """m/s at which driver i passes sample `at`: as traffic does there."""
+        """Returns the m/s at which driver i passes sample `at`: as traffic does there."""
         point, trait = self.net.point[at], self.drivers.trait[i]
         share = 1.0 if self.setup.mode is TrafficStart.PACK else PUT_BACK_SPEED
         v = share * float(point["limit"] * trait["factor"])
@@ -311,7 +320,10 @@ class Traffic:
         return speed_to_stop_within(self.care, self._way_to_line(at), v)
 
     def _way_to_line(self, at: int) -> float:
-        """m from sample `at` to where one may have to wait for others; inf: the lane leads to none."""
+        """Returns the m from sample `at` to where one may have to wait for others.
+
+        inf where its lane leads to no such place.
+        """
         lane, entry = int(self.places.lane[at]), self.streets.entry
         if not entry["size"][self.net.lane["ahead"][lane]]:
             return inf

@@ -22,7 +22,10 @@ def is_safe(
     b_safe: float,
     room: float,
 ) -> bool:
-    """Nobody has to brake harder than b_safe in m/s^2, and there is room, m behind."""
+    """Returns whether neither has to brake harder than b_safe in m/s^2, and there is room.
+
+    room: m to be free behind; ahead it is GAP_CLEAR. Accelerations in m/s^2, gaps in m.
+    """
     return (
         gap_ahead > GAP_CLEAR
         and gap_behind > room
@@ -33,5 +36,5 @@ def is_safe(
 
 @kernel
 def incentive(a_gain: float, a_gain_new_follower: float, a_gain_old_follower: float) -> float:
-    """Advantage in m/s^2, others' counted with politeness; worth it above `Care.a_change`."""
+    """Returns the advantage in m/s^2, others' counted with politeness; worth it above `Care.a_change`."""
     return a_gain + POLITENESS * (a_gain_new_follower + a_gain_old_follower)

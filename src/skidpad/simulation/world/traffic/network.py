@@ -71,7 +71,7 @@ class Network(NamedTuple):
 
 
 def network(samples: LaneSamples, lanes: LaneTable, signals: SignalTable) -> Network:
-    """The drivers' view of a baked map."""
+    """Returns the drivers' view of a baked map; UNSIGNED_LIMIT where it gives no limit."""
     point = np.zeros(len(samples.x), dtype=POINT)
     for name in ("x", "y", "s", "heading", "curvature", "grade", "marking_left", "marking_right"):
         point[name] = getattr(samples, name)
@@ -117,7 +117,10 @@ def _straightest(
     *,
     forward: bool,
 ) -> Ints32:
-    """For each lane the branch whose heading changes least within the window, or -1."""
+    """Returns (L,) for each lane the branch whose heading changes least within STRAIGHT_WINDOW, or -1.
+
+    forward: among successors, else predecessors; start, branches: of the lane table.
+    """
     best = np.full(len(lanes.first), -1, dtype=np.int32)
     for lane in range(len(best)):
         end = lanes.first[lane] + (lanes.size[lane] - 1 if forward else 0)

@@ -38,7 +38,7 @@ def occupancy(lanes: int, actors: int) -> Occupancy:
 
 @kernel
 def add(occ: Occupancy, actor: int, lane: int, s: float) -> None:
-    """Enter `actor` into a lane's list, unless it is there already or has no slot left."""
+    """Enters `actor` into a lane's list, unless it is there already or has no slot left."""
     if lane < 0 or occ.used[actor] == SLOTS:
         return
     entry = occ.head[lane]
@@ -55,13 +55,13 @@ def add(occ: Occupancy, actor: int, lane: int, s: float) -> None:
 
 @inner_kernel
 def beside(net: Network, lane: int, s: float, other: int) -> float:
-    """`s` on a neighbour lane of the same section: lanes of a section scale with their length."""
+    """Returns `s` on a neighbour lane of the same section: lanes of a section scale with their length."""
     return float(s * net.lane[other].length / net.lane[lane].length)
 
 
 @inner_kernel
 def fill(net: Network, placed: Places, occ: Occupancy) -> None:
-    """Enter every present actor into each lane that its body overlaps."""
+    """Empties all lists and enters every present actor into each lane that its body overlaps."""
     for lane in range(len(occ.head)):
         occ.head[lane] = NOBODY
     for i in range(len(occ.used)):
@@ -87,9 +87,10 @@ def fill(net: Network, placed: Places, occ: Occupancy) -> None:
 def find_ahead(
     net: Network, occ: Occupancy, placed: Places, path: Ints32, s: float, me: int, reach: float
 ) -> tuple[int, float]:
-    """Nearest actor ahead along `path` (lanes, -1 ends it): index or NOBODY, gap in m or inf.
+    """Returns the nearest actor ahead along `path` (lanes, -1 ends it): row and gap in m; -1, inf for none.
 
-    The gap is bumper to bumper along the road; negative while bodies overlap lengthwise.
+    s: m along its first lane; reach: m between reference points. The gap is bumper to bumper along the
+    road; negative while bodies overlap lengthwise.
     """
     start = -s
     for k in range(len(path)):
@@ -114,7 +115,7 @@ def find_ahead(
 
 @inner_kernel
 def last_on(occ: Occupancy, lane: int, start: float, me: int) -> tuple[int, float]:
-    """The actor on `lane` least behind `start` m along it, and by how much; NOBODY, inf: none."""
+    """Returns the row on `lane` least behind `start` m along it, and by how many m; -1, inf for none."""
     nearest, distance = NOBODY, np.inf
     if lane < 0:
         return nearest, distance
@@ -132,7 +133,10 @@ def last_on(occ: Occupancy, lane: int, start: float, me: int) -> tuple[int, floa
 def find_behind(
     net: Network, occ: Occupancy, placed: Places, lane: int, s: float, me: int, reach: float
 ) -> tuple[int, float]:
-    """Nearest actor behind along the straightest predecessors and what joins them; as `find_ahead`."""
+    """Returns the nearest actor behind along the straightest predecessors and what joins them.
+
+    Row and gap as of `find_ahead`.
+    """
     start = s
     nearest, distance = last_on(occ, lane, start, me)
     for _ in range(8):

@@ -40,10 +40,9 @@ V_PREVIEW = 10.0  # m/s, look at least this far beyond the comfortable braking d
 def desired_speed(
     net: Network, me: Any, trait: Any, path: NDArray[np.int32], v: float, care: Care
 ) -> float:
-    """Speed in m/s that limits and bends ahead along `path` allow, each reached by comfortable
-    braking from the present speed v, and from which one can stop within sight.
+    """Returns the m/s that limits and bends ahead along `path` allow, and from which one stops within sight.
 
-    me, trait: rows of DRIVER and TRAIT.
+    Each is reached by comfortable braking from the present speed v. me, trait: rows of DRIVER and TRAIT.
     """
     b = braking(care, v)
     known = v * v / (2.0 * b) + V_PREVIEW
@@ -71,7 +70,7 @@ def desired_speed(
 
 @inner_kernel
 def stop_gap(view: View, d: Drivers, i: int) -> float:
-    """Metres from the front bumper to the next line at which driver i has to stop; inf: none."""
+    """Returns the m from the front bumper to the next light at which driver i has to stop; inf: none."""
     net, v = view.streets.net, view.placed[i].speed
     b = firm_braking(view.care, v, YELLOW_BRAKE)
     start = -d.state[i].s - view.placed[i].half_length
@@ -92,7 +91,7 @@ def stop_gap(view: View, d: Drivers, i: int) -> float:
 
 @inner_kernel
 def end_gap(view: View, d: Drivers, i: int) -> float:
-    """Metres to the end of the road along the path; inf: not within what the driver knows."""
+    """Returns the m to the end of the road along the path; inf: not within what the driver knows."""
     known = -d.state[i].s
     for k in range(PATH):
         if d.path[i, k] < 0:
@@ -106,11 +105,10 @@ def end_gap(view: View, d: Drivers, i: int) -> float:
 def _right_of_way_decides(
     view: View, d: Drivers, i: int, j: int, lanes: tuple[int, int, int], before: float
 ) -> bool:
-    """Whether right of way and not the order of arrival decides between drivers i and j at a merge.
+    """Returns whether right of way, not the order of arrival, decides between drivers i and j at a merge.
 
     A driver with priority does not follow one that can still wait for it. A driver that yields waits at
     its line (`right_of_way`) and does not follow one that stands at its own: each would wait for the other.
-
     lanes: my lane of the junction, theirs, and the one on which j is. before: m from the front of j to
     the beginning of theirs, negative on it.
     """
@@ -134,7 +132,10 @@ def _right_of_way_decides(
 
 @inner_kernel
 def merge_gap(view: View, d: Drivers, i: int) -> tuple[int, float]:
-    """Who arrives at a merge ahead just before driver i on another branch, and the gap to it."""
+    """Returns the row that arrives at a merge ahead just before driver i on another branch, and the gap in m.
+
+    -1, inf for none.
+    """
     net, occ = view.streets.net, view.occ
     start = net.lane[d.path[i, 0]].length - d.state[i].s
     v = view.placed[i].speed

@@ -18,8 +18,10 @@ FARTHEST = 240.0  # m of road at which somebody enters
 
 
 def ways(net: Network, lane: int, s: float, forward: bool) -> dict[int, float]:
-    """Lanes met within RADIUS from a place on, or back from it, with the m of road from the place
-    to where each begins. Neighbours of the same direction count as beside it."""
+    """Returns lanes met within RADIUS from a place on, or back from it, with the m to where each begins.
+
+    Metres of road from the place, negative behind it. Neighbours of the same direction count as beside it.
+    """
     begins = {lane: -s}
     todo = [lane]
     for here in todo:  # which grows meanwhile
@@ -49,15 +51,20 @@ class Pack:
         self.ahead, self.behind = (ways(net, lane, s, forward) for forward in (True, False))
 
     def away(self, lane: int, s: float) -> float | None:
-        """m of road by which a place lies ahead of the ego, negative: behind; None: not in reach."""
+        """Returns the m of road by which a place lies ahead of the ego, negative: behind.
+
+        None where it is farther than RADIUS.
+        """
         for begins in (self.ahead, self.behind):
             if lane in begins and abs(begins[lane] + s) <= RADIUS:
                 return begins[lane] + s
         return None
 
     def lost(self, d: Drivers, states: ActorStates) -> list[tuple[int, bool]]:
-        """Rows of those who left the pack and are out of sight, and whether they are to enter ahead:
-        where they did not leave it, as there they would leave it again."""
+        """Returns rows of vehicles that left the pack and are out of sight, and whether to enter ahead.
+
+        They are to enter where they did not leave it, as there they would leave it again.
+        """
         gone = []
         for i in np.flatnonzero(d.state["active"] & states.present).tolist():
             if self.away(int(d.path[i, 0]), float(d.state["s"][i])) is not None:
@@ -69,7 +76,7 @@ class Pack:
         return gone
 
     def entrances(self, candidates: NDArray[np.intp], ahead: bool) -> NDArray[np.intp]:
-        """Those of the candidate points that lie out of sight on the way ahead or behind."""
+        """Returns those of the candidate points that lie out of sight on the way ahead, or else behind."""
         begins = np.full(len(self.net.lane), np.nan)
         for lane, start in (self.ahead if ahead else self.behind).items():
             begins[lane] = start

@@ -18,7 +18,7 @@ SALT = np.uint64(0xD1B54A32D192ED03)
 
 @kernel
 def uniform(key: np.uint64, tick: int, salt: int) -> float:
-    """A number in [0, 1) from (key, tick, salt)."""
+    """Returns a number in [0, 1) that depends on (key, tick, salt) alone."""
     counter = np.uint64(key) + GOLDEN * np.uint64(2 * tick + 1)
     return unit(scrambled(counter + SALT * np.uint64(salt)))
 
@@ -31,7 +31,7 @@ def wrapped(angle: float) -> float:
 
 @inner_kernel
 def choose_branch(net: Network, lane: int, key: np.uint64, turn: int, free_choice: bool) -> int:
-    """The lane to take after `lane`: the straightest, or one drawn per driver and turn."""
+    """Returns the lane to take after `lane`, the straightest, or one drawn per driver and turn; -1: none."""
     here = net.lane[lane]
     if not free_choice or here.nexts < 2:
         return int(here.ahead)
@@ -42,7 +42,10 @@ def choose_branch(net: Network, lane: int, key: np.uint64, turn: int, free_choic
 
 @inner_kernel
 def extend(net: Network, path: Ints32, s: float, key: np.uint64, turn: int, free: bool) -> None:
-    """Append lanes to `path` until it reaches LOOKAHEAD, is full, or the road ends."""
+    """Appends lanes to `path` until it reaches LOOKAHEAD, is full, or the road ends.
+
+    s: m along its first lane; turn: number of lanes entered, which with key decides draws.
+    """
     known = -s
     for k in range(PATH - 1):
         if path[k] < 0:
@@ -62,7 +65,7 @@ def begin(path: Ints32, lane: int) -> None:
 
 @kernel
 def straight_path(net: Network, lane: int, out: Ints32) -> None:
-    """Fill `out` with `lane` and its straightest successors."""
+    """Fills `out` with `lane` and its straightest successors, -1 behind the road's end."""
     for k in range(len(out)):
         out[k] = lane
         if lane >= 0:
@@ -71,9 +74,10 @@ def straight_path(net: Network, lane: int, out: Ints32) -> None:
 
 @inner_kernel
 def along(net: Network, lane: int, at: int, x: float, y: float) -> tuple[int, float]:
-    """Segment of `lane` beside (x, y), searched from sample `at`, and the fraction along it.
+    """Returns the segment of `lane` beside (x, y), searched from sample `at`, and the share along it.
 
-    A fraction below 0 or above 1 means before the first or behind the last sample.
+    The segment is the sample at its begin. A share below 0 or above 1: before the first or behind the
+    last sample.
     """
     first = net.lane[lane].first
     last = first + net.lane[lane].size - 2
@@ -94,7 +98,11 @@ def along(net: Network, lane: int, at: int, x: float, y: float) -> tuple[int, fl
 
 @inner_kernel
 def offset_from(net: Network, at: int, t: float, x: float, y: float) -> tuple[float, float]:
-    """Metres by which (x, y) lies left of the lane, and the lane's heading there."""
+    """Returns the m by which (x, y) lies left of the lane, and the lane's heading there in rad.
+
+    at, t: sample of the lane and share of the way to the next one, as `along` returns them; t is held
+    within 0 and 1.
+    """
     p, q = net.point[at], net.point[at + 1]
     u = min(max(t, 0.0), 1.0)
     heading = p.heading + u * wrapped(q.heading - p.heading)

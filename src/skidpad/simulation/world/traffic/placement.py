@@ -46,7 +46,10 @@ class Position:
 
 
 def published_positions(variant: str) -> tuple[Position, ...]:
-    """The twenty positions as in the listing or in the tables (D-085, D-086)."""
+    """Returns the twenty positions as in the "listing" or in the "table"s (D-085, D-086).
+
+    ConfigError for another variant.
+    """
     require_choice("traffic variant", variant, VARIANTS)
     text = resources.files(__package__).joinpath("positions.csv").read_text()
     return tuple(
@@ -61,7 +64,7 @@ def published_positions(variant: str) -> tuple[Position, ...]:
 
 
 def chosen_positions(vehicles: int, variant: str) -> list[Position]:
-    """The first of each group: floor(0.75 n) ahead up to 15, the rest behind up to 5 (A-203)."""
+    """Returns the first of each group: floor(0.75 n) ahead up to 15, the rest behind up to 5 (A-203)."""
     rows = published_positions(variant)
     ahead = min(int(SHARE_AHEAD * vehicles), MAX_AHEAD)
     behind = min(vehicles - ahead, MAX_BEHIND)
@@ -71,7 +74,10 @@ def chosen_positions(vehicles: int, variant: str) -> list[Position]:
 
 
 def fixed_spawns(map: RoadMap, ego: LanePoint, setup: TrafficSetup, seed: int) -> list[Spawn]:
-    """Vehicles at the published distances from the ego (A-202 to A-205), gaps and speeds varied."""
+    """Returns vehicles at the published distances from the ego, gaps and speeds varied (A-202 to A-205).
+
+    ConfigError where a place has no lane and fewer are not allowed.
+    """
     spawns, missing = [], []
     for position in chosen_positions(setup.vehicles, setup.variant):
         mean = FACTOR_AHEAD if position.group == "ahead" else FACTOR_BEHIND
@@ -90,7 +96,10 @@ def fixed_spawns(map: RoadMap, ego: LanePoint, setup: TrafficSetup, seed: int) -
 
 
 def pack_spawns(map: RoadMap, ego: LanePoint, setup: TrafficSetup, seed: int) -> list[Spawn]:
-    """The published places drawn together around the ego; who finds none there enters later."""
+    """Returns vehicles at the published places drawn together around the ego.
+
+    Those that find no lane there enter later: their place is None.
+    """
     spawns = []
     for position in chosen_positions(setup.vehicles, setup.variant):
         share = PACK_AHEAD if position.group == "ahead" else PACK_BEHIND
@@ -103,7 +112,10 @@ def pack_spawns(map: RoadMap, ego: LanePoint, setup: TrafficSetup, seed: int) ->
 def _spawn(
     map: RoadMap, ego: LanePoint, position: Position, mean: float, seed: int
 ) -> Spawn | None:
-    """A vehicle at a position, its gap and its speed varied by the seed; None: no lane is there."""
+    """Returns a vehicle at a position, its gap and its speed varied by the seed; None: no lane is there.
+
+    mean: of its desired speed over the limit.
+    """
     name = f"{position.group} {position.index}"
     gap = stream(seed, "traffic", "gap", name).uniform(-GAP_SPREAD, GAP_SPREAD)
     place = _place(map, ego, position.distance + gap, position.lanes_left)
@@ -114,7 +126,7 @@ def _spawn(
 
 
 def _place(map: RoadMap, ego: LanePoint, distance: float, lanes_left: int) -> LanePoint | None:
-    """`distance` m along the road from the ego, then so many lanes to the left; None: no lane."""
+    """Returns the place `distance` m along the road from the ego, then so many lanes left; None: no lane."""
     place = map.ahead(ego, distance) if distance >= 0.0 else map.behind(ego, -distance)
     step = map.left if lanes_left > 0 else map.right
     for _ in range(abs(lanes_left)):
@@ -123,7 +135,10 @@ def _place(map: RoadMap, ego: LanePoint, distance: float, lanes_left: int) -> La
 
 
 def random_factors(vehicles: int, seed: int) -> NDArray[np.float64]:
-    """Desired speeds over the limit, Gaussian, one stream per vehicle (A-209)."""
+    """Returns (vehicles,) desired speeds over the limit, Gaussian, one stream per vehicle (A-209).
+
+    ConfigError beyond VEHICLES_MAX.
+    """
     if not 0 <= vehicles <= VEHICLES_MAX:
         raise ConfigError(f"traffic.vehicles must be between 0 and {VEHICLES_MAX}, got {vehicles}")
     draws = [stream(seed, "traffic", "speed", i).normal(0.0, 1.0) for i in range(vehicles)]
@@ -131,5 +146,5 @@ def random_factors(vehicles: int, seed: int) -> NDArray[np.float64]:
 
 
 def type_of(index: int, types: Sequence[str]) -> str:
-    """Types in turn, the rear group continuing after the front (A-205)."""
+    """Returns the type of the vehicle of this index: types take turns (A-205)."""
     return types[index % len(types)]

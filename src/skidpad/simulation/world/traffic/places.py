@@ -52,9 +52,10 @@ class FreePlaces:
         has_room: Callable[[int, NDArray[np.float64]], bool],
         among: NDArray[np.intp] | None = None,
     ) -> int | None:
-        """A sample between `nearest` and `farthest` m from the ego, clear of all; None: not found.
+        """Returns a sample between `nearest` and `farthest` m from the ego, clear of all; None: not found.
 
-        has_room: of a sample and (n,) m from it to every actor. among: candidates, None: all.
+        TRIES samples are drawn. has_room: of a sample and (n,) m from it to every actor. among: candidates,
+        None: all.
         """
         point = self.net.point
         among = self.candidates if among is None else among

@@ -69,7 +69,10 @@ class _Bake:
                 self.control(row, control)
 
     def control(self, row: int, control: int) -> None:
-        """Note where one waits for a signal; one on a junction's lane holds at the lanes before it."""
+        """Notes where one waits for a signal; one on a junction's lane holds at the lanes before it.
+
+        row: of the signal table; control: LIGHT, STOP or YIELD.
+        """
         lane = int(self.signals.lane[row])
         within = int(self.lanes.junction[lane])
         waiting = [lane]
@@ -82,7 +85,7 @@ class _Bake:
                 at["line"] = self.signals.s[row]
 
     def points(self, lane: int) -> tuple[Floats, Floats]:
-        """(k, 2) places and (k,) s of a lane."""
+        """Returns (k, 2) places in m and (k,) s of a lane."""
         at = slice(self.lanes.first[lane], self.lanes.first[lane] + self.lanes.size[lane])
         p = self.samples
         return np.column_stack([p.x[at], p.y[at]]), p.s[at]
@@ -98,8 +101,10 @@ class _Bake:
         return {int(i) for i in self.lanes.next_lane[start[lane] : start[lane + 1]]}
 
     def whole(self, lane: int, forward: bool) -> list[int]:
-        """The lane and what goes on from it (else: leads to it) within its junction: files cut
-        one way through a junction into sections."""
+        """Returns the lane and what goes on from it within its junction (else: what leads to it).
+
+        Files cut one way through a junction into sections.
+        """
         found = [lane]
         for here in found:  # which grows meanwhile
             near = self.after(here) if forward else self.before(here)
@@ -108,13 +113,13 @@ class _Bake:
         return found
 
     def outside(self, lane: int, forward: bool) -> set[int]:
-        """The lanes behind (else: before) the junction to which the way over `lane` leads."""
+        """Returns the lanes behind (else: before) the junction to which the way over `lane` leads."""
         way = self.whole(lane, forward)
         near = (self.after(w) if forward else self.before(w) for w in way)
         return set().union(*near) - set(way)
 
     def standing(self, lane: int) -> tuple[int, int, int]:
-        """Sorts lanes of a junction: what is smaller yields."""
+        """Returns a key by which lanes of a junction are compared: what is smaller yields."""
         controls = [int(self.entry["control"][p]) for p in self.outside(lane, forward=False)]
         major = 0 if any(c in (STOP, YIELD) for c in controls) else 1
         first, last = (self.whole(lane, forward)[-1] for forward in (False, True))
@@ -125,7 +130,7 @@ class _Bake:
         return major, manner, -lane
 
     def pair(self, a: int, b: int) -> None:
-        """Note what lanes a and b of one junction share."""
+        """Notes in `found` what lanes a and b of one junction share, if anything, and which yields."""
         if b in self.whole(a, True) or b in self.whole(a, False):
             return  # sections of one way
         forks = bool(self.outside(a, False) & self.outside(b, False))
@@ -147,7 +152,7 @@ class _Bake:
 def bake_priority(
     samples: LaneSamples, lanes: LaneTable, signals: SignalTable, roadside: Roadside | None
 ) -> tuple[NDArray[np.void], NDArray[np.void], NDArray[np.void], Floats]:
-    """(L,) ENTRY, (C,) CONFLICT, (Q,) ZEBRA, and (Z, 5) zebras as x, y, heading, half sizes."""
+    """Returns (L,) ENTRY, (C,) CONFLICT, (Q,) ZEBRA, and (Z, 5) zebras as x, y, heading, half sizes."""
     bake = _Bake(samples, lanes, signals)
     limit = np.nan_to_num(samples.limit[lanes.first], nan=0.0)
     drivable = np.isin(lanes.kind, (LaneKind.DRIVING, LaneKind.RAMP)) & (limit < FAST)
@@ -166,7 +171,7 @@ def bake_priority(
 
 
 def _zebras(roadside: Roadside | None) -> Floats:
-    """(Z, 5) centre, heading across the street, half length along it and half width."""
+    """Returns (Z, 5) centre, heading across the street, half length along it and half width."""
     rows = []
     for polygon in () if roadside is None else roadside.crosswalks:
         p = polygon[:4, :2]
@@ -182,7 +187,7 @@ def _zebras(roadside: Roadside | None) -> Floats:
 
 
 def _zebra_rows(bake: _Bake, boxes: Floats) -> NDArray[np.void]:
-    """Where each drivable lane meets each zebra."""
+    """Returns where each drivable lane meets each zebra (ZEBRA); writes their numbers into the entries."""
     rows: list[tuple[float, int]] = []
     for lane in range(len(bake.lanes.first)):
         bake.entry["zebra_first"][lane] = len(rows)

@@ -48,8 +48,11 @@ INDICATED = 5  # lanes ahead that others can guess
 
 @inner_kernel
 def right_of_way_gap(view: View, d: Drivers, i: int) -> tuple[float, int, int]:
-    """m from the front bumper to where driver i has to wait for others (inf: nowhere), for what
-    (`state.Held`), and the row of the actor that is the cause (NOBODY: there is none)."""
+    """Returns the m from the front bumper to where driver i waits for others, for what, and the cause's row.
+
+    inf where it need not wait; for what: `state.Held`; row -1: no actor is the cause. Counts in its state
+    how long it waits, and notes its stops.
+    """
     body, me = view.placed[i], d.state[i]
     start = -me.s - body.half_length  # from the front to the beginning of path[k]
     far = reach(view.care, body.speed, REACH)
@@ -90,8 +93,11 @@ def right_of_way_gap(view: View, d: Drivers, i: int) -> tuple[float, int, int]:
 def _waits(
     view: View, d: Drivers, i: int, k: int, start: float, line: float, control: int
 ) -> tuple[int, int]:
-    """For what driver i, not yet past the line before path[k], must be ready to stop there, and the row of
-    the actor that is the cause."""
+    """Returns for what driver i must be ready to stop before path[k], and the row of the cause.
+
+    FREE and -1 where it need not. It is not yet past the line; start, line: m from its front to the lane
+    and to the line. Notes a stop at a stop sign.
+    """
     me, body = d.state[i], view.placed[i]
     lane = d.path[i, k]
     junction = view.streets.entry[lane].junction
@@ -129,29 +135,29 @@ def _waits(
 
 @inner_kernel
 def is_clear_of_line(view: View, d: Drivers, i: int) -> bool:
-    """Whether driver i is neither in a junction nor close to the line before one."""
+    """Returns whether driver i is neither in a junction nor close to the line before one."""
     entry = view.streets.entry[d.path[i, 0]]
     return bool(entry.junction < 0 and _gap_to_line(view, d, i) > HALT_GAP)
 
 
 @inner_kernel
 def _gap_to_line(view: View, d: Drivers, i: int) -> float:
-    """m from the front bumper of driver i to the line at the end of its present lane."""
+    """Returns the m from the front bumper of driver i to the line at the end of its present lane."""
     line = view.streets.entry[d.path[i, 0]].line
     return float(line - d.state[i].s - view.placed[i].half_length)
 
 
 @inner_kernel
 def _is_impatient(view: View, d: Drivers, i: int) -> bool:
-    """Whether driver i has stood so long that others let it go first."""
+    """Returns whether driver i has stood so long that others let it go first."""
     return bool(view.care.on and d.state[i].active and d.state[i].stood > IMPATIENT)
 
 
 @inner_kernel
 def _first_to_go(view: View, d: Drivers, i: int, lane: int) -> int:
-    """Row of a driver that waits to go over `lane` and that driver i, though it need not yield, lets go
-    first: it has stood for long, and longer than i.
+    """Returns the row of a driver that waits to go over `lane` and is let go first by driver i; -1: none.
 
+    It has stood for long, and longer than i, which need not yield.
     Without it no left turn gets through while the stream that comes the other way fills each green,
     nor does any vehicle that yields to an endless stream.
     """
@@ -176,9 +182,9 @@ def _first_to_go(view: View, d: Drivers, i: int, lane: int) -> int:
 def _impatient_on(
     view: View, d: Drivers, here: int, lane: int, reach: float, longest: float
 ) -> int:
-    """Row of a driver on lane `here`, at most `reach` m from its line, that has stood for more than
-    `longest` s and goes over `lane`.
+    """Returns the row of a driver on lane `here` that goes over `lane` and has stood too long; -1: none.
 
+    It is at most `reach` m from its line and has stood for more than `longest` s.
     One that waits for room behind the junction does not count: that room may depend on driver i.
     """
     entry = view.occ.head[here]
@@ -195,7 +201,10 @@ def _impatient_on(
 
 @inner_kernel
 def _time_through(view: View, d: Drivers, i: int, way: float, bend: float) -> float:
-    """s that driver i takes for `way` m through a junction, no faster than its bend allows."""
+    """Returns the s that driver i takes for `way` m through a junction, no faster than its bend allows.
+
+    bend: 1/m.
+    """
     a_max = drive_limit(view.care, view.placed[i].speed, d.trait[i].a_max)
     v, v_max = max(view.placed[i].speed, 0.0), V_THROUGH
     if view.care.on and bend * V_THROUGH * V_THROUGH > 1.0:
@@ -206,7 +215,7 @@ def _time_through(view: View, d: Drivers, i: int, way: float, bend: float) -> fl
 
 @inner_kernel
 def _travel_time(v: float, way: float, a: float, v_max: float) -> float:
-    """s for `way` m from speed v at acceleration a up to v_max."""
+    """Returns the s for `way` m from speed v at acceleration a up to v_max; faster ones keep v."""
     if v >= v_max:
         return way / v
     t = (-v + sqrt(v * v + 2.0 * a * way)) / a
@@ -218,7 +227,7 @@ def _travel_time(v: float, way: float, a: float, v_max: float) -> float:
 
 @inner_kernel
 def _on_area(view: View, i: int, lane: int, start: float, end: float) -> int:
-    """Row of an actor other than i whose body is on [start, end] of a lane."""
+    """Returns the row of an actor other than i whose body is on [start, end] m of a lane; -1: none."""
     entry = view.occ.head[lane]
     while entry != NOBODY:
         j = entry // SLOTS
@@ -231,7 +240,7 @@ def _on_area(view: View, i: int, lane: int, start: float, end: float) -> int:
 
 @inner_kernel
 def _is_in_way(view: View, i: int, j: int, lane: int, front: float) -> bool:
-    """Whether the body of actor j leaves driver i no room on a lane, from `front` m along it on."""
+    """Returns whether the body of actor j leaves driver i no room on a lane, from `front` m along it on."""
     me, other, row = view.placed[i], view.placed[j], view.streets.net.lane[lane]
     c, s = cos(other.yaw), sin(other.yaw)
     half_l = other.half_length + me.half_width + CREEP_ROOM
@@ -246,7 +255,7 @@ def _is_in_way(view: View, i: int, j: int, lane: int, front: float) -> bool:
 
 @inner_kernel
 def _can_judge_anew(view: View, v: float, gap: float) -> bool:
-    """Whether a driver in a junction, `gap` m before a shared area, can still leave the way to others."""
+    """Returns whether a driver in a junction, `gap` m before a shared area, can leave the way to others."""
     if v < V_ANEW:
         return True
     return bool(view.care.on and v * v <= 2.0 * firm_braking(view.care, v, COURTESY_BRAKE) * gap)
@@ -256,9 +265,10 @@ def _can_judge_anew(view: View, v: float, gap: float) -> bool:
 def _gap_within(
     view: View, d: Drivers, i: int, k: int, start: float, keeps_out: bool
 ) -> tuple[float, int, int]:
-    """m to the nearest shared area on path[k] that a driver in the junction must not enter (inf: none),
-    for what, and the row of the actor that is the cause.
+    """Returns the m to the nearest shared area on path[k] that driver i must not enter, for what, and a row.
 
+    The row is that of the actor that is the cause. inf, FREE and -1 where there is no such area; the
+    driver is in the junction.
     keeps_out: of areas in which another stands, else only of those whose way is not free. A driver that
     can still stop judges gaps anew.
     """
@@ -291,7 +301,7 @@ def _gap_within(
 
 @inner_kernel
 def _queue_behind(view: View, d: Drivers, i: int, k: int, start: float) -> int:
-    """Row of the last in a queue that leaves no room behind the junction lane path[k]."""
+    """Returns the row of the last in a queue that leaves no room behind junction lane path[k]; -1: none."""
     body, me = view.placed[i], d.state[i]
     room = start + view.streets.net.lane[d.path[i, k]].length + 2.0 * body.half_length + EXIT_ROOM
     if d.path[i, k + 1] >= 0 and view.streets.entry[d.path[i, k + 1]].size > 0:
@@ -306,7 +316,7 @@ def _queue_behind(view: View, d: Drivers, i: int, k: int, start: float) -> int:
 
 @inner_kernel
 def _coming(view: View, d: Drivers, i: int, lane: int, zone: float, clear: float) -> int:
-    """Row of an actor that arrives at `zone` m along `lane` within `clear` s."""
+    """Returns the row of an actor that arrives at `zone` m along `lane` within `clear` s; -1: none."""
     found = _arrives(view, d, i, lane, lane, zone, clear)
     if found != NOBODY:
         return found
@@ -333,13 +343,13 @@ def _coming(view: View, d: Drivers, i: int, lane: int, zone: float, clear: float
 
 @inner_kernel
 def _watch_distance(view: View, v: float, clear: float) -> float:
-    """m before the shared area in which somebody at speed v matters for `clear` s."""
+    """Returns the m before the shared area in which an actor at v m/s matters for `clear` s."""
     return max(WATCH, v * clear) if view.care.on else WATCH
 
 
 @inner_kernel
 def _held_by_light(view: View, lane: int) -> bool:
-    """Whether a red light stands at the end of a lane."""
+    """Returns whether a red light stands at the end of a lane."""
     entry = view.streets.entry[lane]
     return bool(entry.control == LIGHT and view.lights[entry.signal] == 0)
 
@@ -348,7 +358,10 @@ def _held_by_light(view: View, lane: int) -> bool:
 def _arrives(
     view: View, d: Drivers, i: int, lane: int, target: int, way: float, clear: float
 ) -> int:
-    """Row of an actor on `lane`, `way` m before the area from its beginning, that gets there in time."""
+    """Returns the row of an actor on `lane` that gets to the shared area within `clear` s; -1: none.
+
+    way: m from the lane's beginning to the area; target: lane that its path must go over.
+    """
     entry = view.occ.head[lane]
     while entry != NOBODY:
         j = entry // SLOTS
@@ -373,7 +386,7 @@ def _arrives(
 
 @inner_kernel
 def leads_to(d: Drivers, j: int, lane: int) -> bool:
-    """Whether driver j's path goes over a lane: its indicators say so."""
+    """Returns whether driver j's path goes over a lane within INDICATED: its indicators say so."""
     found = False
     for k in range(INDICATED):
         found = found or d.path[j, k] == lane

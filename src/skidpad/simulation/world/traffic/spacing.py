@@ -20,7 +20,7 @@ REACH = 150.0  # m of road that are searched, farther than anybody drives in LEA
 
 
 def claims(placed: Places, d: Drivers) -> Places:
-    """(2 n,) every actor where it is, then where it goes to: in a change of lane these are two."""
+    """Returns (2 n,) every actor where it is, then where it goes to: in a change of lane these are two."""
     aims = placed.copy()
     drives = d.state["active"]
     aims["lane"][drives], aims["s"][drives] = d.path[drives, 0], d.state["s"][drives]
@@ -30,10 +30,10 @@ def claims(placed: Places, d: Drivers) -> Places:
 def seconds_to_others(
     net: Network, claimed: Places, lane: int, s: float, v: float, me: int
 ) -> float:
-    """Smallest time gap in s from a place on a lane, passed with speed v, to those ahead and behind.
+    """Returns the smallest time gap in s from a place on a lane, passed at v m/s, to those before and behind.
 
-    claimed: of `claims`. me: row of the vehicle that is or will be there. Those on neighbouring lanes
-    do not count.
+    inf for none within REACH. claimed: of `claims`. me: row of the vehicle that is or will be there. Those
+    on neighbouring lanes do not count.
     """
     placed, n = claimed, len(claimed) // 2
     least = np.inf
@@ -52,7 +52,7 @@ def seconds_to_others(
 
 
 def is_crossing_free(streets: Streets, claimed: Places, lane: int, s: float, me: int) -> bool:
-    """Whether a vehicle that is put before a junction surprises no driver there.
+    """Returns whether a vehicle that is put s m along `lane` before a junction surprises no driver there.
 
     Drivers judge gaps by those within `WATCH` m of the shared area: a driver that has decided to go
     cannot yield to a vehicle that was not there. claimed, me: as in `seconds_to_others`.
@@ -80,7 +80,7 @@ def is_crossing_free(streets: Streets, claimed: Places, lane: int, s: float, me:
 
 
 def _way(net: Network, lane: int, s: float, forward: bool) -> dict[int, float]:
-    """Lanes within REACH before or behind a place, and m of road from it to where each begins."""
+    """Returns lanes within REACH before or behind a place, and the m of road from it to where each begins."""
     begins = {lane: -s}
     todo = [lane]
     for here in todo:  # which grows meanwhile
@@ -103,8 +103,10 @@ def _way(net: Network, lane: int, s: float, forward: bool) -> dict[int, float]:
 
 
 def room(care: Care, v: float, states: ActorStates) -> Floats:
-    """(n,) m that somebody put on the road with speed v keeps to every actor, so that either can
-    brake for the other."""
+    """Returns (n,) m between centres that a vehicle put on the road at speed v keeps to every actor.
+
+    At least CLEARANCE; with care so much that either can brake for the other.
+    """
     clear = np.full(len(states.x), CLEARANCE)
     if not care.on:
         return clear

@@ -23,7 +23,7 @@ BRAKE_STANDING = 0.5
 
 @inner_kernel
 def steer(view: View, d: Drivers, i: int) -> float:
-    """Steer command that tracks the path: the curvature ahead plus a second-order control.
+    """Returns the steer command that tracks the path: the curvature ahead plus a second-order control.
 
     The lateral offset obeys e'' = -OMEGA^2 e - 2 ZETA OMEGA e', as v^2 times curvature is lateral
     acceleration. In a lane change the wanted offset slides from `shift` to 0 along a quintic.
@@ -49,7 +49,7 @@ def steer(view: View, d: Drivers, i: int) -> float:
 
 @inner_kernel
 def curvature_ahead(view: View, d: Drivers, i: int, distance: float) -> float:
-    """Curvature of the path `distance` m ahead, 1/m."""
+    """Returns the curvature of the path `distance` m ahead, 1/m; 0 behind its end."""
     s = d.state[i].s + distance
     for k in range(PATH):
         if d.path[i, k] < 0:
@@ -64,7 +64,7 @@ def curvature_ahead(view: View, d: Drivers, i: int, distance: float) -> float:
 
 @inner_kernel
 def pedals(view: View, d: Drivers, i: int) -> tuple[float, float]:
-    """Throttle and brake for the acceleration asked for: feedforward plus integral."""
+    """Returns throttle and brake for the acceleration asked for: feedforward plus integral (`trim`)."""
     me, trait, body = d.state[i], d.trait[i], view.placed[i]
     v, a = body.speed, me.target
     if v < V_STANDING and a <= 0.05:

@@ -60,7 +60,7 @@ class Character:
 
 
 def risky_character(seed: int, id: int) -> Character:
-    """The character of driver `id` in the stratum of risky drivers."""
+    """Returns the character of driver `id` in the stratum of risky drivers."""
     rng = stream(seed, "traffic", "risky", id)
     draws = rng.random(4).tolist()
     u_headway, of_headway = tail_draw(HEADWAY_LAYERS, *draws[:2])
@@ -69,7 +69,7 @@ def risky_character(seed: int, id: int) -> Character:
 
 
 def tail_draw(layers: Layers, which: float, where: float) -> tuple[float, float]:
-    """A quantile in [0, 1) from two uniform numbers, and its weight p / q.
+    """Returns a quantile in [0, 1) from two uniform numbers, and its weight p / q.
 
     q is the mixture of p within each layer's part by the layers' shares: no weight exceeds one over
     the share of the whole.
@@ -91,7 +91,7 @@ def vary(
     stratum: Stratum = Stratum.NATURAL,
     headways: Headways = Headways.COMFORT,
 ) -> None:
-    """Give every driver (row of TRAIT) a character of its own.
+    """Gives every driver (row of TRAIT) a character of its own, in place.
 
     Headways of the field are spread evenly over ids (a Kronecker sequence from a start drawn per run):
     twenty drivers stand for the whole distribution, its ends included.

@@ -19,7 +19,7 @@ V_WALKING = 0.1  # m/s
 
 @inner_kernel
 def note_walkers(streets: Streets, placed: Places) -> None:
-    """Mark the zebras on which somebody walks, or steps from the kerb."""
+    """Notes in `streets.busy` the zebras on which a pedestrian walks, or steps from the kerb."""
     for z in range(len(streets.zebras)):
         zebra = streets.zebras[z]
         c, s = cos(zebra[2]), sin(zebra[2])
@@ -36,7 +36,7 @@ def note_walkers(streets: Streets, placed: Places) -> None:
 
 @inner_kernel
 def zebra_gap(view: View, d: Drivers, i: int) -> float:
-    """m from the front bumper to a zebra on which somebody walks; inf: none within reach."""
+    """Returns the m from the front bumper to a zebra on which a pedestrian walks; inf: none within reach."""
     body = view.placed[i]
     start = -d.state[i].s - body.half_length
     far = reach(view.care, body.speed, REACH)

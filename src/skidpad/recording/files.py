@@ -24,7 +24,7 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # disk, quota, limit on the si
 
 
 def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
-    """Let `write` fill a temporary file beside `path`, then rename it over `path`.
+    """Lets `write` fill a temporary file beside `path`, then renames it over `path`.
 
     A reader sees the old file or the new one, never a part. OutputError when the disk is full or
     the folder cannot be written; what was there before is untouched.
@@ -44,7 +44,7 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write `content` to `path` atomically."""
+    """Writes `content` to `path` atomically; makes its folder."""
     write_atomically(path, lambda temporary: _fill(temporary, content))
 
 
@@ -54,7 +54,7 @@ def _fill(path: Path, content: bytes) -> None:
 
 
 def require_free(folder: Path) -> Path:
-    """`folder` if nothing is in it yet; OutputError where something is, or a file."""
+    """Returns `folder` if nothing is in it yet; OutputError where something is, or a file."""
     if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
         raise OutputError(f"{folder} exists already and is not empty; choose another --out")
     return folder
@@ -72,7 +72,7 @@ def _fill_secret(path: Path, content: bytes) -> None:
 
 
 def write_parquet(path: Path, table: pl.DataFrame, metadata: dict[str, str] | None = None) -> None:
-    """Write `table` as zstd Parquet, atomically, with `metadata` in its footer."""
+    """Writes `table` as zstd Parquet, atomically, with `metadata` in its footer."""
     buffer = BytesIO()  # polars takes no path that is not UTF-8
     table.write_parquet(buffer, compression="zstd", metadata=(metadata or {}) | {SUM: NO_SUM})
     content = buffer.getvalue()
@@ -82,7 +82,7 @@ def write_parquet(path: Path, table: pl.DataFrame, metadata: dict[str, str] | No
 
 
 def _require_sum(content: bytes, path: Path) -> None:
-    """FileError for a table of ours that is not what was written.
+    """Raises FileError for a table of ours that is not what was written.
 
     Polars can end the whole process over a damaged page, so damage is found before it reads. Files
     of versions before this one have no checksum and are read as they are.
@@ -97,12 +97,12 @@ def _require_sum(content: bytes, path: Path) -> None:
 
 
 def write_csv(path: Path, table: pl.DataFrame) -> None:
-    """Write `table` as CSV, atomically."""
+    """Writes `table` as CSV, atomically."""
     write_bytes(path, table.write_csv().encode())
 
 
 def read_parquet(path: Path) -> tuple[pl.DataFrame, dict[str, str]]:
-    """The table at `path` and the metadata in its footer; FileError when it is not Parquet."""
+    """Returns the table at `path` and the metadata in its footer; FileError when it is not Parquet."""
     if not is_file(path):
         raise FileError(f"there is no file {path}")
     content = read_bytes(path, "table", PARQUET_MAX)
@@ -120,7 +120,7 @@ def read_parquet(path: Path) -> tuple[pl.DataFrame, dict[str, str]]:
 
 
 def require_columns(table: pl.DataFrame, wanted: Mapping[str, Any], path: Path) -> pl.DataFrame:
-    """The table with these columns in these types; FileError for one that is not there or another."""
+    """Returns the table with these columns in these types; FileError where one is missing or another."""
     for name, kind in wanted.items():
         if name not in table.columns:
             raise FileError(f"{path} has no column {name!r}: it is another kind of table")
@@ -130,7 +130,7 @@ def require_columns(table: pl.DataFrame, wanted: Mapping[str, Any], path: Path) 
 
 
 def output_error(path: Path, error: Exception) -> OutputError:
-    """One sentence for a person; a full disk is named as such."""
+    """Returns the OutputError for a failure to write, one sentence; a full disk is named as such."""
     number = getattr(error, "errno", None)
     full = number in FULL or any(os.strerror(n) in str(error) for n in FULL)
     if full:
@@ -139,7 +139,7 @@ def output_error(path: Path, error: Exception) -> OutputError:
 
 
 def content_hash(tables: Iterable[pl.DataFrame], text: bytes = b"") -> str:
-    """SHA-256 over schemas, canonical column values and `text` (decision X-1).
+    """Returns SHA-256 over schemas, canonical column values and `text` (decision X-1).
 
     Absent values are equal however they are stored: a null and a NaN hash alike, and so do -0.0
     and 0.0. The caller leaves out columns of wall clock, host, process and path, and sorts rows.

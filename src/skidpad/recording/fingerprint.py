@@ -28,13 +28,13 @@ class Fingerprint:
 
     @property
     def short(self) -> str:
-        """Sixteen digits that differ when anything here does."""
+        """Returns sixteen digits that differ when anything here does."""
         text = msgspec.json.encode(asdict(self), order="deterministic")
         return hashlib.sha256(text).hexdigest()[:16]
 
 
 def comparison_text(a: Collection[str], b: Collection[str]) -> str:
-    """Whether hashes of drives on these fingerprints may be compared; empty: it is not known."""
+    """Returns in words whether hashes of drives on these fingerprints may be compared; empty: not known."""
     if a and b and len({*a, *b}) == 1:
         return f"hashes may be compared: same processor features, libraries and version ({next(iter(a))})"
     places = [", ".join(sorted(side)) or "not known" for side in (a, b)]
@@ -46,7 +46,7 @@ def comparison_text(a: Collection[str], b: Collection[str]) -> str:
 
 @cache
 def fingerprint() -> Fingerprint:
-    """The fingerprint of this process."""
+    """Returns the fingerprint of this process."""
     import llvmlite.binding as llvm  # slow to load, and readers of logs do not need it
     import numba
 

@@ -31,7 +31,10 @@ MARKS = {
 
 
 def require_kind(folder: Path, *allowed: ResultKind) -> None:
-    """OutputError when `folder` is none, or holds a result of another kind than these."""
+    """Raises OutputError when `folder` is none, or holds a result of another kind than these.
+
+    A folder that does not exist passes.
+    """
     try:
         names = {entry.name for entry in folder.iterdir()}
     except FileNotFoundError:
@@ -45,7 +48,7 @@ def require_kind(folder: Path, *allowed: ResultKind) -> None:
 
 @contextmanager
 def prepare_files(folder: Path, names: Sequence[str]) -> Iterator[Path]:
-    """A place for the files of a result; they replace those in `folder` when all are complete.
+    """Yields a folder for the files of a result; they replace those in `folder` when all are complete.
 
     names: all files that such a result may have, the one that marks it last. What an earlier
     result has and this one has not goes with it. An error leaves `folder` as it was.

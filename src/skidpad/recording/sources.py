@@ -12,7 +12,10 @@ BLOCK = 2**20  # bytes
 
 
 def open_channels(path: Path, mapping: Path | None = None, truth: bool = True) -> ChannelSource:
-    """The recording at `path`; with `mapping` it is read as a ROS 2 bag."""
+    """Returns the recording at `path`; with `mapping` it is read as a ROS 2 bag.
+
+    truth: whether an MCAP file's true world is read. FileError for a folder without a mapping, or none.
+    """
     if mapping is not None:
         from skidpad.recording.formats.ros_bag import RosRecording
 
@@ -25,7 +28,7 @@ def open_channels(path: Path, mapping: Path | None = None, truth: bool = True) -
 
 
 def file_hash(path: Path) -> str:
-    """SHA-256 over the bytes of a recording: of the file, or of all files of a folder by name."""
+    """Returns SHA-256 over the bytes of a recording: of the file, or of all files of a folder by name."""
     digest = sha256()
     for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
         if not file.is_file():
@@ -41,7 +44,7 @@ def file_hash(path: Path) -> str:
 
 
 def recordings_below(folder: Path) -> list[Path]:
-    """All .mcap files below `folder`, by name; FileError when there is none."""
+    """Returns all .mcap files below `folder`, by name; FileError when there is none."""
     found = sorted(folder.rglob("*.mcap")) if folder.is_dir() else []
     if not found:
         raise FileError(f"{folder}: holds no .mcap recording")

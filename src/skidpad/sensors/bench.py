@@ -39,7 +39,7 @@ PAINTS = ((196, 34, 38), (30, 70, 160), (232, 232, 230), (44, 46, 50), (180, 184
 
 
 def convoy(map: RoadMap, travelled: float = 0.0) -> tuple[ActorTable, ActorStates]:
-    """The ego and 20 vehicles around it, `travelled` m after the map's start."""
+    """Returns the ego and 20 vehicles around it, `travelled` m after the map's start."""
     assert map.ego_start is not None, f"map {map.name} has no start for the ego"
     at = map.ego_start
     start = map.on_lane(at.road, at.lane, at.s)
@@ -76,7 +76,7 @@ def _place(map: RoadMap, ego: LanePoint, distance: float, lanes_right: int) -> L
 
 
 def run(ticks: int = TICKS, weather: str = "rain-night") -> dict[str, float]:
-    """Median CPU time in ms of each stage over single-shot ticks, kernels warm.
+    """Returns the median CPU time in ms of each stage over single-shot ticks, kernels warm.
 
     `core` is a tick that reads depth, labels and radar only; `all_images` one that reads all. The
     RGB stages come from the latter, where every picture has thrown the others out of the cache.

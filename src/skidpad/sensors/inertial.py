@@ -16,24 +16,24 @@ from skidpad.core.states import ActorStates
 
 
 def map_origin(geo_reference: str) -> tuple[float, float] | None:
-    """Latitude and longitude in deg of a map's origin, from its projection text; None without both."""
+    """Returns latitude and longitude in deg of a map's origin, as its projection text says; None without."""
     number = r"-?[0-9.]+(?:[eE][-+]?[0-9]+)?"
     found = dict(re.findall(rf"\+(lat_0|lon_0)=({number})", geo_reference))
     return (float(found["lat_0"]), float(found["lon_0"])) if len(found) == 2 else None
 
 
 def compass(pose: Pose) -> float:
-    """rad clockwise from north, [0, 2 pi); north is +y."""
+    """Returns rad clockwise from north, [0, 2 pi); north is +y."""
     return (pi / 2.0 - pose.yaw) % (2.0 * pi)
 
 
 def gnss(antenna: Pose, origin: tuple[float, float]) -> GnssFix:
-    """The fix of an antenna in the world; origin: latitude and longitude of the map's, deg."""
+    """Returns the fix of an antenna in the world; origin: latitude and longitude of the map's, deg."""
     return GnssFix(*geolocation(antenna.x, antenna.y, *origin), antenna.z)
 
 
 def imu(mount: Pose, states: ActorStates, i: int, gravity: float = G) -> ImuReading:
-    """What a unit mounted on actor i feels. gravity: m/s^2.
+    """Returns what a unit mounted on actor i feels. gravity: m/s^2.
 
     The lever arm adds its centripetal acceleration; what changes of the yaw rate would add is left
     out. The road's curvature in height is not felt either: bodies have no vertical acceleration.
@@ -48,12 +48,12 @@ def imu(mount: Pose, states: ActorStates, i: int, gravity: float = G) -> ImuRead
 
 
 def imu_at_rest(unit: Pose, gravity: float = G) -> ImuReading:
-    """What a unit feels that nothing carries. gravity: m/s^2."""
+    """Returns what a unit feels that nothing carries. gravity: m/s^2."""
     return _measure_motion(unit, np.array([0.0, 0.0, gravity]), 0.0)
 
 
 def _measure_motion(unit: Pose, force: NDArray[np.float64], rate: float) -> ImuReading:
-    """force: (3,) specific, in the world's axes; rate: rad/s about the vertical."""
+    """Returns the reading of a unit. force: (3,) specific, in the world's axes; rate: rad/s about z."""
     to_sensor = unit.rotation().T
     fx, fy, fz = (to_sensor @ force).tolist()
     wx, wy, wz = (to_sensor @ np.array([0.0, 0.0, rate])).tolist()
@@ -61,6 +61,6 @@ def _measure_motion(unit: Pose, force: NDArray[np.float64], rate: float) -> ImuR
 
 
 def speed(states: ActorStates, i: int) -> float:
-    """m/s along the body, negative in reverse."""
+    """Returns the speed of actor i in m/s along its body, negative in reverse."""
     yaw = float(states.yaw[i])
     return float(states.vx[i]) * cos(yaw) + float(states.vy[i]) * sin(yaw)

@@ -26,13 +26,16 @@ def wiper_stage(rate_mm_h: float) -> int:
 
 
 def make_rain_sensor(spec: PointSensorSpec, host: SensorHost) -> Callable[[], int]:
-    """Returns what reads the stage of the wiper."""
+    """Returns a function that gives the stage of the wiper, 0 to 3, in the run's weather."""
     del spec
     return lambda: wiper_stage(rain_rate(host.setup.weather))
 
 
 def make_thermometer(spec: PointSensorSpec, host: SensorHost) -> Callable[[], float]:
-    """Returns what reads the temperature of the air, with an error of up to 2 K."""
+    """Returns a function that gives the temperature of the air in deg C, in steps of STEP_C.
+
+    The error, up to ERROR_C to either side, is drawn once per run.
+    """
     error = stream(host.seed, f"{spec.id}/error").uniform(-ERROR_C, ERROR_C)
 
     def read() -> float:

@@ -63,7 +63,7 @@ def twelve_sensors(
     display: CaptureSize = CaptureSize.TILE,
     with_radar: bool = True,
 ) -> tuple[SensorSpec, ...]:
-    """The published suite in the published order (A-018).
+    """Returns the published suite in the published order (A-018).
 
     bumper_depth_fov_deg: 90 repeats the listing's mismatch with the labels (A-023, D-001).
     with_radar: False gives the reduced suite of the second prototype (A-038).
@@ -95,9 +95,10 @@ def _camera(m: Mounting, bumper_depth_fov_deg: float, display: CaptureSize) -> C
 def mounts_outside(
     specs: tuple[SensorSpec, ...], length: float, width: float, height: float
 ) -> list[str]:
-    """One warning per sensor mounted outside the actor's box (A-039, D-012).
+    """Returns one warning per sensor and axis along which it stands outside the actor's box (A-039, D-012).
 
-    The mirrors, roof and top view stand outside of any car on purpose: they are named all the same.
+    Sizes in m; [] where all are inside. The mirrors, roof and top view stand outside of any car on
+    purpose: they are named all the same.
     """
     warnings = []
     for spec in specs:

@@ -59,19 +59,19 @@ class SensorHost(Protocol):
 
     @property
     def seed(self) -> int:
-        """The seed of the run, for noise."""
+        """Returns the seed of the run, for noise."""
 
     @property
     def setup(self) -> Setup:
-        """Map, weather, settings and the length of a tick."""
+        """Returns map, weather, settings and the length of a tick."""
 
     @property
     def table(self) -> ActorTable:
-        """Sizes and kinds of all actors; row 0 is the ego."""
+        """Returns sizes and kinds of all actors; row 0 is the ego."""
 
     @property
     def states(self) -> ActorStates:
-        """Where all actors are in this tick, and how they move."""
+        """Returns where all actors are in this tick, and how they move."""
 
     def scene(self) -> LiveScene:
         """Returns the map's surfaces with all actors where they are now."""
@@ -117,9 +117,11 @@ class AskedSensors:
         lights: Mapping[int, LightState],
         braking: NDArray[np.bool_],
     ) -> Mapping[str, Any]:
-        """Readings of this state by id, valid until the next call (decision X-11).
+        """Returns the readings of this tick by sensor id; each is measured when it is first read.
 
-        braking: (n,) whose brake lamps are on. Eyes and channels look in every tick.
+        A first read after the next call raises BackendError (decision X-11). images: by camera id. lights:
+        by signal id. braking: (n,) whose brake lamps are on. To be called in every tick: eyes and channels
+        look in each.
         """
         self.tick, self.states, self.images = tick, states, images
         for observe in self.observers:
@@ -144,7 +146,7 @@ class AskedSensors:
 
 
 def make_camera(spec: CameraSpec, sensors: AskedSensors) -> Callable[[], CameraImage]:
-    """Returns what reads a camera's image of the tick."""
+    """Returns a function that gives the camera's image of the tick; ConfigError where none is rendered."""
 
     def image() -> CameraImage:
         if spec.id not in sensors.images:
@@ -155,7 +157,7 @@ def make_camera(spec: CameraSpec, sensors: AskedSensors) -> Callable[[], CameraI
 
 
 def make_lidar(spec: LidarSpec, sensors: AskedSensors) -> Callable[[], LidarPoints]:
-    """Returns what scans with a lidar: a simulator's own where it has one."""
+    """Returns a function that scans with a lidar: a simulator's own if it has one, else rays in the scene."""
     server = sensors.server_lidar
     if server is not None:
         return lambda: server(spec)
@@ -180,25 +182,28 @@ def make_gnss(spec: PointSensorSpec, sensors: AskedSensors) -> Callable[[], Gnss
 
 
 def make_imu(spec: PointSensorSpec, sensors: AskedSensors) -> Callable[[], ImuReading]:
-    """Returns what measures force and turn."""
+    """Returns a function that measures specific force and turn at the unit's mounting."""
     return lambda: inertial.imu(spec.mount, sensors.states, EGO)
 
 
 def make_speedometer(spec: PointSensorSpec, sensors: AskedSensors) -> Callable[[], float]:
-    """Returns what measures the speed along the body."""
+    """Returns a function that gives the ego's speed along its body in m/s, negative in reverse."""
     del spec
     return lambda: inertial.speed(sensors.states, EGO)
 
 
 def make_eyes(spec: EyesSpec, sensors: AskedSensors) -> Callable[[], DriverView]:
-    """Returns the view of a driver's eyes, which look in every tick."""
+    """Returns a function that gives what a driver's eyes see; adds them to what looks in every tick."""
     eyes = Eyes(spec, sensors.map.roadside, sensors.table, sensors.setup)
     sensors.observers.append(eyes.look)
     return eyes.view
 
 
 def make_channel(spec: ChannelSpec, sensors: AskedSensors) -> Callable[[], ChannelView]:
-    """Returns the view of a channel of its newest cycle."""
+    """Returns a function that gives what the channel measured in the first tick of its newest cycle.
+
+    Adds an observer to `sensors` that measures in that tick; no view before the first one.
+    """
     setup = sensors.setup
     suite = ChannelSuite(
         spec.id, senses_of(spec.id, spec.jumps), sensors.map.roadside, sensors.table,
@@ -223,7 +228,7 @@ class MeasuredCycles:
         lights: Mapping[int, LightState],
         braking: NDArray[np.bool_],
     ) -> None:
-        """Counts a tick of the run, and measures where it begins a cycle."""
+        """Counts a tick of the run, and measures in each that begins a cycle: every `period`-th."""
         del tick, braking
         cycle, rest = divmod(self._ticks, self._spec.period)
         self._ticks += 1

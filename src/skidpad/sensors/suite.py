@@ -79,7 +79,7 @@ class PixelSuite:
         weather: Weather,
         settings: PixelSettings = PixelSettings(),
     ) -> None:
-        """Specs that are neither camera nor radar are somebody else's."""
+        """Specs that are neither camera nor radar are ignored."""
         self.cameras = {s.id: s for s in specs if isinstance(s, CameraSpec)}
         self.settings, self._table, self._specs = settings, table, specs
         widest = max((c.width for c in self.cameras.values()), default=1)
@@ -95,13 +95,13 @@ class PixelSuite:
         self.tick = -1
 
     def change(self, outside: Outside, extras: frozenset[Extra] | None = None) -> None:
-        """Weather and headlights are others from the next observation on; extras, where given, too."""
+        """Sets weather and headlights from the next observation on; extras, where given, too."""
         if extras is not None:
             self.settings = replace(self.settings, extras=extras)
         self._look_out(outside.weather, outside.range_model, outside.beam)
 
     def _look_out(self, weather: Weather, range_model: RangeModel, beam: Beam | None) -> None:
-        """Light, sight and noise of a weather."""
+        """Sets light, sight and noise for a weather, and makes the passes, noises and radars anew."""
         settings, seed, dt = self.settings, self.settings.seed, self.settings.dt
         limited = range_model is RangeModel.PHYSICAL
         labels = label_range(weather, Beam.LOW if beam is None else beam)
@@ -141,7 +141,10 @@ class PixelSuite:
         lights: Mapping[int, LightState],
         braking: NDArray[np.bool_] | None = None,
     ) -> Observation:
-        """What the sensors see of this state. braking: (n,) whose brake lamps are lit."""
+        """Returns what the sensors see of this state; images are drawn when they are first read.
+
+        lights: by signal id. braking: (n,) whose brake lamps are lit; None: as they were.
+        """
         self.tick = tick
         self._ego = states.pose(EGO)
         self.scene.place(states, self.settings.dt)
@@ -163,7 +166,10 @@ class PixelSuite:
         return Observation(images, self._measure(tick))
 
     def render(self, id: str, rows: range | None = None) -> CameraImage:
-        """The image of one camera in the current state; with `rows`, at least those of it."""
+        """Returns the image of one camera in the current state; with `rows`, at least those of it.
+
+        Its arrays are buffers of the suite, which later calls overwrite; KeyError for an unknown camera.
+        """
         camera, one = self.cameras[id], self._pass_of[id]
         noise, seed = self.settings.perception_noise, self.settings.seed
         whole = range(camera.height)
@@ -183,7 +189,7 @@ class PixelSuite:
         return CameraImage(instances=one.instances)
 
     def _draw(self, camera: CameraSpec, view: View, one: Pass, rows: range) -> None:
-        """See to it that these rows of a pass show the present."""
+        """Draws rows of a pass unless they show the present already."""
         missing = one.missing(range(rows.start, min(rows.stop, camera.height)))
         if not missing:
             return
@@ -193,7 +199,7 @@ class PixelSuite:
         one.drawn = missing
 
     def _picture(self, id: str, view: View, one: Pass) -> CameraImage:
-        """The rows of a view as a colour image."""
+        """Returns a colour image whose rows of the view are painted, with additions and noise."""
         packed = self._rgb[id]
         self.shading.paint(view, self._ego, one.inverse, one.key, packed)
         if self.settings.extras:
@@ -205,7 +211,7 @@ class PixelSuite:
         return CameraImage(rgb=rgb, packed=packed)
 
     def snapshot(self, *ids: str) -> dict[str, NDArray[np.uint8]]:
-        """Copies (H, W, 3) of RGB views as they are now, for a file (A-257); none given: all."""
+        """Returns copies (H, W, 3) of RGB views as they are now, for a file (A-257); none given: all."""
         return {
             id: np.ascontiguousarray(rgb)
             for id in (ids or tuple(self._rgb))
@@ -235,7 +241,10 @@ class LazyImages(PartialImages):
         return self._ready[id]
 
     def rows(self, id: str, first: int, end: int) -> CameraImage:
-        """Returns an image in which at least rows first to end - 1 are drawn."""
+        """Returns an image in which at least rows first to end - 1 are drawn.
+
+        KeyError for an unknown camera, BackendError for an image of an older tick.
+        """
         if id in self._ready:
             return self._ready[id]
         self._check(id)

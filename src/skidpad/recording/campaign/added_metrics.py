@@ -30,7 +30,7 @@ def write_added_metrics(folder: Path, added: Sequence[AddedMetric]) -> None:
 
 
 def read_added_metrics(folder: Path) -> tuple[AddedMetric, ...]:
-    """Returns the metrics that packages added to a run as it was driven."""
+    """Returns the metrics that packages added to a run as it was driven; () where there are none."""
     path = folder / METRICS_FILE
     if not path.is_file():
         return ()

@@ -34,7 +34,7 @@ class CampaignFolder(Generic[E]):
 
     @cached_property
     def results(self) -> pl.DataFrame:
-        """One row per run; FileError when there are none."""
+        """Returns one row per run; FileError when there are none."""
         results = read_results(self.path)
         if not len(results):
             raise FileError(f"{self.path} holds no finished run yet")
@@ -42,38 +42,38 @@ class CampaignFolder(Generic[E]):
 
     @cached_property
     def timing(self) -> pl.DataFrame:
-        """Wall and processor time per run; columns of later versions may be missing."""
+        """Returns wall and processor time per run; columns of later versions may be missing."""
         times = read_parquet(self.path / TIMING)[0]
         known = {n: kind for n, kind in schema(Timing).items() if n in times.columns}
         return require_columns(times, known, self.path / TIMING)
 
     @cached_property
     def entries(self) -> list[E]:
-        """The last word of the ledger on each run."""
+        """Returns the newest entry of the ledger on each run, by name."""
         return latest(read_ledger(self.path, self.entry))
 
     @cached_property
     def fingerprints(self) -> list[str]:
-        """Fingerprints of the machines that drove the campaign."""
+        """Returns the fingerprints of the machines that drove the campaign, sorted."""
         return sorted(fingerprints(self.entries))
 
     @cached_property
     def configuration(self) -> dict[str, Any]:
-        """What all runs have in common."""
+        """Returns what all runs have in common."""
         return common_configuration(self.path)
 
     def names(self, *columns: str) -> dict[tuple[Any, ...], str]:
-        """Names of the runs by these columns of their keys."""
+        """Returns the names of the runs by these columns of their keys."""
         return {tuple(getattr(e.key, c) for c in columns): e.run for e in self.entries}
 
     def log(self, run: str) -> Path | None:
-        """Where the log of the run of this name lies; None when it was not kept."""
+        """Returns the folder of the log of the run of this name; None when it was not kept."""
         folder = inside(self.path / RUNS, run)
         return folder if (folder / TICKS).is_file() else None
 
 
 def last_snapshot(run: Path) -> Path | None:
-    """The last picture that was taken in a run, if there is one."""
+    """Returns the last picture that was taken in a run; None where there is none."""
 
     def when(path: Path) -> tuple[int, str]:
         t = path.stem.rpartition("_")[2]
@@ -83,5 +83,5 @@ def last_snapshot(run: Path) -> Path | None:
 
 
 def snapshot(run: Path, t: float) -> Path | None:
-    """The picture that was taken in a run at `t` s, if there is one."""
+    """Returns the picture that was taken in a run at `t` s; None where there is none."""
     return next(iter(sorted((run / SNAPSHOTS).glob(f"*_{t:07.2f}s.png"))), None)

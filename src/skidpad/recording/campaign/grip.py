@@ -71,17 +71,17 @@ COLUMNS = ("x", "y", "v", "cvip", "steer", "brake", "throttle", "npc_x", "npc_y"
 
 
 def series_path(folder: Path, cell: str, seed: int) -> Path:
-    """Where the recorded series of a run lie."""
+    """Returns the file of the recorded series of a run."""
     return inside(folder / SERIES, cell) / f"{seed:06d}.parquet"
 
 
 def write_series(path: Path, series: NDArray[np.float32]) -> None:
-    """Write the series (T, 9) of one run, atomically; columns as in COLUMNS."""
+    """Writes the series (T, 9) of one run, atomically; columns as in COLUMNS."""
     write_parquet(path, pl.DataFrame(series, schema=dict.fromkeys(COLUMNS, pl.Float32)))
 
 
 def read_series(folder: Path, run: str) -> pl.DataFrame:
-    """The series of the run of this name."""
+    """Returns the series of the run of this name; FileError for a name without a seed, or no such file."""
     cell, _, seed = run.rpartition("-")
     if not (seed.isascii() and seed.isdigit()):
         raise FileError(f"the ledger of {folder} names a run {run!r:.200}, which has no seed")
@@ -90,6 +90,6 @@ def read_series(folder: Path, run: str) -> pl.DataFrame:
 
 
 def read_stopping(folder: Path) -> pl.DataFrame:
-    """Ratio, friction and stopping distances of each weather and model; empty if not computed."""
+    """Returns ratio, friction and stopping distances of each weather and model; empty if not computed."""
     path = folder / STOPPING
     return read_parquet(path)[0] if path.is_file() else pl.DataFrame()

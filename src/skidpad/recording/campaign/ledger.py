@@ -37,7 +37,7 @@ class HasOutcome(Protocol):
 
     @property
     def outcome(self) -> str:
-        """The outcome of a run, as `core.Outcome` names it."""
+        """Returns the outcome of a run, as `core.Outcome` names it."""
         ...
 
 
@@ -106,7 +106,7 @@ class Ledger(Generic[E], AbstractContextManager["Ledger[E]"]):
             )
 
     def _heal(self) -> None:
-        """Cut off what a kill left of a line; set damaged lines aside, so that they are driven again."""
+        """Cuts off what a kill left of a line; sets damaged lines aside, so that they are driven again."""
         content = self.path.read_bytes()
         whole = content.rfind(b"\n") + 1
         if whole != len(content):
@@ -126,7 +126,10 @@ class Ledger(Generic[E], AbstractContextManager["Ledger[E]"]):
         _lock(self._file, self.folder)
 
     def append(self, entry: E) -> None:
-        """Record a finished run; when this returns, the line is on the disk."""
+        """Writes a finished run; when this returns, the line is on the disk.
+
+        OutputError where that fails; the ledger is then as before.
+        """
         line = _add_checksum(msgspec.json.encode(entry)) + b"\n"
         size = os.fstat(self._file).st_size
         try:
@@ -140,12 +143,12 @@ class Ledger(Generic[E], AbstractContextManager["Ledger[E]"]):
         self.entries.append(entry)
 
     def completed_runs(self) -> frozenset[str]:
-        """Runs that need not be driven again: all but those that crashed or timed out."""
+        """Returns the runs that need not be driven again: all but those that crashed or timed out."""
         last = latest(self.entries)
         return frozenset(e.run for e in last if Outcome(e.key.outcome) not in RETRIED)
 
     def close(self) -> None:
-        """Release the lock; safe to call twice."""
+        """Releases the lock; safe to call twice."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1
@@ -163,7 +166,10 @@ class Damage:
 
 
 def read_ledger(folder: Path, kind: type[E]) -> list[E]:
-    """All entries, oldest first. A torn last line is passed over; any other damage is a FileError."""
+    """Returns all entries, oldest first; [] without a ledger.
+
+    A torn last line is passed over; any other damage is a FileError.
+    """
     path = folder / LEDGER
     entries, damaged = _entries(path, kind)
     if damaged:
@@ -176,7 +182,7 @@ def read_ledger(folder: Path, kind: type[E]) -> list[E]:
 
 
 def _entries(path: Path, kind: type[E]) -> tuple[list[E], list[Damage]]:
-    """What can be read of a ledger, and what cannot; what follows the last newline is torn."""
+    """Returns what can be read of a ledger, and what cannot; what follows the last newline is torn."""
     try:
         lines = path.read_bytes().split(b"\n")[:-1]
     except FileNotFoundError:
@@ -202,19 +208,19 @@ def _entries(path: Path, kind: type[E]) -> tuple[list[E], list[Damage]]:
 
 
 def _add_checksum(line: bytes) -> bytes:
-    """A JSON object with a checksum as its last member, so that a flipped bit is no new value."""
+    """Returns a JSON object with a checksum as its last member, so that a flipped bit is no new value."""
     return line[:-1] + b',"sum":"%08x"}' % crc32(line)
 
 
 def _check_sum(line: bytes) -> None:
-    """ValueError for a line that is not what was written; lines of old versions have no checksum."""
+    """Raises ValueError for a line that is not what was written; lines of old versions have no checksum."""
     found = SUM.search(line)
     if found and crc32(line[: found.start()] + b"}") != int(found[1], 16):
         raise ValueError("its checksum is another")
 
 
 def latest(entries: Iterable[E]) -> list[E]:
-    """The last word on each run, in the order of their names."""
+    """Returns the newest entry on each run, in the order of their names."""
     by_run = {e.run: e for e in entries}
     return [by_run[run] for run in sorted(by_run)]
 
@@ -233,7 +239,7 @@ class FolderState(Enum):
 
 
 def folder_state(folder: Path, identity: dict[str, Any]) -> FolderState:
-    """What `folder` holds, seen from the campaign with this resolved configuration."""
+    """Returns what `folder` holds, seen from the campaign with this resolved configuration."""
     if not folder.exists():
         return FolderState.EMPTY
     if not folder.is_dir():
@@ -246,14 +252,14 @@ def folder_state(folder: Path, identity: dict[str, Any]) -> FolderState:
 
 
 def _is_rest(file: Path) -> bool:
-    """What a kill at the very beginning leaves: an empty ledger, a part of a file."""
+    """Returns whether a file is what a kill at the very beginning leaves: empty ledger, part of a file."""
     if file.name.startswith(".") and file.name.endswith(".part"):
         return True
     return file.name == LEDGER and file.is_file() and file.stat().st_size == 0
 
 
 def read_identity(folder: Path) -> dict[str, Any]:
-    """campaign.json of a folder; empty when there is none."""
+    """Returns campaign.json of a folder; {} when there is none."""
     path = folder / CAMPAIGN
     if not path.is_file():
         return {}
@@ -262,12 +268,12 @@ def read_identity(folder: Path) -> dict[str, Any]:
 
 
 def campaign_command(folder: Path) -> str:
-    """Which command wrote a campaign's folder, "adas" where it does not say."""
+    """Returns which command wrote a campaign's folder, "adas" where it does not say."""
     return str(read_identity(folder).get("command", "adas"))
 
 
 def common_configuration(folder: Path) -> dict[str, Any]:
-    """What all runs of a campaign have in common."""
+    """Returns what all runs of a campaign have in common; {} where it does not say."""
     common = read_identity(folder).get("common", {})
     if not isinstance(common, dict):
         raise FileError(f"{folder / CAMPAIGN} does not describe a campaign")
@@ -275,7 +281,7 @@ def common_configuration(folder: Path) -> dict[str, Any]:
 
 
 def encode_identity(identity: dict[str, Any]) -> bytes:
-    """Canonical text of a resolved configuration."""
+    """Returns the canonical text of a resolved configuration."""
     return msgspec.json.encode(identity, order="deterministic")
 
 

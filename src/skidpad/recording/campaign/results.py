@@ -32,7 +32,7 @@ M = TypeVar("M")
 
 
 def metric(meaning: str, source: str) -> Any:
-    """A results column: what it means, and the requirement or decision that asks for it."""
+    """Returns the field of a results column: its meaning, and which requirement or decision asks for it."""
     return field(default=None, metadata={"meaning": meaning, "source": source})
 
 
@@ -55,7 +55,7 @@ class Columns(Generic[K, M]):
     sort: tuple[str, ...]  # columns of the key that tell runs apart
 
     def table(self, rows: Iterable[tuple[K, M | None]]) -> pl.DataFrame:
-        """One row per run in canonical order; no metrics: nulls."""
+        """Returns one row per run in canonical order; no metrics: nulls."""
         flat = [_plain(self.key, key) | _plain(self.metrics, metrics) for key, metrics in rows]
         return pl.DataFrame(flat, schema=schema(self.key, self.metrics)).sort(self.sort)
 
@@ -68,9 +68,10 @@ class Columns(Generic[K, M]):
         fingerprints: Sequence[str] = (),
         added: Sequence[Sequence[AddedMetric]] = (),
     ) -> str:
-        """Write results.parquet, and timing.parquet with a line for each row; returns the hash.
+        """Writes results.parquet, and timing.parquet with a line for each row; returns the hash.
 
         fingerprints: of each row, where it was driven. added: of each row, what packages measured.
+        csv: also as CSV files.
         """
         beside = [pl.Series(FINGERPRINT, fingerprints, dtype=pl.String)] * bool(fingerprints)
         for name in dict.fromkeys(metric.name for row in added for metric in row):
@@ -92,7 +93,7 @@ class Columns(Generic[K, M]):
         return self.hash(table)
 
     def check_table(self, table: pl.DataFrame, path: Path) -> pl.DataFrame:
-        """The table with every column; FileError when it is one of another kind.
+        """Returns the table with every column; FileError when it is one of another kind.
 
         Metrics of versions that did not have them yet are null, factors their default.
         """
@@ -106,12 +107,12 @@ class Columns(Generic[K, M]):
         return require_columns(table, schema(self.key, self.metrics), path)
 
     def hash(self, table: pl.DataFrame) -> str:
-        """Content hash of results; neither the order of rows nor where they were driven matters (X-1)."""
+        """Returns the content hash (X-1) of results, whatever the order of rows and where they were run."""
         return content_hash([table.drop(FINGERPRINT, strict=False).sort(self.sort)])
 
 
 def _defaults(kind: type[Any]) -> dict[str, Any]:
-    """Returns the default values of a dataclass by field, those without left out."""
+    """Returns a dataclass's plain defaults by field; fields without one, or with a factory, are left out."""
     return {f.name: f.default for f in fields(kind) if f.default is not MISSING}
 
 
@@ -121,7 +122,7 @@ def _plain(kind: type[Any], row: Any) -> dict[str, Any]:
 
 
 def schema(*rows: type[Any]) -> dict[str, Any]:
-    """Polars types of the fields of these row classes, in order."""
+    """Returns the Polars types of the fields of these row classes, in order."""
     return {
         f.name: TYPES.get(str(f.type).split(" |")[0], pl.String)  # the others are enums of words
         for row in rows
@@ -130,7 +131,7 @@ def schema(*rows: type[Any]) -> dict[str, Any]:
 
 
 def read_results(folder: Path, columns: Columns[Any, Any] | None = None) -> pl.DataFrame:
-    """results.parquet of a campaign; FileError when there is none, or it has other columns."""
+    """Returns results.parquet of a campaign; FileError when there is none, or it has other columns."""
     if (folder / "ledger.jsonl").is_file() and not (folder / RESULTS).is_file():
         raise FileError(f"{folder} holds a campaign that is not finished: finish it with --resume")
     table = read_parquet(folder / RESULTS)[0]
@@ -138,5 +139,5 @@ def read_results(folder: Path, columns: Columns[Any, Any] | None = None) -> pl.D
 
 
 def definitions_of(rows: type[Any]) -> list[tuple[str, str, str]]:
-    """(column, meaning, source) of every metric of a class of rows."""
+    """Returns (column, meaning, source) of every metric of a class of rows."""
     return [(f.name, f.metadata["meaning"], f.metadata["source"]) for f in fields(rows)]

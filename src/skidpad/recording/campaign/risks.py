@@ -45,12 +45,12 @@ class Risk(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def template(self) -> RunSpec:
-        """The run whose values vary."""
+        """Returns the run whose values vary."""
         return run_from_plain(self.run, RISK)
 
     @property
     def assumptions(self) -> list[str]:
-        """Names of the inputs for which no source is given."""
+        """Returns the names of the inputs for which no source is given."""
         names = [v.name for v in self.space.variables if not v.source]
         rates = {"encounters per hour": self.per_hour, "encounters per 100 km": self.per_100km}
         return names + [

@@ -32,7 +32,7 @@ class Search(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def template(self) -> RunSpec:
-        """The run whose values vary."""
+        """Returns the run whose values vary."""
         return run_from_plain(self.run, SEARCH)
 
 
@@ -78,12 +78,15 @@ class Trial(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def is_avoidable(self) -> bool:
-        """Whether it is a failure that the reference driver, or braking and steering in time, avoids."""
+        """Returns whether it is a failure that the reference driver, braking or steering in time avoids."""
         return self.is_failure and (self.is_avoided_by_reference or self.bound != "")
 
     @property
     def is_avoided_by_reference(self) -> bool:
-        """Whether the reference driver touches nothing and stays on the road with the same values."""
+        """Returns whether the reference driver touches nothing and stays on the road with the same values.
+
+        False where it was not driven.
+        """
         r = self.reference
         if r is None:
             return False
@@ -91,17 +94,20 @@ class Trial(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def is_failure(self) -> bool:
-        """Whether it is a contact above 5 km/h or a departure."""
+        """Returns whether it is a contact above 5 km/h or a departure."""
         return self.margin <= 0.0 and not self.fault
 
     @property
     def is_harmless(self) -> bool:
-        """Whether it was driven and is no failure."""
+        """Returns whether it was driven and is no failure."""
         return not self.is_failure and not self.fault
 
     @property
     def kind(self) -> str:
-        """What failed in a few words, such as "front into lead"; failures of one kind are a group."""
+        """Returns what failed in a few words, such as "front into lead"; failures of one kind are a group.
+
+        "no failure" where nothing did.
+        """
         if not self.is_failure:
             return "no failure"
         if not self.other:

@@ -36,7 +36,7 @@ def message_from_frame(frame: ChannelFrame) -> pb.Channel:
 
 
 def frame_from_message(message: pb.Channel) -> ChannelFrame:
-    """The frame in `message`; FileError when its arrays do not fit together."""
+    """Returns the frame in `message`; FileError when its arrays do not fit together."""
     n = _rows("objects", len(message.objects), 5)
     p = len(message.prediction_t)
     size, polygons = _split_polygons(message.polygon_size, message.polygons, n)
@@ -75,7 +75,7 @@ def message_from_truth(truth: TruthFrame) -> pb.Truth:
 
 
 def truth_from_message(message: pb.Truth) -> TruthFrame:
-    """The true world in `message`; FileError when its arrays do not fit together."""
+    """Returns the true world in `message`; FileError when its arrays do not fit together."""
     n = _rows("actors", len(message.actors), 5)
     size, polygons = _split_polygons(message.polygon_size, message.polygons, n)
     mu = _floats(message.mu)
@@ -116,12 +116,12 @@ def message_from_context(context: Context) -> pb.Context:
 
 
 def context_from_message(message: pb.Context) -> Context:
-    """The context in `message`; a map on the wire has no order of its own."""
+    """Returns the context in `message`, sorted: a map on the wire has no order of its own."""
     return Context(message.t, dict(sorted(message.entries.items())))
 
 
 def padded_polygons(shapes: Iterable[Floats]) -> tuple[NDArray[np.int64], Floats]:
-    """Sizes (n,) and polygons (n, k, 2) padded with NaN, from shapes of (k_i, 2)."""
+    """Returns sizes (n,) and polygons (n, k, 2) padded with NaN, from shapes of (k_i, 2)."""
     rows = list(shapes)
     size = np.array([len(shape) for shape in rows], dtype=np.int64)
     polygons = np.full((len(rows), int(size.max(initial=0)), 2), np.nan)

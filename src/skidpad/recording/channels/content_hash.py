@@ -11,7 +11,7 @@ from skidpad.recording.channels.mcap_files import McapRecording
 
 
 def recording_hash(path: Path) -> str:
-    """SHA-256 over all messages in order: channel, type and canonical values."""
+    """Returns SHA-256 over all messages in order: channel, type and canonical values."""
     recording = McapRecording(path)
     digest = hashlib.sha256(repr(recording.channels).encode())
     for message in recording.messages():
@@ -23,7 +23,7 @@ def recording_hash(path: Path) -> str:
 
 
 def _canonical(value: object) -> bytes:
-    """Bytes of a value with -0.0 and NaN normalised."""
+    """Returns the bytes of a value with -0.0 and NaN normalised."""
     if isinstance(value, dict):
         return repr(sorted(value.items())).encode()
     if isinstance(value, str):

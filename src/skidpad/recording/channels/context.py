@@ -7,7 +7,7 @@ from skidpad.recording.channels.mcap_files import ChannelSource
 
 
 def context_of(source: ChannelSource) -> dict[str, str]:
-    """All words of the recording; of those said twice the later ones."""
+    """Returns all words of the recording; of those said twice the later ones."""
     words: dict[str, str] = {}
     for message in source.messages():
         if isinstance(message.item, Context):

@@ -34,7 +34,11 @@ class _Clock:
         self.t: float | None = None  # newest accepted time over all senders
 
     def accept(self, message: Message) -> bool:
-        """Whether `message` counts; counts it as a loss if not."""
+        """Takes in a message and moves time on; returns False, with a loss counted, where it does not count.
+
+        It does not when its time is malformed, older than its sender's newest, or more than MAX_GAP ahead
+        of all; the next of its sender within MAX_GAP confirms such a jump.
+        """
         if not abs(message.t) < TIME_MAX:  # also NaN
             self.losses.malformed += 1
             return False
@@ -63,7 +67,7 @@ class _Clock:
 
 
 def cycles(source: ChannelSource) -> Iterator[Cycle]:
-    """The cycles of a recording: grid times from its first message to its last.
+    """Yields the cycles of a recording: grid times from its first message to its last.
 
     A stretch of more than MAX_GAP without any message is left out; k keeps counting the grid. A live
     source says with `Due` that a cycle is complete, which then need not wait for the next message.
@@ -100,7 +104,7 @@ def cycles(source: ChannelSource) -> Iterator[Cycle]:
 
 
 def _last_before(t: float, t_first: float) -> int:
-    """Number of the last grid time before `t`; -1 when there is none."""
+    """Returns the number of the last grid time before `t` s; -1 when there is none."""
     return floor((t - t_first - SAME_TIME) / STEP)
 
 
@@ -125,7 +129,7 @@ class _State:
             self.driving = self.channels.index(item.driving)
 
     def cycle(self, k: int, t: float) -> Cycle:
-        """Returns cycle `k` at `t` s; frames and truth older than MAX_AGE are None."""
+        """Returns cycle `k` at `t` s; frames and truth older than MAX_AGE are None, and counted as stale."""
         fresh = []
         for name, frame in zip(self.channels, self.frames, strict=True):
             if frame is not None and t - frame.t > MAX_AGE + SAME_TIME:

@@ -27,7 +27,7 @@ class Ending(str, Enum):
 
 
 def column(meaning: str, source: str) -> Any:
-    """A results column that every driven segment has."""
+    """Returns the field of a results column that every driven segment has."""
     return field(metadata={"meaning": meaning, "source": source})
 
 
@@ -97,11 +97,11 @@ def read_record(path: Path) -> DriveRecord | None:
 
 
 def read_records(folders: Iterable[Path]) -> list[DriveRecord]:
-    """All finished segments below the folders, in order of their paths."""
+    """Returns the records of all finished segments below the folders, in order of their paths."""
     found = (read_record(p) for folder in folders for p in sorted(folder.rglob("*.json")))
     return [record for record in found if record is not None]
 
 
 def read_outcomes(folders: Iterable[Path]) -> list[DriveOutcome]:
-    """The outcomes of all finished segments below the folders, in order of their paths."""
+    """Returns the outcomes of all finished segments below the folders, in order of their paths."""
     return [record.outcome for record in read_records(folders)]

@@ -47,13 +47,13 @@ class IndicatorLog:
         self._rows: list[Floats] = []
 
     def add(self, k: int, t: float, values: Floats) -> None:
-        """Values (len(columns),) of cycle k at `t` s."""
+        """Adds the values (len(columns),) of cycle k at `t` s."""
         self._k.append(k)
         self._t.append(t)
         self._rows.append(values)
 
     def table(self) -> pl.DataFrame:
-        """Long form, by cycle and then in the order of the columns."""
+        """Returns the rows in long form, by cycle and then in the order of the columns."""
         n, m = len(self._k), len(self.columns)
         values = np.array(self._rows, dtype=np.float64).reshape(n, m)
         low = np.array([_threshold_in(c, upper=False) for c in self.columns])
@@ -74,12 +74,12 @@ class IndicatorLog:
         )
 
     def write(self, folder: Path) -> None:
-        """Write the table into `folder`."""
+        """Writes the table into `folder`."""
         write_parquet(folder / FILE, self.table())
 
 
 def read_indicators(folder: Path) -> pl.DataFrame:
-    """The table in a monitor's output folder."""
+    """Returns the table in a monitor's output folder."""
     return require_columns(read_parquet(folder / FILE)[0], TYPES, folder / FILE)
 
 

@@ -58,7 +58,7 @@ class Losses:
     )  # cycles without a fresh message, by channel
 
     def any(self) -> bool:
-        """Whether anything at all was lost."""
+        """Returns whether anything was lost; messages of foreign topics are no loss."""
         return self.cut or bool(
             self.chunks or self.malformed or self.out_of_order or self.jumps or self.stale
         )
@@ -69,16 +69,16 @@ class ChannelSource(Protocol):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Names of the driving channels."""
+        """Returns the names of the driving channels."""
         ...
 
     @property
     def losses(self) -> Losses:
-        """What could not be read; complete once all messages have been."""
+        """Returns what could not be read; complete once all messages have been."""
         ...
 
     def messages(self) -> Iterator[Message]:
-        """All messages, oldest first as far as the recording is in order."""
+        """Yields all messages, oldest first as far as the recording is in order."""
         ...
 
 
@@ -128,7 +128,7 @@ class ChannelWriter(AbstractContextManager["ChannelWriter"]):
         return int(self._writer.register_channel(topic, "protobuf", schema))
 
     def add(self, item: Item, channel: int | None = None) -> None:
-        """Append any item; a frame with the index of the channel that said it."""
+        """Appends any item; a frame with the index of the channel that said it."""
         if isinstance(item, ChannelFrame):
             assert channel is not None
             self.write(self.channels[channel], item)
@@ -166,7 +166,7 @@ class ChannelWriter(AbstractContextManager["ChannelWriter"]):
             self._flushed_at = t
 
     def close(self) -> None:
-        """Finish the file; safe to call twice."""
+        """Finishes the file; safe to call twice."""
         if not self._file.closed:
             self._writer.finish()  # type: ignore[no-untyped-call]
             self._file.close()
@@ -200,7 +200,7 @@ class McapRecording:
         self.channels = tuple(name.removeprefix(CHANNEL_TOPIC) for name in names)
 
     def messages(self) -> Iterator[Message]:
-        """All messages; `losses` is complete once they have been read."""
+        """Yields all messages; `losses` begins anew and is complete once they have been read."""
         self.losses = Losses()
         index = {CHANNEL_TOPIC + name: i for i, name in enumerate(self.channels)}
         for topic, schema, record in self._records(self.losses):
@@ -234,7 +234,7 @@ class McapRecording:
         return tuple(TopicInfo(topic, *seen[topic]) for topic in self._order_channels(list(seen)))
 
     def _order_channels(self, topics: list[str]) -> list[str]:
-        """Channels in the order of the writer's metadata where it survives, then by name."""
+        """Returns the topics, channels in the order of the writer's metadata if it survives, then by name."""
         rank = {CHANNEL_TOPIC + name: i for i, name in enumerate(self._declared)}
         return sorted(topics, key=lambda topic: (rank.get(topic, len(rank)), topic))
 
@@ -281,7 +281,7 @@ class McapRecording:
 
 
 def _open_chunk(record: Any, losses: Losses) -> Sequence[Any]:
-    """The records inside a chunk, or the record itself; a damaged chunk is counted and empty."""
+    """Returns the records inside a chunk, or the record itself; a damaged chunk is counted and empty."""
     if not isinstance(record, mcap.records.Chunk):
         return (record,)
     try:

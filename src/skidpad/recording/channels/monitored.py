@@ -19,12 +19,12 @@ MOST = 1e9  # of cycles, and of ms in one: 12 days
 
 
 def write_summary(folder: Path, summary: dict[str, Any]) -> None:
-    """Write the summary of a drive."""
+    """Writes the summary of a drive."""
     write_bytes(folder / SUMMARY, json.dumps(summary, indent=1, allow_nan=False).encode())
 
 
 def read_summary(folder: Path) -> dict[str, Any]:
-    """The summary in a monitor's output folder."""
+    """Returns the summary in a monitor's output folder; FileError without one."""
     path = folder / SUMMARY
     data = read_bytes(path, "`skidpad monitor` writes the summary")
     summary: dict[str, Any] = decode_json(data, str(path), dict[str, Any])
@@ -32,12 +32,12 @@ def read_summary(folder: Path) -> dict[str, Any]:
 
 
 def write_timing(folder: Path, times: pl.DataFrame) -> None:
-    """Write the times of a drive's cycles."""
+    """Writes the times of a drive's cycles."""
     write_parquet(folder / TIMING, times)
 
 
 def read_timing(folder: Path, columns: Mapping[str, Any]) -> pl.DataFrame | None:
-    """The times of a drive's cycles; None where none was measured.
+    """Returns the times of a drive's cycles; None where none was measured.
 
     columns: Polars types of those that are asked for. FileError when one of them is missing, of another
     type or holds what is no time, and for cycles out of order.

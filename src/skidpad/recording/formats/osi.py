@@ -73,10 +73,10 @@ class Tilting(Protocol):
 
 
 def write_osi(file: Path, log: RunLog, world: World | None = None) -> int:
-    """Write the trace; the number of messages, one per moment of the log.
+    """Writes the trace and returns the number of messages, one per moment of the log.
 
-    MissingExtra without it. ConfigError for a name without `.osi`, by which readers know the format.
-    InputError for a log without a moment.
+    MissingExtra without the extra. ConfigError for a name without `.osi`, by which readers know the
+    format. InputError for a log without a moment.
     """
     if file.suffix != ".osi":
         raise ConfigError(f"--osi takes a file that ends in .osi, got {file}")
@@ -88,7 +88,7 @@ def write_osi(file: Path, log: RunLog, world: World | None = None) -> int:
 
 
 def send_run(address: tuple[str, int], log: RunLog, world: World | None = None) -> int:
-    """Send a run as UDP datagrams at the pace of its times; returns the number of messages."""
+    """Sends a run as UDP datagrams at the pace of its times; returns the number of messages."""
     rows = zip(log.t.tolist(), moments(log, world or World()), strict=True)
     return send_osi(address, ((t, truth.SerializeToString()) for t, truth in rows))
 
@@ -126,7 +126,7 @@ def library() -> Any:
 
 
 def _still(osi3: Any, world: World) -> GroundTruth:
-    """What holds for the whole run."""
+    """Returns a message with what holds for the whole run."""
     truth: GroundTruth = osi3.osi_groundtruth_pb2.GroundTruth()
     options = osi3.osi_version_pb2.DESCRIPTOR.GetOptions()
     truth.version.CopyFrom(options.Extensions[osi3.osi_version_pb2.current_interface_version])
@@ -175,7 +175,7 @@ def _write_actor(object: Any, log: RunLog, k: int, i: int, tilt: Tilting | None)
 
 
 def _light(truth: GroundTruth, signal: int, state: LightState, head: Pose) -> None:
-    """A traffic light, a message for each bulb; x is the way that it looks."""
+    """Adds a traffic light to the message, an entry for each bulb; x is the way that it looks."""
     for n, (colour, lit, below) in enumerate(BULBS):
         bulb = truth.traffic_light.add()
         bulb.id.value = FIRST_BULB + len(BULBS) * signal + n
@@ -199,7 +199,7 @@ class _Lamps:
         self.states: dict[int, LightState] = {}
 
     def at(self, tick: int) -> Mapping[int, LightState]:
-        """Returns the states of lamps by signal id."""
+        """Returns the states of lamps by signal id; ticks must not fall from call to call."""
         while self.done < len(self.changes) and self.changes[self.done].tick <= tick:
             change = self.changes[self.done]
             self.states[change.signal] = change.state

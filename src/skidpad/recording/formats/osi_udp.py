@@ -49,7 +49,7 @@ def send_osi(
     messages: Iterable[tuple[float, bytes]],
     wait: Callable[[float], None] = time.sleep,
 ) -> int:
-    """Send messages at their times, s from the first; returns how many were sent."""
+    """Sends messages at their times, s from the first; returns how many were sent."""
     family = socket.AF_INET6 if ":" in address[0] else socket.AF_INET
     count, begin, first = 0, time.monotonic(), 0.0
     with socket.socket(family, socket.SOCK_DGRAM) as out:

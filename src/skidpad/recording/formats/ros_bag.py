@@ -102,7 +102,7 @@ class Mapping(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def load_mapping(path: Path) -> Mapping:
-    """Read and check a mapping file."""
+    """Returns the mapping in a file; ConfigError where it names no channels or does not fit."""
     mapping: Mapping = decode_yaml(read_bytes(path, "mapping"), str(path), Mapping)
     if not mapping.channels:
         raise ConfigError(f"{path}: names no channels")
@@ -123,7 +123,10 @@ class _Assembler:
         self.shape = corners * (half_l, half_w) + (offset, 0.0)
 
     def frame(self, t: float, odometry: Any) -> ChannelFrame | None:
-        """The channel's frame at an odometry message; None while its objects are not fresh."""
+        """Returns the channel's frame at an odometry message at t s; None while its objects are not fresh.
+
+        None, too, less than EVERY after the frame before.
+        """
         if t - self.last < EVERY - 1e-6 and t >= self.last:
             return None
         ego = _ego(odometry)
@@ -172,7 +175,7 @@ class RosFrames:
         self.roles = _roles(mapping)
 
     def take(self, topic: str, t: float, content: Any, kind: str) -> Iterator[Message]:
-        """Frames that a message of type `kind` at t s completes; ValueError and the like if odd."""
+        """Yields the frames that a message of type `kind` at t s completes; raises ValueError etc. if odd."""
         for c, role in self.roles[topic]:
             one = self.assemblers[c]
             if role == "objects":
@@ -227,7 +230,7 @@ class RosRecording:
             ) from error
 
     def messages(self) -> Iterator[Message]:
-        """Frames of all channels in the order of arrival of their ego poses."""
+        """Yields the frames of all channels in the order of arrival of their ego poses."""
         self.losses = Losses()
         frames = RosFrames(self.mapping)
         with self._reader() as reader:
@@ -277,13 +280,13 @@ def _roles(mapping: Mapping) -> dict[str, list[tuple[int, str]]]:
 
 
 def stamp_of(content: Any) -> float:
-    """Time in s of a message's header."""
+    """Returns the time in s of a message's header."""
     stamp = content.header.stamp
     return float(stamp.sec + stamp.nanosec / NS)
 
 
 def _ego(odometry: Any) -> Floats:
-    """State from Odometry, whose twist is in the body's frame."""
+    """Returns the state (5,) from Odometry, whose twist is in the body's frame."""
     p, q, v = (
         odometry.pose.pose.position,
         odometry.pose.pose.orientation,
@@ -295,7 +298,7 @@ def _ego(odometry: Any) -> Floats:
 
 
 def _plan(content: Any, topic: PlanTopic) -> Floats:
-    """Rows x, y, t from the message's stamp."""
+    """Returns rows x, y, t from the message's stamp, in m and s."""
     if hasattr(content, "points"):
         rows = [
             (

@@ -37,7 +37,7 @@ class RosObjects(NamedTuple):
     classes: Ints  # (n,)
 
     def to_world(self, ego: Floats) -> RosObjects:
-        """The objects in the world, given in the frame of `ego` (5,)."""
+        """Returns the objects in the world, given in the frame of `ego` (5,)."""
         c, s = cos(ego[2]), sin(ego[2])
         turn = np.array([[c, s], [-s, c]])
         states = self.states.copy()
@@ -88,7 +88,7 @@ def _table(rows: list[_Row]) -> RosObjects:
 
 
 def yaw_of(q: Any) -> float:
-    """Heading in rad of a quaternion."""
+    """Returns the heading in rad of a quaternion."""
     return atan2(2.0 * (q.w * q.z + q.x * q.y), 1.0 - 2.0 * (q.y * q.y + q.z * q.z))
 
 
@@ -99,7 +99,7 @@ def _box(length: float, width: float) -> Floats:
 
 
 def _autoware(content: Any) -> RosObjects:
-    """autoware_perception_msgs/PredictedObjects; twists are in the objects' own frames."""
+    """Returns the objects of autoware PredictedObjects; twists are in the objects' own frames."""
     rows = []
     for o in content.objects:
         k = o.kinematics
@@ -132,7 +132,7 @@ def _autoware(content: Any) -> RosObjects:
 
 
 def _read_derived_objects(content: Any) -> RosObjects:
-    """derived_object_msgs/ObjectArray: no predictions, twists in the frame of the poses."""
+    """Returns the objects of derived_object_msgs/ObjectArray: no predictions, twists as the poses."""
     rows = []
     for o in content.objects:
         size = list(o.shape.dimensions)

@@ -83,7 +83,7 @@ class HazardWriter(AbstractContextManager["HazardWriter"]):
         self._index.flush()
 
     def close(self) -> None:
-        """Finish both files; safe to call twice."""
+        """Finishes both files; safe to call twice."""
         self._text.close()
         self._index.close()
 
@@ -92,7 +92,7 @@ class HazardWriter(AbstractContextManager["HazardWriter"]):
 
 
 def index_row(record: HazardRecord) -> dict[str, Any]:
-    """The record without its worlds, for JSON."""
+    """Returns the record without its worlds, for JSON."""
     return {
         "id": record.id,
         "type": record.type.value,
@@ -114,14 +114,14 @@ def index_row(record: HazardRecord) -> dict[str, Any]:
 
 
 def encode_record(record: HazardRecord) -> str:
-    """The record as lines of text: its index, its worlds, and an end mark."""
+    """Returns the record as lines of text: its index, its worlds, and an end mark."""
     head = json.dumps(index_row(record), allow_nan=False)
     lines = ["H " + head, *encode_worlds(record.worlds, len(record.channels)), "Z"]
     return "\n".join(lines) + "\n"
 
 
 def decode_record(text: str) -> HazardRecord:
-    """Inverse of `encode_record`, in its resolution of 1 cm, 1 mrad and 1 ms."""
+    """Returns the record of a text of `encode_record`, to 1 cm, 1 mrad and 1 ms; FileError for others."""
     lines = text.split("\n")
     if len(lines) < 3 or not lines[0].startswith("H ") or lines[-2:] != ["Z", ""]:
         raise FileError("a hazard record must run from a line H to a line Z")
@@ -178,7 +178,7 @@ def _optional_int(value: Any) -> int | None:
 
 
 def read_hazards(folder: Path) -> Iterator[HazardRecord]:
-    """The records of a monitor's output folder; a record cut off at the end is left out.
+    """Yields the records of a monitor's output folder; a record cut off at the end is left out.
 
     FileError when there is no record file, or when it is damaged before its end.
     """
@@ -217,7 +217,7 @@ def _records(stream: Iterator[str]) -> Iterator[HazardRecord]:
 
 
 def read_index(folder: Path) -> list[dict[str, Any]]:
-    """The rows of the index file."""
+    """Returns the rows of the index file; FileError names a line that is damaged."""
     path = folder / INDEX_FILE
     lines = read_bytes(path, "`skidpad monitor` writes the index", INDEX_LIMIT).splitlines()
     rows = []

@@ -28,6 +28,6 @@ def read_searches(folder: Path) -> Searches:
 
 
 def add_search(folder: Path, id: str, sentences: Sequence[str]) -> None:
-    """Add what a search around a hazard came to; it replaces an earlier one."""
+    """Writes what a search around a hazard came to into the folder's file; it replaces an earlier one."""
     found = read_searches(folder) | {id: tuple(sentences)}
     write_bytes(folder / SEARCHES, msgspec.json.format(msgspec.json.encode(found)))

@@ -148,7 +148,7 @@ def _encode_paths(c: int, channel: Channel, frame: ChannelFrame, slots: list[int
 
 
 def _assign_slots(channel: Channel, frame: ChannelFrame) -> list[int]:
-    """A slot per object: its identity's, else the nearest free known one within 3 m, else new."""
+    """Returns a slot per object: its identity's, else the nearest free known one within 3 m, else new."""
     free = dict(channel.slots)
     slots = []
     poses = _poses(frame.objects)
@@ -188,13 +188,13 @@ def _scale_to_integer(value: float, scale: int) -> int | None:
 
 
 def _poses(rows: Floats) -> list[Pose]:
-    """States (n, 5) as whole numbers."""
+    """Returns states (n, 5) as whole numbers of cm, mrad and cm/s."""
     flat = _flat(rows * _POSE_SCALE, 1)
     return [flat[i : i + 5] for i in range(0, len(flat), 5)]
 
 
 def _flat(table: Floats, scale: int) -> Numbers:
-    """All numbers of a table as whole numbers, row by row."""
+    """Returns all numbers of a table times the scale as whole numbers, row by row."""
     scaled = table.ravel() * scale
     if np.all(np.abs(scaled) < NUMBER_LIMIT):  # also false for NaN
         whole: Numbers = np.rint(scaled).astype(np.int64).tolist()
@@ -203,7 +203,7 @@ def _flat(table: Floats, scale: int) -> Numbers:
 
 
 def _shapes(frame: ChannelFrame) -> list[Numbers]:
-    """The vertices of each object's shape as whole numbers of cm."""
+    """Returns the vertices of each object's shape as whole numbers of cm."""
     n, k, _ = frame.polygons.shape
     if np.all(frame.polygon_size == k):  # the common case: nothing is padded
         flat = _flat(frame.polygons, 100)
@@ -235,7 +235,7 @@ def _differences(values: Numbers, base: Numbers) -> Numbers:
 
 
 def _curvature(values: Numbers, before: int | None = None) -> Numbers:
-    """Differences of differences; the first value is relative to `before`."""
+    """Returns differences of differences; the first value is relative to `before`."""
     out: Numbers = []
     last, step = before or 0, 0
     for i, v in enumerate(values):

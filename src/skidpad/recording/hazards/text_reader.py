@@ -19,7 +19,7 @@ ID_LIMIT = 2**63  # identities are the largest numbers of the format
 
 
 def decode_worlds(lines: Iterable[str], n_channels: int) -> tuple[Cycle, ...]:
-    """Inverse of `encode_worlds`; FileError names the line that cannot be read."""
+    """Returns the worlds of lines of `encode_worlds`; FileError names the line that cannot be read."""
     decoder = _Decoder(n_channels)
     for number, line in enumerate(lines, start=2):
         try:
@@ -187,7 +187,7 @@ def _sums(values: Numbers, base: Numbers) -> Numbers:
 
 
 def _sum_differences(values: Numbers, before: int | None = None) -> Numbers:
-    """Inverse of `_curvature`."""
+    """Returns the values whose `_curvature` these are."""
     out: Numbers = []
     last, step = before or 0, 0
     for i, v in enumerate(values):

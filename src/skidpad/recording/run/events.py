@@ -103,13 +103,13 @@ NAMES = {kind: name for name, kind in KINDS.items()}
 
 
 def encode_events(events: Iterable[Event]) -> bytes:
-    """One line per event, in the order given."""
+    """Returns one JSON line per event, in the order given."""
     lines = [msgspec.json.encode({"event": NAMES[type(e)], **_plain(e)}) for e in events]
     return b"".join(line + b"\n" for line in lines)
 
 
 def decode_events(text: bytes, name: str = "events.jsonl") -> tuple[Event, ...]:
-    """The inverse; FileError names the line that cannot be read."""
+    """Returns the events of lines of `encode_events`; FileError names the line that cannot be read."""
     events: list[Event] = []
     for number, line in enumerate(text.splitlines(), start=1):
         try:

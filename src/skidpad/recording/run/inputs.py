@@ -21,18 +21,21 @@ class _Line(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def encode_inputs(inputs: Iterable[Timed]) -> bytes:
-    """One line per input, in the order given."""
+    """Returns one JSON line per input, in the order given."""
     lines = (msgspec.json.encode(_Line(i.tick, i.input), order="deterministic") for i in inputs)
     return b"".join(line + b"\n" for line in lines)
 
 
 def inputs_hash(text: bytes) -> str:
-    """What `RunSpec.inputs` says of a file of inputs; "" for none."""
+    """Returns what `RunSpec.inputs` says of a file of inputs; "" for none."""
     return hashlib.sha256(text).hexdigest() if text else ""
 
 
 def read_inputs(folder: Path, wanted: str) -> tuple[Timed, ...]:
-    """The inputs of a run. wanted: `RunSpec.inputs`, "": none; FileError when the file is another."""
+    """Returns the inputs of a run; FileError when the file is missing or another.
+
+    wanted: `RunSpec.inputs`; "": none were given, and () is returned.
+    """
     if not wanted:
         return ()
     path = folder / INPUTS
@@ -46,7 +49,7 @@ def read_inputs(folder: Path, wanted: str) -> tuple[Timed, ...]:
 
 
 def decode_inputs(text: bytes, name: str = INPUTS) -> tuple[Timed, ...]:
-    """The inverse of `encode_inputs`; FileError names the line that cannot be read."""
+    """Returns the inputs of lines of `encode_inputs`; FileError names the line that cannot be read."""
     inputs: list[Timed] = []
     for number, line in enumerate(text.splitlines(), start=1):
         try:

@@ -123,56 +123,56 @@ class RunLog:
 
     @property
     def t(self) -> Floats:
-        """(T,) s of simulated time."""
+        """Returns (T,) s of simulated time."""
         return np.asarray(self.tick * self.header.dt, dtype=np.float64)
 
     @property
     def v_ego(self) -> Floats:
-        """(T,) m/s, true speed of the ego over ground."""
+        """Returns (T,) m/s, the true speed of the ego over ground."""
         v: Floats = np.hypot(self.actors.vx[:, 0], self.actors.vy[:, 0]).astype(np.float64)
         return v
 
     @property
     def contacts(self) -> tuple[ContactEvent, ...]:
-        """Contacts of the ego in order of time."""
+        """Returns the contacts of the ego in order of time."""
         return tuple(e for e in self.events if isinstance(e, ContactEvent))
 
     @property
     def background(self) -> tuple[TrafficContact, ...]:
-        """Contacts among background vehicles in order of time."""
+        """Returns the contacts among background vehicles in order of time."""
         return tuple(e for e in self.events if isinstance(e, TrafficContact))
 
     @property
     def put_back(self) -> tuple[PutBack, ...]:
-        """Vehicles of the background that were put elsewhere."""
+        """Returns the vehicles of the background that were put elsewhere."""
         return tuple(e for e in self.events if isinstance(e, PutBack))
 
     @property
     def moved_on(self) -> tuple[MovedOn, ...]:
-        """Vehicles of the background that were moved from afar to near the ego."""
+        """Returns the vehicles of the background that were moved from afar to near the ego."""
         return tuple(e for e in self.events if isinstance(e, MovedOn))
 
     @property
     def roll_overs(self) -> tuple[RolledOver, ...]:
-        """Vehicles, the ego too, that came to lie on their side."""
+        """Returns the vehicles, the ego too, that came to lie on their side."""
         return tuple(e for e in self.events if isinstance(e, RolledOver))
 
     @property
     def invasions(self) -> tuple[LaneInvasion, ...]:
-        """Markings that the ego's outline crossed."""
+        """Returns the markings that the ego's outline crossed."""
         return tuple(e for e in self.events if isinstance(e, LaneInvasion))
 
     @property
     def relocations(self) -> tuple[Relocation, ...]:
-        """Moves of the ego by the supervisor."""
+        """Returns the moves of the ego by the supervisor."""
         return tuple(e for e in self.events if isinstance(e, Relocation))
 
     @property
     def lights(self) -> tuple[LightChange, ...]:
-        """Changes of traffic lights in order of time."""
+        """Returns the changes of traffic lights in order of time."""
         return tuple(e for e in self.events if isinstance(e, LightChange))
 
     @property
     def notices(self) -> tuple[Notice, ...]:
-        """What stack, supervisor and traffic had to say."""
+        """Returns what stack, supervisor, traffic and scenario had to say."""
         return tuple(e for e in self.events if isinstance(e, Notice))

@@ -58,7 +58,7 @@ S = TypeVar("S", EgoSeries, CommandSeries, ReportSeries)
 
 
 def tick_table(log: RunLog) -> pl.DataFrame:
-    """One row per tick: scalars typed and null where absent, actors as arrays of n numbers."""
+    """Returns one row per tick: scalars typed and null where absent, actors as arrays of n numbers."""
     columns: dict[str, Any] = {
         "tick": log.tick,
         "supervision": log.supervision.astype(np.uint8),
@@ -86,7 +86,7 @@ def _kind(name: str) -> type[pl.Boolean | pl.Int32 | pl.Float64]:
 
 
 def log_hash(log: RunLog) -> str:
-    """Content hash of a drive (decision X-1): equal for equal drives, wherever they were driven.
+    """Returns the content hash of a drive (decision X-1): equal for equal drives, wherever driven.
 
     Labels (`about`, weather slugs) are left out, so that cells which weather cannot touch are
     recognised by equal hashes (decision M-1).
@@ -104,7 +104,7 @@ def _hash(log: RunLog, table: pl.DataFrame) -> str:
 
 
 def write_log(folder: Path, log: RunLog) -> str:
-    """Write ticks.parquet and events.jsonl into `folder`, each atomically; returns the hash."""
+    """Writes ticks.parquet and events.jsonl into `folder`, each atomically; returns the hash."""
     head = msgspec.json.encode(_describe_log(log), order="deterministic")
     table = tick_table(log)
     write_bytes(folder / EVENTS, encode_events(log.events))
@@ -113,7 +113,7 @@ def write_log(folder: Path, log: RunLog) -> str:
 
 
 def driven_on(folder: Path) -> str | None:
-    """Fingerprint of the process that wrote the log in `folder`; None: it is not known."""
+    """Returns the fingerprint of the process that wrote the log in `folder`; None: it is not known."""
     return read_parquet(folder / TICKS)[1].get(PLACE)
 
 
@@ -139,7 +139,7 @@ class _Kept(msgspec.Struct, frozen=True):
 
 
 def read_log(folder: Path) -> RunLog:
-    """The log in `folder`; FileError names what is missing or not a log."""
+    """Returns the log in `folder`; FileError names what is missing or not a log."""
     table, metadata = read_parquet(folder / TICKS)
     where = str(folder / TICKS)
     if KEY not in metadata:
@@ -256,14 +256,14 @@ WORDS: dict[str, type[IntEnum]] = {  # fields of the stack's report that are num
 
 
 def require_sound(log: RunLog) -> None:
-    """ValueError that says what of a log cannot be."""
+    """Raises ValueError that says what of a log cannot be."""
     _require_indices(log)
     _require_numbers(log)
     _require_words(log)
 
 
 def _require_indices(log: RunLog) -> None:
-    """ValueError unless ticks rise and what counts something points into it."""
+    """Raises ValueError unless ticks rise and all indices point to something."""
     n = len(log.table)
     if (np.diff(log.tick) <= 0).any() or (log.tick < 0).any():
         raise ValueError("ticks must rise")
@@ -288,7 +288,7 @@ def _require_numbers(log: RunLog) -> None:
 
 
 def _require_words(log: RunLog) -> None:
-    """ValueError for a number that stands for no word."""
+    """Raises ValueError for a number of the stack's report that stands for no word."""
     for name, words in WORDS.items():
         values = getattr(log.report, name)
         if not np.isin(values[~np.isnan(values)], list(words)).all():

@@ -44,7 +44,7 @@ class Staging(Struct, frozen=True, kw_only=True):
 
     @property
     def missing(self) -> list[StagedEvent]:
-        """Events of the interaction that never began."""
+        """Returns the events of the interaction that never began."""
         return [e for e in self.events if e.began is None and not e.on_contact]
 
 

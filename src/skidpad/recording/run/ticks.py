@@ -98,7 +98,7 @@ class TickLog:
         report: StackReport | None,
         supervision: Supervision = Supervision.NONE,
     ) -> None:
-        """Record one moment: `truth` and `frame` of the same tick, and the stack's answer to it."""
+        """Copies one moment: `truth` and `frame` of the same tick, and the stack's answer to it."""
         assert truth.tick == frame.tick, "truth and frame must be of one moment"
         k = self._n
         if k == len(self._tick):
@@ -133,21 +133,21 @@ class TickLog:
         self._n = k + 1
 
     def set_weather(self, slug: str) -> None:
-        """The weather from the next moment on (A-217, A-231)."""
+        """Sets the weather from the next moment on (A-217, A-231)."""
         if slug not in self._weathers:
             self._weathers.append(slug)
         self._weather = self._weathers.index(slug)
 
     def relocated(self, relocation: Relocation) -> None:
-        """The supervisor moved the ego (A-194)."""
+        """Adds a move of the ego by the supervisor (A-194)."""
         self._events.append(relocation)
 
     def notice(self, tick: int, source: NoticeSource, text: str) -> None:
-        """Something that a reader of the log should know."""
+        """Adds something that a reader of the log should know."""
         self._events.append(Notice(tick, source, text))
 
     def finish(self) -> RunLog:
-        """The log so far; arrays are views of the recorder's own until it grows."""
+        """Returns the log so far; arrays are views of the recorder's own until it grows."""
         k = self._n
         columns = self._row[:k].T
         ego, applied, requested, report = np.split(
@@ -194,7 +194,7 @@ class TickLog:
 def copy_actors(
     states: Held[ActorStates], mu: NDArray[np.float64], columns: Held[ActorColumns], k: int
 ) -> None:
-    """Writes tick k of every actor; mu: (n, 4)."""
+    """Writes row k of every actor into the columns; mu: (n, 4)."""
     s, c = states.value, columns.value
     for i in range(len(s.x)):
         c.actors[0, k, i], c.actors[1, k, i], c.actors[2, k, i] = s.x[i], s.y[i], s.z[i]

@@ -47,7 +47,10 @@ class Ghosts:
         self.alive: list[_Ghost] = []
 
     def update(self, pose: tuple[float, float, float]) -> tuple[Floats, NDArray[np.int64]]:
-        """(m, 5) x, y, heading, length, width in the ego's frame, and (m,) classes."""
+        """Returns (m, 5) x, y, heading, length, width in the ego's frame, and (m,) classes, a cycle on.
+
+        pose: x, y in m and yaw in rad of the ego. To be called once per cycle.
+        """
         chance, distance, bearing, turn, kind, life = self._rng.random(6).tolist()
         for ghost in self.alive:
             ghost.left -= self.dt

@@ -33,7 +33,10 @@ class LocalisationError:
         require_range("localisation.drift_time", self.drift_time, 1e-3, 1e6)
 
     def scale(self, factor: float, is_dark: bool) -> LocalisationError:
-        """The same with all strengths times `factor`, in the dark or not."""
+        """Returns the same with all strengths times `factor`, in the dark or not.
+
+        Darkness does not act on the heading; the result's own `dark` is 1.
+        """
         f = factor * (self.dark if is_dark else 1.0)
         return replace(
             self,
@@ -64,7 +67,7 @@ class Localisation:
         return np.array([e.sigma, e.sigma, e.heading_sigma])
 
     def update(self) -> tuple[float, float, float]:
-        """Error in x, y (m, world frame) and heading (rad) of the next cycle."""
+        """Returns the error in x, y (m, world frame) and heading (rad) of the next cycle."""
         e = self.error
         self.jitter = gauss_markov(
             self.jitter, self._jitter.standard_normal(3) * self._sigmas(), self.dt / e.time
@@ -83,7 +86,7 @@ class Localisation:
 
 
 def gauss_markov(state: Floats, draw: Floats, ratio: float) -> Floats:
-    """Next value of a first-order Gauss-Markov process; `ratio` is the step over its time.
+    """Returns the next value of a first-order Gauss-Markov process; `ratio` is the step over its time.
 
     draw: normal deviates with the stationary standard deviation. Source: Gelb (1974), 3.6.
     """

@@ -130,7 +130,10 @@ SENSES = {
 
 
 def senses_of(channel: str, jumps: float = 1.0) -> ChannelSensing:
-    """The senses of a shipped channel, with so many times its jumps of position."""
+    """Returns the senses of a shipped channel, with so many times its jumps of position.
+
+    ConfigError for another channel.
+    """
     require_choice("channel", channel, tuple(SENSES))
     senses = SENSES[channel]
     error = replace(senses.localisation, jump_rate=jumps * senses.localisation.jump_rate)

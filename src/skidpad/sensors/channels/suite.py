@@ -76,7 +76,7 @@ class ChannelSensing:
             require_range(f"channel.{name}", getattr(self, name), 0.0, 1.0)
 
     def scale(self, factor: float) -> ChannelSensing:
-        """All noise, misses, ghosts and confusions times `factor`: the sweep of decision C-2.
+        """Returns all noise, misses, ghosts and confusions times `factor`: the sweep of decision C-2.
 
         The localisation is scaled when it is built, since darkness comes in there.
         """
@@ -145,7 +145,11 @@ class ChannelSuite:
     def observe(
         self, t: float, states: ActorStates, lights: Mapping[int, LightState]
     ) -> ChannelView:
-        """This channel's view of the true world at time t; row 0 is the ego."""
+        """Returns this channel's view of the true world at time t s; row 0 is the ego.
+
+        To be called once per cycle: noise and latency have a state. Objects are those of `latency_cycles`
+        before.
+        """
         s = states
         pose = (float(s.x[0]), float(s.y[0]), float(s.yaw[0]))
         self._look(s)
@@ -168,7 +172,7 @@ class ChannelSuite:
 
     @property
     def visible(self) -> NDArray[np.bool_]:
-        """(n,) the visible set of the last call: actors of which any bearing was free."""
+        """Returns (n,) the visible set of the last call: actors of which any bearing was free."""
         mask: NDArray[np.bool_] = self._sight.share > 0.0
         return mask
 
@@ -190,7 +194,7 @@ class ChannelSuite:
     def _detect(
         self, s: ActorStates, pose: tuple[float, float, float]
     ) -> tuple[Floats, NDArray[np.int64]]:
-        """Objects in the ego's frame with their errors, and ghosts; draws are made for all actors."""
+        """Returns objects in the ego's frame with their errors, and ghosts; draws are made for all actors."""
         cfg, n, rng = self.sensing, len(self.table), self._streams
         self._bias = gauss_markov(
             self._bias, rng["bias"].standard_normal((n, 2)), CYCLE / cfg.bias_time
@@ -222,7 +226,7 @@ class ChannelSuite:
         return np.concatenate([objects, ghosts]), np.concatenate([classes, ghost_classes])
 
     def _draw_misses(self, rows: NDArray[np.intp], distance: Floats) -> NDArray[np.bool_]:
-        """(k,) which visible actors are missed: a slow latent draw below what distance allows."""
+        """Returns (k,) which visible actors are missed: a slow latent draw below what distance allows."""
         cfg = self.sensing
         far = np.minimum(distance / np.maximum(self._reach[rows], 1e-9), 1.0) ** 2
         chance = cfg.miss + (cfg.miss_far - cfg.miss) * far
@@ -232,7 +236,7 @@ class ChannelSuite:
     def _lights(
         self, pose: tuple[float, float, float], lights: Mapping[int, LightState]
     ) -> dict[int, LightState]:
-        """States of the heads in sight, by signal id; none unless this channel reads lights."""
+        """Returns the states of the heads in sight, by signal id; none unless this channel reads lights."""
         seen: dict[int, LightState] = {}
         for head in self._heads if self._light_range > 0.0 else ():
             dx, dy = head.x - pose[0], head.y - pose[1]
@@ -250,7 +254,7 @@ class ChannelSuite:
 
 
 def _reach(cfg: ChannelSensing, table: ActorTable, weather: Weather) -> Floats:
-    """(n,) m at which each actor can be seen in this weather (`physics.optics`)."""
+    """Returns (n,) m at which each actor can be seen in this weather (`physics.optics`)."""
     person = np.isin(table.kind, (int(ActorKind.PEDESTRIAN), int(ActorKind.BICYCLE)))
     nominal = np.where(person, cfg.range_person, cfg.range_vehicle)
     return np.minimum(nominal, label_range(weather))
@@ -264,6 +268,6 @@ def _occluders(roadside: Roadside) -> Boxes:
 
 
 def _normal_cdf(x: Floats) -> Floats:
-    """Logistic approximation of the normal distribution function (Bowling et al. 2009, 1.4e-4)."""
+    """Returns a logistic approximation of the normal distribution function (Bowling et al. 2009, 1.4e-4)."""
     out: Floats = 1.0 / (1.0 + np.exp(-(0.07056 * x**3 + 1.5976 * x)))
     return out

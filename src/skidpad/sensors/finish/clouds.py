@@ -41,7 +41,7 @@ class Layer(NamedTuple):
 
 @lru_cache(maxsize=1)
 def _noise() -> NDArray[np.float32]:
-    """(SIZE, SIZE) ranks of a smooth field, even in [0, 1): a share of it is a quantile."""
+    """Returns (SIZE, SIZE) ranks of a smooth field, even in [0, 1): a share of it is a quantile."""
     rng = stream(0, "clouds")
     total = np.zeros((SIZE, SIZE))
     for blur, weight in OCTAVES:
@@ -53,7 +53,7 @@ def _noise() -> NDArray[np.float32]:
 
 
 def layer_of(weather: Weather, light: Lighting) -> Layer:
-    """The clouds of a weather; a strength of 0 where there are none to be seen."""
+    """Returns the clouds of a weather; a strength of 0 where there are none to be seen."""
     cover = weather.cloudiness / 100.0
     soft = 0.10 + 0.55 * cover
     clear = (1.0 - cover) ** 1.4
@@ -72,7 +72,7 @@ def layer_of(weather: Weather, light: Lighting) -> Layer:
 def draw_clouds(
     view: View, layer: Layer, shift: float, inverse: NDArray[np.float32], out: NDArray[np.uint32]
 ) -> None:
-    """Lay the clouds over the sky in the rows of a view. shift: texels that they have drifted."""
+    """Lays the clouds over the sky in the rows of a view, in `out`. shift: texels that they have drifted."""
     r, width = view.rotation, out.shape[1]
     nodes = width // STEP + 2
     seen, amount = np.empty(nodes, dtype=np.float32), np.empty(nodes, dtype=np.float32)
@@ -123,7 +123,7 @@ def _blend(
     inverse: NDArray[np.float32],
     out: NDArray[np.uint32],
 ) -> None:
-    """One row's sky with what its nodes say, in between along straight lines.
+    """Lays clouds over one row's sky by what its nodes say, in between along straight lines.
 
     lanes: (2, width and STEP more) room for thickness and share of every pixel.
     """

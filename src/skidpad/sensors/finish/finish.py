@@ -71,7 +71,7 @@ class Finish:
     def add(
         self, extras: frozenset[Extra], view: View, own: bool, one: Pass, out: NDArray[np.uint32]
     ) -> None:
-        """The additions in the rows of a view's picture. own: the ego's body is seen in it."""
+        """Draws the additions into the rows of a view's picture `out`. own: the ego's body is seen in it."""
         inverse, key, light = one.inverse, one.key, self._light
         if Extra.CLOUDS in extras and self._layer.strength > 0.0:
             shift = (self._drift * self._tick) % SIZE
@@ -88,6 +88,6 @@ class Finish:
 
 
 def _within(bodies: Bodies, ego: Pose, reach: float) -> Bodies:
-    """Those whose centre lies within `reach` m."""
+    """Returns the bodies whose centre lies within `reach` m of the ego."""
     near = np.hypot(bodies.x - ego.x, bodies.y - ego.y) < reach
     return Bodies._make(field[near] for field in bodies)

@@ -24,7 +24,7 @@ LONGEST = 6.0  # lengths of its fall after which a streak ends
 
 @inner_kernel
 def add_light(p: np.uint32, r: float, g: float, b: float) -> np.uint32:
-    """A packed pixel with more light; its bytes are square roots of light."""
+    """Returns the packed pixel p with light r, g, b added (1: white); its bytes are square roots of light."""
     red, green, blue = unpack(p)
     red = min(np.sqrt(red * red + WHITE * np.float32(r)), np.float32(255.0))
     green = min(np.sqrt(green * green + WHITE * np.float32(g)), np.float32(255.0))
@@ -34,7 +34,7 @@ def add_light(p: np.uint32, r: float, g: float, b: float) -> np.uint32:
 
 @inner_kernel
 def _visible_share(view: View, u: float, v: float, z: float, inverse: NDArray[np.float32]) -> float:
-    """Share of a lamp at (u, v), z m ahead, that nothing hides."""
+    """Returns the share of a lamp at (u, v) px, z m ahead, that nothing hides."""
     height, width = inverse.shape
     nearest = 1.0 / max(z - CLEARANCE, 0.1)
     free = 0
@@ -51,7 +51,7 @@ def _halo(
     view: View, u: float, v: float, core: float, light: tuple[float, float, float],
     out: NDArray[np.uint32],
 ) -> None:  # fmt: skip
-    """A round bloom: light / (1 + (d / core)^2)^2, out to where it is too faint to see."""
+    """Adds a round bloom: light / (1 + (d / core)^2)^2, out to where it is too faint to see; core: px."""
     most = max(light)
     reach = min(core * np.sqrt(max(np.sqrt(most / LEAST) - 1.0, 0.0)), BLOOM_MOST)
     for row in range(max(int(v - reach), view.top), min(int(v + reach) + 1, view.height)):
@@ -74,7 +74,7 @@ def _streak(
     key: NDArray[np.int32],
     out: NDArray[np.uint32],
 ) -> None:
-    """An upright streak on the road: place is column, row of its begin and of its middle, width."""
+    """Adds an upright streak on the road: place is column, row of its begin and of its middle, width; px."""
     u, begin, middle, wide = place
     tall = max(0.6 * (middle - begin), 4.0)
     reach, most = 2.6 * wide, max(light)
@@ -96,7 +96,7 @@ def _streak(
 
 @inner_kernel
 def _ahead(view: View, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """Column, row and depth of a point."""
+    """Returns column, row and depth in m of a point; depth -1 less than 0.5 m ahead."""
     r, c = view.rotation, view.centre
     dx, dy, dz = x - c[0], y - c[1], z - c[2]
     depth = r[2, 0] * dx + r[2, 1] * dy + r[2, 2] * dz
@@ -119,7 +119,7 @@ def shine(
     key: NDArray[np.int32],
     out: NDArray[np.uint32],
 ) -> None:
-    """Add bloom and, on a road as wet as `wet` (0: none), reflections of all lamps in sight."""
+    """Adds bloom and, on a road as wet as `wet` (0: none), reflections of all lamps in sight to `out`."""
     for i in range(sources.x.size):
         x, y, z = sources.x[i], sources.y[i], sources.z[i]
         u, v, depth = _ahead(view, x, y, z)

@@ -84,7 +84,10 @@ class Lamps:
     def _of_vehicles(
         self, states: ActorStates, end: float, on: NDArray[np.bool_], lit: Floats
     ) -> Sources:
-        """The lamps at one end of those who have them on: on either side, or in the middle."""
+        """Returns the lamps at one end of those that have them on: on either side, or in the middle.
+
+        end: 1 front, -1 rear; lit: (3,) colour times power.
+        """
         rows = np.flatnonzero(on)
         one = np.concatenate([rows, rows[self._side[rows] > 0.0]])
         side = self._side[one]

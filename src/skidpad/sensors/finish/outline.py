@@ -15,7 +15,7 @@ CUT = 0.3  # m, the plane before the camera at which edges are cut
 
 @inner_kernel
 def project_corners(view: View, corners: Floats, out: Floats) -> int:
-    """Points (k, 2) on screen of corners (n, 3), whose edges are cut before the camera; k."""
+    """Writes points (k, 2) in px of corners (n, 3), edges cut before the camera, into `out`; returns k."""
     r, n, count = view.rotation, corners.shape[0], 0
     camera = np.empty((n, 3))
     for i in range(n):
@@ -52,7 +52,10 @@ def _turns_left(p: Floats, a: int, b: int, c: int) -> bool:
 
 @inner_kernel
 def hull(points: Floats, count: int, ring: NDArray[np.int64]) -> int:
-    """Indices of the convex hull of points (count, 2), sorted in place; how many (Andrew, 1979)."""
+    """Writes indices of the convex hull of points (count, 2), sorted in place, into `ring`; returns how many.
+
+    Source: Andrew (1979).
+    """
     for i in range(1, count):
         x, y, j = points[i, 0], points[i, 1], i - 1
         while j >= 0 and (points[j, 0] > x or (points[j, 0] == x and points[j, 1] > y)):
@@ -78,9 +81,10 @@ def hull(points: Floats, count: int, ring: NDArray[np.int64]) -> int:
 def spans(
     view: View, corners: Floats, points: Floats, ring: NDArray[np.int64], out: NDArray[np.int64]
 ) -> tuple[int, int]:
-    """First and end row of the convex hull of corners (n <= 16, 3); its columns into `out`.
+    """Returns first and end row of the convex hull of corners (n <= 16, 3); writes its columns into `out`.
 
     out: (rows of the picture, 2) first and end column; points (MOST, 2), ring (2 * MOST,): room.
+    (0, 0) where it is not in the picture.
     """
     count = project_corners(view, corners, points)
     if count < 3:

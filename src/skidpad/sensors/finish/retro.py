@@ -51,7 +51,7 @@ def send_back(
     key: NDArray[np.int32],
     out: NDArray[np.uint32],
 ) -> None:
-    """Add what comes back to the rows of a view. ego: the pose that carries the headlights."""
+    """Adds what comes back to the rows of a view in `out`. ego: the pose that carries the headlights."""
     body = ego.rotation()
     to_body = np.ascontiguousarray(body.T @ view.rotation.T, dtype=np.float32)
     offset = body.T @ (view.centre - (ego.x, ego.y, ego.z))
@@ -61,7 +61,7 @@ def send_back(
 
 @inner_kernel
 def _any(key: NDArray[np.int32]) -> bool:
-    """Whether any of these pixels may send light back."""
+    """Returns whether any of these pixels may send light back."""
     found = 0
     for i in range(key.size):
         label, material = (key[i] >> 8) & 255, key[i] & 255

@@ -66,7 +66,7 @@ class Shade(NamedTuple):
 
 
 def bodies_of(table: ActorTable, states: ActorStates) -> Bodies:
-    """The boxes of all who take part."""
+    """Returns the boxes of all actors but props."""
     present = states.present & (table.kind != ActorKind.PROP)
     return Bodies(
         states.x, states.y, states.z, states.yaw, table.length, table.width, table.height, present
@@ -74,7 +74,7 @@ def bodies_of(table: ActorTable, states: ActorStates) -> Bodies:
 
 
 def standing(boxes: Sequence[Box]) -> Bodies:
-    """What stands beside the road; what hangs over it is too high to darken it."""
+    """Returns what stands beside the road as bodies; what hangs over it is too high to darken it."""
 
     def each(name: str) -> Floats:
         return np.array([getattr(b, name) for b in boxes], dtype=np.float64)
@@ -86,7 +86,7 @@ def standing(boxes: Sequence[Box]) -> Bodies:
 
 
 def shade_of(light: Lighting) -> Shade:
-    """Where shadows fall, and how dark they are."""
+    """Returns where shadows fall, and how dark they are."""
     direction, sun, sky = light.sun_direction, float(light.sun.mean()), float(light.sky.mean())
     up = max(float(direction[2]), 0.05)
     share = sun * max(float(direction[2]), 0.0) / max(sun * up + sky, 1e-6)
@@ -123,7 +123,7 @@ def _cast_of(bodies: Bodies, i: int, shade: Shade) -> _Cast:
 
 @inner_kernel
 def _corners(bodies: Bodies, i: int, cast: _Cast, out: Floats) -> None:
-    """(16, 3) corners of what a shadow can darken: the body's footprint and the shadow's end."""
+    """Writes (16, 3) corners of what a shadow can darken: the body's footprint and the shadow's end."""
     size = cast.half_l + cast.half_w
     if cast.sun > 0.0:
         size += np.hypot(cast.end_x, cast.end_y)
@@ -144,7 +144,7 @@ def _corners(bodies: Bodies, i: int, cast: _Cast, out: Floats) -> None:
 
 @inner_kernel
 def _outside(lx: float, ly: float, half_l: float, half_w: float) -> float:
-    """Distance in m to a box's outline, negative inside."""
+    """Returns the distance in m to a box's outline, negative inside."""
     qx, qy = abs(lx) - half_l, abs(ly) - half_w
     if qx <= 0.0 or qy <= 0.0:
         return float(max(qx, qy))
@@ -153,7 +153,7 @@ def _outside(lx: float, ly: float, half_l: float, half_w: float) -> float:
 
 @inner_kernel
 def _beyond_shadow(cast: _Cast, lx: float, ly: float) -> float:
-    """Distance in m to the outline that the box sweeps to the end of its shadow, negative inside.
+    """Returns the m to the outline that the box sweeps to the end of its shadow, negative inside.
 
     A swept box is bounded by its own two directions and by that of the way; beyond a corner the
     largest of the three is a little less than the distance.
@@ -172,7 +172,7 @@ def _beyond_shadow(cast: _Cast, lx: float, ly: float) -> float:
 
 @inner_kernel
 def _light_at(cast: _Cast, lx: float, ly: float) -> float:
-    """Share of the light that reaches the ground at (lx, ly) in the body's axes."""
+    """Returns the share of the light that reaches the ground at (lx, ly) in the body's axes."""
     light = 1.0
     near = (CONTACT - _outside(lx, ly, cast.half_l, cast.half_w)) / (1.6 * CONTACT)
     if near > 0.0:
@@ -205,7 +205,7 @@ def _darken(
     key: NDArray[np.int32],
     out: NDArray[np.uint32],
 ) -> None:
-    """One body's shadow in the spans that it can reach."""
+    """Draws one body's shadow into `out`, in the spans that it can reach."""
     r, per = view.rotation, 1.0 / view.focal
     ox, oy = view.centre[0] - bodies.x[i], view.centre[1] - bodies.y[i]
     oz = view.centre[2] - bodies.z[i]
@@ -243,7 +243,7 @@ def cast_shadows(
     key: NDArray[np.int32],
     out: NDArray[np.uint32],
 ) -> None:
-    """Darken the ground in the rows of a view's picture, packed as by `shade`; reach in m."""
+    """Darkens the ground in the rows of a view's picture `out`, packed as by `shade`; reach in m."""
     corners, points = np.empty((16, 3)), np.empty((MOST, 2))
     ring = np.empty(2 * MOST, dtype=np.int64)
     columns = np.empty((out.shape[0], 2), dtype=np.int64)

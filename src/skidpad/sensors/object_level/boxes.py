@@ -63,13 +63,13 @@ def empty_mount() -> Mount:
 
 
 def mount_of(pose: Pose) -> Mount:
-    """A mounting pose as arrays for kernels."""
+    """Returns a mounting pose as arrays for kernels."""
     return Mount(np.array([pose.x, pose.y, pose.z]), np.ascontiguousarray(pose.rotation()))
 
 
 @inner_kernel
 def place(mount: Mount, states: ActorStates, seat: Mount) -> None:
-    """The ego's sensor seen from the world into `seat`, body pitch and roll included (`Pose.rotation`)."""
+    """Writes the ego's sensor seen from the world into `seat`, body pitch and roll included."""
     cr, sr = np.cos(states.roll[0]), np.sin(states.roll[0])
     cp, sp = np.cos(states.pitch[0]), np.sin(states.pitch[0])
     cy, sy = np.cos(states.yaw[0]), np.sin(states.yaw[0])
@@ -90,14 +90,14 @@ def place(mount: Mount, states: ActorStates, seat: Mount) -> None:
 
 @inner_kernel
 def placed(mount: Mount, states: ActorStates) -> Mount:
-    """The ego's sensor seen from the world, in arrays of its own; `place` needs none."""
+    """Returns the ego's sensor seen from the world, in arrays of its own; `place` needs none."""
     seat = Mount(np.empty(3), np.empty((3, 3)))
     place(mount, states, seat)
     return seat
 
 
 def walls_of(roadside: Roadside) -> Walls:
-    """Every stretch of barrier as a vertical rectangle."""
+    """Returns every stretch of barrier as a vertical rectangle."""
     rows = [
         np.column_stack([b.points[:-1], b.points[1:], np.full(len(b.points[1:]), b.height)])
         for b in roadside.barriers
@@ -106,7 +106,7 @@ def walls_of(roadside: Roadside) -> Walls:
 
 
 def group_walls(walls: Walls) -> WallGroups:
-    """Where the walls of each group are, so that far ones are passed over together."""
+    """Returns where the walls of each group are, so that far ones are passed over together."""
     starts = np.arange(0, len(walls.x0), GROUP)
     if not len(starts):
         return WallGroups(*np.empty((5, 0)))
@@ -137,7 +137,10 @@ def walls_in_view(
     reach: float,
     keep: Ints,
 ) -> int:
-    """Walls of which a part may lie within `reach` and |left| <= slope * forward, into `keep`; how many."""
+    """Writes the walls that may be in view into `keep`; returns how many.
+
+    Of those a part may lie within `reach` m and |left| <= slope * forward.
+    """
     c, s = np.cos(yaw), np.sin(yaw)
     n = 0
     for g in range(groups.x_min.size):
@@ -167,7 +170,7 @@ def walls_in_view(
 def _is_out_of_view(
     origin: Floats, c: float, s: float, slope: float, groups: WallGroups, g: int
 ) -> bool:
-    """Whether a rectangle about all walls of a group lies behind, or beyond one side of the view."""
+    """Returns whether a rectangle about all walls of a group lies behind, or beyond one side of the view."""
     x = 0.5 * (groups.x_min[g] + groups.x_max[g]) - origin[0]
     y = 0.5 * (groups.y_min[g] + groups.y_max[g]) - origin[1]
     half_x = 0.5 * (groups.x_max[g] - groups.x_min[g]) + groups.longest[g] + ROUNDING
@@ -181,7 +184,10 @@ def _is_out_of_view(
 def boxes_in_view(
     origin: Floats, yaw: float, slope: float, boxes: Boxes, reach: float, keep: Ints
 ) -> int:
-    """Boxes of which a part may lie within `reach` and |left| <= slope * forward, into `keep`; how many."""
+    """Writes the boxes that may be in view into `keep`; returns how many.
+
+    Of those a part may lie within `reach` m and |left| <= slope * forward.
+    """
     c, s = np.cos(yaw), np.sin(yaw)
     stretch = np.hypot(1.0, slope)
     n = 0

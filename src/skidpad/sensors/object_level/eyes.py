@@ -71,7 +71,7 @@ class Eyes:
         lights: Mapping[int, LightState],
         braking: Flags,
     ) -> None:
-        """See the world of this tick; row 0 is the ego. braking: (n,) whose brake lamps are on."""
+        """Sees the world of this tick; row 0 is the ego. braking: (n,) whether brake lamps are on."""
         s, t = states, self.table
         eye = np.array([s.x[EGO], s.y[EGO], s.z[EGO] + self.spec.mount.z, s.yaw[EGO]])
         boxes = Boxes(s.x, s.y, s.z, s.yaw, t.length, t.width, t.height)
@@ -86,7 +86,7 @@ class Eyes:
         self._queue.append(_Seen(tick, actors, self._lights(eye, boxes, lights)))
 
     def view(self) -> DriverView:
-        """What the driver acts on in the tick of the last look."""
+        """Returns what the driver acts on in the tick of the last look: others as of `reaction` s before."""
         s, seen, now = self._states, self._queue[0], self._queue[-1].tick
         c, sn = cos(s.yaw[EGO]), sin(s.yaw[EGO])
         return DriverView(
@@ -104,7 +104,7 @@ class Eyes:
     def _lights(
         self, eye: Floats, boxes: Boxes, lights: Mapping[int, LightState]
     ) -> dict[int, LightState]:
-        """States of the heads in sight, by signal id."""
+        """Returns the states of the heads in sight, by signal id."""
         seen: dict[int, LightState] = {}
         farthest = min(self.visibility, LIGHT_FARTHEST)
         for head in self._heads:
@@ -123,7 +123,7 @@ class Eyes:
 def is_free(
     eye: Floats, x: float, y: float, z: float, boxes: Boxes, solid: Flags, target: int
 ) -> bool:
-    """Whether no solid box but `target` stands in the line from the eye (x, y, z, yaw) to a point."""
+    """Returns whether no solid box but `target` stands in the line from the eye (x, y, z, yaw) to a point."""
     dx, dy = x - eye[0], y - eye[1]
     d = np.hypot(dx, dy)
     if d < 1e-6:
@@ -150,7 +150,7 @@ def is_free(
 def in_sight(
     eye: Floats, actors: Boxes, present: Flags, reach: Floats, fixed: Boxes, out: Flags
 ) -> None:
-    """Which actors are seen from the eye (x, y, z, yaw); row 0 is the eye's own car.
+    """Writes which actors are seen from the eye (x, y, z, yaw) into `out`; row 0 is the eye's own car.
 
     reach: (n,) m beyond which an actor cannot be seen; out: (n,).
     """
@@ -179,7 +179,7 @@ def in_sight(
 def perceived_velocity(
     s: ActorStates, rows: NDArray[np.int64], width: Floats
 ) -> tuple[Floats, Floats]:
-    """(k,) x and y of the velocities as perceived, in the world frame.
+    """Returns (k,) x and y of the velocities as perceived, in the world frame.
 
     Closing or falling back whose looming stays below the threshold is not noticed: the radial part
     of the relative velocity then reads 0.
@@ -193,7 +193,7 @@ def perceived_velocity(
 
 
 def road_look(weather: Weather) -> RoadLook:
-    """What the road looks like in a weather."""
+    """Returns what the road looks like in a weather."""
     if weather.ice_thickness > 0.0:
         return RoadLook.ICE
     if weather.snow_depth_mm > 0.0:
@@ -206,7 +206,7 @@ def road_look(weather: Weather) -> RoadLook:
 
 
 def _reach(table: ActorTable, weather: Weather) -> Floats:
-    """(n,) m at which each actor can be seen."""
+    """Returns (n,) m at which each actor can be seen."""
     by_outline = label_range(weather)
     by_lamps = sight(weather) if weather.is_night else 0.0
     lit = table.kind <= int(ActorKind.MOTORCYCLE)

@@ -89,7 +89,10 @@ def see_boxes(
     limit: float,
     work: CameraScratch,
 ) -> int:
-    """What a camera on box 0 sees up to `limit` m into the arrays of `e`; returns how many runs."""
+    """Writes what a camera on box 0 sees up to `limit` m into the arrays of `e`; returns how many runs.
+
+    labels: (n,) SemanticClass of the boxes. Nearer boxes hide farther ones column by column.
+    """
     place(e.mount, states, work.seat)
     camera = _camera(work.seat, e.focal, e.width, e.height)
     out, classes, order = e.runs, e.classes, work.order
@@ -135,7 +138,10 @@ def _camera(seat: Mount, focal: float, width: int, height: int) -> Camera:
 def _sort_boxes(
     camera: Camera, boxes: Boxes, present: NDArray[np.bool_], limit: float, work: CameraScratch
 ) -> int:
-    """Boxes in sight into `work.order`, nearest first; returns how many."""
+    """Writes the boxes in sight into `work.order`, nearest first; returns how many.
+
+    Box 0 carries the camera and is left out, and so are those on another level of an overpass.
+    """
     order, distance = work.order, work.distance
     yaw = np.arctan2(camera.forward.y, camera.forward.x)
     slope = WIDEN * camera.width / (2.0 * camera.focal)
@@ -160,7 +166,11 @@ def _sort_boxes(
 def _box_runs(
     camera: Camera, box: Block, back: bool, covered: Floats, out: NDArray[np.float32], n: int
 ) -> int:
-    """Append runs of a box to `out` from row n on: of its faces in sight, or of those at the back."""
+    """Adds runs of a box to `out` from column n on; returns the next free column.
+
+    back: of the faces that look away, else of those that face the camera. Of a camera inside the box
+    all count.
+    """
     dx, dy = camera.x - box.x, camera.y - box.y
     along, across = (
         box.cos * dx + box.sin * dy,
@@ -191,7 +201,10 @@ def _face_runs(
     out: NDArray[np.float32],
     n: int,
 ) -> int:
-    """Runs of the vertical face over the box-frame segment (x0, y0)-(x1, y1)."""
+    """Adds the runs of the vertical face over (x0, y0)-(x1, y1), m in the box's frame, to `out`.
+
+    covered: px by column of BIN px, rows from there down are hidden. Returns the next free column.
+    """
     span = np.hypot(x1 - x0, y1 - y0)
     strips = min(max(int(np.ceil(span / STRIP)), MIN_STRIPS), MAX_STRIPS)
     # Strip edges and centre at mid-height give the columns; a strip begins where the last one ended.
@@ -214,7 +227,10 @@ def _face_runs(
 
 @inner_kernel
 def _column(camera: Camera, box: Block, bx: float, by: float) -> tuple[float, float, float]:
-    """Place seen from the camera, m, and column, px, of a point of a box; NaN: nearer than `NEAR`."""
+    """Returns a box's point seen from the camera (x, y in m) and its column in px, NaN nearer than `NEAR`.
+
+    bx, by: m in the box's frame.
+    """
     px = box.x + box.cos * bx - box.sin * by - camera.x
     py = box.y + box.sin * bx + box.cos * by - camera.y
     pz = box.z + 0.5 * box.height - camera.z
@@ -238,7 +254,10 @@ def _strip_runs(
     out: NDArray[np.float32],
     n: int,
 ) -> int:
-    """Cut the vertical line over (px, py), relative to the camera, into runs of rows."""
+    """Adds the vertical line over (px, py), m from the camera, to `out` in runs of rows above `hidden`.
+
+    u, width: px, middle and width of the strip. Returns the next free column of `out`.
+    """
     upper, f_upper = _row(camera, px, py, box.z + box.height * 0 / camera.runs - camera.z)
     for j in range(camera.runs):
         lower, f_lower = upper, f_upper
@@ -255,7 +274,7 @@ def _strip_runs(
 
 @inner_kernel
 def _row(camera: Camera, px: float, py: float, pz: float) -> tuple[float, float]:
-    """Row, px, and depth, m, of a point seen from the camera; the row is NaN nearer than `NEAR`."""
+    """Returns row in px and depth in m of a point, m from the camera; the row is NaN nearer than `NEAR`."""
     ahead, up = camera.forward, camera.up
     forward = ahead.x * px + ahead.y * py + ahead.z * pz
     if forward < NEAR:

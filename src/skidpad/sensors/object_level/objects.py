@@ -116,7 +116,10 @@ class ObjectSuite:
         self._states: ActorStates | None = None
 
     def see_through(self, weather: Weather | None, beam: Beam | None) -> None:
-        """The weather that limits the ranges, None: it does not; beam None: as by night (A-218)."""
+        """Sets the weather that limits the ranges from now on; None: it does not.
+
+        beam: of the ego's headlights; None: low beam (A-218).
+        """
         self.antennas = [
             antenna_of(s, self._seed, self._dt, weather)
             for s in self._specs
@@ -127,7 +130,7 @@ class ObjectSuite:
         self.limit = SIGHT if weather is None else min(label_range(weather, lit), SIGHT)
 
     def segments(self, states: ActorStates) -> dict[str, Segments]:
-        """What each depth camera sees of vehicles, by camera id."""
+        """Returns what each depth camera sees of vehicles, by camera id; `NOTHING` where it sees none."""
         around = self._around(states)
         seen = {}
         for (spec, _), eye, held in zip(self.cameras, self._eyes, self._held_eyes, strict=True):
@@ -140,7 +143,7 @@ class ObjectSuite:
         return seen
 
     def radar(self, tick: int, states: ActorStates) -> RadarPoints:
-        """Returns of the first radar; none when the suite has no radar."""
+        """Returns the points of the first radar; none when the suite has no radar."""
         if not self.antennas:
             return RadarPoints.none()
         around = self._around(states)
@@ -149,12 +152,12 @@ class ObjectSuite:
         return RadarPoints(*self._radar.echoes[:, :m].copy())
 
     def _find_slope(self, states: ActorStates) -> None:
-        """Slope of the road under the ego; level without a map."""
+        """Writes the slope of the road under the ego where the radar reads it; level without a map."""
         if self.lanes is not None:
             feel_slope(self.lanes, self._around(states))
 
     def _around(self, states: ActorStates) -> Held[Surroundings]:
-        """The surroundings, held as long as the states stay the same arrays."""
+        """Returns the surroundings, held; they are made anew when `states` is another object."""
         if states is not self._states:
             t = self.table
             boxes = Boxes(states.x, states.y, states.z, states.yaw, t.length, t.width, t.height)
@@ -169,20 +172,20 @@ class ObjectSuite:
 
 @kernel
 def listen(around: Held[Surroundings], radar: Held[Antenna], tick: int) -> int:
-    """Echoes of a radar in this tick into the surroundings' array; returns how many."""
+    """Writes the echoes of a radar in this tick into the surroundings' array; returns how many."""
     a = around.value
     return cast_radar(radar.value, tick, a.boxes, a.states, a.walls, a.posts, a.radar)
 
 
 @kernel
 def feel_slope(map: Held[LaneArrays], around: Held[Surroundings]) -> None:
-    """The slope of the road under the ego, for the radar."""
+    """Writes the slope of the road under the ego, dz/dx and dz/dy, where the radar reads it."""
     s = around.value.states
     find_slope(map.value, s.x[0], s.y[0], s.z[0], around.value.radar.slope)
 
 
 @kernel
 def look(around: Held[Surroundings], eye: Held[Eye], limit: float) -> int:
-    """What a camera sees up to `limit` m into the arrays of `eye`; returns how many runs."""
+    """Writes what a camera sees up to `limit` m into the arrays of `eye`; returns how many runs."""
     a = around.value
     return see_boxes(eye.value, a.states, a.boxes, a.labels, limit, a.camera)

@@ -31,9 +31,10 @@ class Sight(NamedTuple):
 @inner_kernel
 def ray_box(dx: float, dy: float, c: float, s: float, half_l: float, half_w: float,
             ux: float, uy: float) -> float:  # fmt: skip
-    """Distance along a unit ray (ux, uy) to a box centred at (dx, dy) turned by (c, s); inf: missed.
+    """Returns the m along a unit ray (ux, uy) to a box centred at (dx, dy) and turned by (c, s).
 
-    Slab method in the box's frame (Kay and Kajiya 1986); 0 from inside.
+    inf: it misses; 0 from inside. c, s: cosine and sine of the box's yaw. Slab method in the box's
+    frame (Kay and Kajiya 1986).
     """
     ox, oy = -(c * dx + s * dy), -(-s * dx + c * dy)
     vx, vy = c * ux + s * uy, -s * ux + c * uy
@@ -50,7 +51,7 @@ def ray_box(dx: float, dy: float, c: float, s: float, half_l: float, half_w: flo
 
 @inner_kernel
 def _draw(boxes: Boxes, i: int, owner: int, eye: Floats, half_angle: float, sight: Sight) -> int:
-    """Draw box i into the buffer; returns how many bearings in view it fills."""
+    """Draws box i into the buffer as `owner`; returns how many bearings in view it fills, hidden or not."""
     c, s = np.cos(boxes.yaw[i]), np.sin(boxes.yaw[i])
     dx, dy = boxes.x[i] - eye[0], boxes.y[i] - eye[1]
     half_l, half_w = 0.5 * boxes.length[i], 0.5 * boxes.width[i]
@@ -95,7 +96,7 @@ def look(
     fixed_reach: float,
     sight: Sight,
 ) -> None:
-    """Fill `sight` as seen from `eye` (4,): x, y, z and viewing direction; actor 0 is the eye's own.
+    """Fills `sight` as seen from `eye` (4,): x, y, z and viewing direction; actor 0 is the eye's own.
 
     half_angle in rad to both sides; reach (n,) in m per actor, beyond which it is not there at all.
     """
@@ -125,7 +126,7 @@ def look(
 def sees_point(
     eye: Floats, eye_height: float, point: Floats, heights: Floats, sight: Sight
 ) -> bool:
-    """Whether a point (3,) in the air is not behind the nearest body on its bearing.
+    """Returns whether a point (3,) in the air is above or before the nearest body on its bearing.
 
     heights: (n + fixed,) m of all bodies, by owner.
     """

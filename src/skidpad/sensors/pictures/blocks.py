@@ -28,7 +28,7 @@ _WHITE = np.float32(255.0)
 
 @inner_kernel
 def end_of_run(keys: NDArray[np.int32], x: int) -> int:
-    """Where the run of equal keys that begins at x ends; looked through `STRIDE` at a time."""
+    """Returns where the run of equal keys that begins at x ends; looked through `STRIDE` at a time."""
     k, count = keys[x], keys.size
     end = x + 1
     while end + STRIDE <= count:
@@ -47,7 +47,10 @@ def end_of_run(keys: NDArray[np.int32], x: int) -> int:
 def gather(
     key: NDArray[np.int32], y: int, first: int, count: int, table: Floats32, work: Floats32
 ) -> None:
-    """Colour and behaviour of a block's pixels from the table, one read per run of equal keys."""
+    """Writes colour and behaviour of a block's pixels from the table into the lanes R to S of `work`.
+
+    y, first, count: the block's row, first column and number of pixels.
+    """
     keys = key[y, first : first + count]
     x = 0
     while x < count:
@@ -71,10 +74,10 @@ def gather(
 def slopes(
     inverse: Floats32, y: int, first: int, count: int, view: View, work: Floats32
 ) -> tuple[bool, bool]:
-    """Viewing direction, inverse depth and its two slopes, of a block's pixels.
+    """Writes viewing direction, inverse depth and its two slopes of a block's pixels into `work`.
 
     Of the two differences on either side the gentler one counts: the other may cross an edge.
-    Says whether any pixel shows a surface, and whether any shows sky.
+    Returns whether any pixel shows a surface, and whether any shows sky.
     """
     height, width = inverse.shape
     focal = np.float32(view.focal)
@@ -109,7 +112,7 @@ def slopes(
 
 @inner_kernel
 def develop(count: int, work: Floats32, out: NDArray[np.uint32]) -> None:
-    """Linear light to bytes: gamma 2, clipped, packed as red, green, blue, 255."""
+    """Writes a block's linear light into `out` as bytes: gamma 2, clipped, packed red, green, blue, 255."""
     for x in range(count):
         r, g, b = work[R + x], work[G + x], work[B + x]
         r = np.sqrt(r if r < ONE else ONE) * _WHITE

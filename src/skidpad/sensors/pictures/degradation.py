@@ -57,7 +57,7 @@ class Degradation:
 
     @property
     def calm(self) -> Calm:
-        """The share of both stages as one: their noises are independent, so variances add."""
+        """Returns the share of both stages as one: their noises are independent, so variances add."""
         rain, night = self.share * self.rain_sigma, self.share if self.night else 0.0
         gain = 1.0 + night * (NIGHT_GAIN - 1.0)
         sigma = hypot(gain * rain, night * NIGHT_SIGMA)
@@ -65,12 +65,12 @@ class Degradation:
 
     @property
     def any(self) -> bool:
-        """Whether an image changes at all (A-225)."""
+        """Returns whether an image changes at all (A-225)."""
         return self.rain_sigma > 0.0 or self.night or self.streaks > 0.0
 
 
 def degradation(weather: Weather, *, exclusive: bool = False) -> Degradation:
-    """The stages that act in a weather. exclusive: rain switches the night stage off (listing)."""
+    """Returns the stages that act in a weather. exclusive: rain switches the night stage off (listing)."""
     rain = weather.precipitation / 100.0
     return Degradation(
         rain_sigma=RAIN_SIGMA * rain,
@@ -82,7 +82,7 @@ def degradation(weather: Weather, *, exclusive: bool = False) -> Degradation:
 
 @lru_cache(maxsize=32)
 def glass_mask(height: int, width: int, pillar: bool) -> NDArray[np.int32]:
-    """(H,) first column of each row that weather degrades; `width` where none is (A-226, A-227).
+    """Returns (H,) the first column of each row that weather degrades; `width` where none is (A-226, A-227).
 
     The pillar keeps pixels with y > (h_p / w_p) x + (0.85 H - h_p), x < w_p and y < 0.85 H.
     """
@@ -99,14 +99,14 @@ def glass_mask(height: int, width: int, pillar: bool) -> NDArray[np.int32]:
 
 @lru_cache(maxsize=8)
 def open_view(height: int) -> NDArray[np.int32]:
-    """(H,) the same of a camera outside of any cockpit: weather is everywhere."""
+    """Returns (H,) zeros, as `glass_mask` of a camera outside of any cockpit: weather is everywhere."""
     first = np.zeros(height, dtype=np.int32)
     first.setflags(write=False)
     return first
 
 
 def clear_of_weather(height: int, width: int, pillar: bool = True) -> NDArray[np.bool_]:
-    """(H, W) True where the picture stays clean: cockpit and pillar."""
+    """Returns (H, W) True where the picture stays clean: cockpit and pillar."""
     return np.arange(width) < glass_mask(height, width, pillar)[:, None]
 
 
@@ -126,7 +126,10 @@ class CameraNoise:
             self._tile = np.zeros(1, dtype=np.int8)
 
     def apply(self, tick: int, image: Packed, rows: range | None = None) -> None:
-        """Degrade an image (H, W) of packed bytes in place, or only some of its rows."""
+        """Degrades an image (H, W) of packed bytes in place, or only some of its rows.
+
+        It stays as it is where no stage acts. The same tick gives the same noise.
+        """
         s = self.strength
         if not s.any:
             return
@@ -159,7 +162,10 @@ def degrade(
     end_row: int,
     image: Packed,
 ) -> None:
-    """Rain: noise, then mix with grey. Night: gain, lift, noise. Clip once at the end (A-228)."""
+    """Degrades rows of an image in place: in rain noise, then grey; at night gain, lift, noise (A-228).
+
+    Clipped once at the end. keys: of the stages; first: (H,) column of each row, as by `glass_mask`.
+    """
     width = image.shape[1]
     room = np.uint64(tile.size - 3 * width)
     rain_unit = np.float32(rain_sigma / TILE_UNIT)
@@ -200,7 +206,10 @@ def soften(
     end_row: int,
     image: Packed,
 ) -> None:
-    """Mix with grey, gain, lift and one noise for all colours: half the price of `degrade`."""
+    """Mixes rows of an image with grey, gain, lift and one noise for all colours, in place.
+
+    Half the price of `degrade`. first: (H,) column of each row, as by `glass_mask`.
+    """
     width = image.shape[1]
     room = np.uint64(tile.size - width)
     unit = np.float32(calm.sigma / TILE_UNIT)
@@ -230,7 +239,10 @@ def draw_streaks(
     end_row: int,
     image: Packed,
 ) -> None:
-    """Short slanted strokes of falling rain, brighter than what is behind them."""
+    """Draws short slanted strokes of falling rain, brighter than what is behind them, into rows of `image`.
+
+    count: of the whole image; first: (H,) column of each row, as by `glass_mask`.
+    """
     height, width = image.shape
     light = 120.0 if night else 215.0
     for i in range(count):

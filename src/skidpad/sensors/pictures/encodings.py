@@ -46,12 +46,12 @@ for _label, _rgb in CITYSCAPES.items():
 
 
 def cityscapes_colours(labels: Bytes) -> Bytes:
-    """(H, W) class ids to (H, W, 3) red, green, blue (A-034)."""
+    """Returns (H, W, 3) red, green, blue of (H, W) class ids (A-034); unknown classes are black."""
     return _COLOURS[labels]
 
 
 def vehicle_mask(rgb: Bytes) -> NDArray[np.bool_]:
-    """(H, W, 3) class colours to the published tolerance boxes of car, truck and bus (A-035).
+    """Returns (H, W) whether class colours (H, W, 3) are those of car, truck or bus, by boxes (A-035).
 
     For images whose colours have been through lossy coding; labels need no mask.
     """

@@ -43,7 +43,7 @@ class Lighting(NamedTuple):
 
 
 def lighting(weather: Weather, beam: Beam | None = None) -> Lighting:
-    """The light of a weather. beam: of the ego; None: low beam by night (A-218)."""
+    """Returns the light of a weather. beam: of the ego; None: low beam by night, else none (A-218)."""
     if beam is None:
         beam = Beam.LOW if weather.is_night else Beam.OFF
     altitude = radians(weather.sun_altitude_deg)

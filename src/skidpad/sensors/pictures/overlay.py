@@ -31,7 +31,7 @@ OPACITY = 0.85
 
 
 def droplet_layer(weather: Weather, width: int, height: int, seed: int, camera: str) -> Layer:
-    """(H, W) opacity in [0, OPACITY] of the drops on this camera's lens."""
+    """Returns (H, W) opacity in [0, OPACITY] of the drops on this camera's lens; zeros without rain."""
     layer = np.zeros((height, width), dtype=np.float32)
     share = weather.precipitation / 100.0
     rng = stream(seed, "overlay", camera)
@@ -47,7 +47,10 @@ def droplet_layer(weather: Weather, width: int, height: int, seed: int, camera: 
 
 
 def overlaid(image: Image, layer: Layer) -> Image:
-    """(H, W, 3) the image seen through the drops; the input is untouched."""
+    """Returns (H, W, 3) the image seen through the drops; `image` itself where there are none.
+
+    layer: (H, W) opacity, as by `droplet_layer`. The input is never changed.
+    """
     if not layer.any():
         return image
     height = image.shape[0]
@@ -65,11 +68,11 @@ class Lens:
         self.layers: dict[str, Layer] = {}
 
     def add_drops(self, images: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The same readings, images among them with drops when they are first read."""
+        """Returns the same readings by sensor id; images get their drops whenever they are read."""
         return _Wet(images, self)
 
     def wet(self, id: str, image: CameraImage) -> CameraImage:
-        """One image; only RGB looks through glass, as labels and depth are ideal sensors."""
+        """Returns an image with drops; all but RGB stay as they are: labels and depth are ideal sensors."""
         if image.rgb is None:
             return image
         if id not in self.layers:

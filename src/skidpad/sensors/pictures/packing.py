@@ -16,7 +16,7 @@ _LOW, _HIGH, _HALF = np.float32(0.0), np.float32(255.0), np.float32(0.5)
 
 @kernel
 def pack(r: np.float32, g: np.float32, b: np.float32) -> np.uint32:
-    """A pixel of three values within 0 to 255, cut to whole numbers."""
+    """Returns a pixel of three values within 0 to 255, cut to whole numbers."""
     red, green, blue = np.uint32(np.int32(r)), np.uint32(np.int32(g)), np.uint32(np.int32(b))
     packed: np.uint32 = np.uint32(red | np.uint32(green << _G) | np.uint32(blue << _B) | _OPAQUE)
     return packed
@@ -24,7 +24,7 @@ def pack(r: np.float32, g: np.float32, b: np.float32) -> np.uint32:
 
 @kernel
 def unpack(p: np.uint32) -> tuple[np.float32, np.float32, np.float32]:
-    """Red, green and blue of a pixel."""
+    """Returns red, green and blue of a pixel, 0 to 255."""
     return (
         np.float32(np.int32(p & _BYTE)),
         np.float32(np.int32(np.uint32(p >> _G) & _BYTE)),
@@ -34,7 +34,7 @@ def unpack(p: np.uint32) -> tuple[np.float32, np.float32, np.float32]:
 
 @kernel
 def rounded(value: np.float32) -> np.float32:
-    """Clipped to 0 to 255, and so that `pack` rounds it."""
+    """Returns the value plus a half, clipped to 0 to 255, so that `pack` rounds it."""
     v: np.float32 = value + _HALF
     v = v if v > _LOW else _LOW
     return v if v < _HIGH else _HIGH

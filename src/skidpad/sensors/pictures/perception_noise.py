@@ -30,7 +30,10 @@ class PerceptionNoise:
     def on_depth(
         self, inverse: NDArray[np.float32], seed: int, id: str, tick: int
     ) -> NDArray[np.float32]:
-        """(H, W) inverse depth with multiplicative noise; nothing stays nothing."""
+        """Returns (H, W) inverse depth with multiplicative noise; 0 (nothing) stays 0.
+
+        `inverse` itself without noise. The same seed, camera id and tick give the same noise.
+        """
         if self.depth_sigma_ratio == 0.0:
             return inverse
         deviates = stream(seed, "perception", id, tick).standard_normal(
@@ -43,7 +46,10 @@ class PerceptionNoise:
     def on_labels(
         self, labels: NDArray[np.uint8], seed: int, id: str, tick: int
     ) -> NDArray[np.uint8]:
-        """(H, W) class ids with some of them lost."""
+        """Returns (H, W) class ids, of which a share is lost (SemanticClass.NONE).
+
+        `labels` itself without a share. The same seed, camera id and tick give the same loss.
+        """
         if self.label_dropout == 0.0:
             return labels
         lost = stream(seed, "perception", id, tick).random(labels.shape) < self.label_dropout

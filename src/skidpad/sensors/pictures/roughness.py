@@ -22,7 +22,7 @@ FINE, COARSE = 0.04, 1.0  # m, a texel of grains and one of patches
 
 
 def _make_tiles() -> Floats32:
-    """(3 * SIZE * SIZE,) grains, then patches and tints in turn: mean 0, deviation a third."""
+    """Returns (3 * SIZE * SIZE,) grains, then patches and tints in turn: mean 0, deviation a third."""
     rng = np.random.default_rng(20)
     tiles = np.empty((3, SIZE, SIZE), dtype=np.float32)
     coarse = (1.0, 4.0, 12.0, 28.0)
@@ -72,7 +72,10 @@ def roughen(
     view: View, v: np.float32, count: int, keys: NDArray[np.int32], grain: Floats32, tiles: Floats32,
     work: Floats32,
 ) -> None:  # fmt: skip
-    """Change the colours of a block's surfaces by where in the world they lie."""
+    """Changes the colours of a block's surfaces in `work` by where in the world they lie.
+
+    v: m down per m ahead of the block's row; grain: (256, 3) strengths by material; tiles: `TILES`.
+    """
     r = view.rotation
     x_u, x_1 = np.float32(r[0, 0]), np.float32(r[1, 0]) * v + np.float32(r[2, 0])
     y_u, y_1 = np.float32(r[0, 1]), np.float32(r[1, 1]) * v + np.float32(r[2, 1])
@@ -124,9 +127,10 @@ def vary_sky(
     view: View, v: np.float32, count: int, light: Lighting, sun: Floats32, tiles: Floats32,
     work: Floats32,
 ) -> None:  # fmt: skip
-    """Change a block's sky by the direction: brighter around the sun, thin veils, no two parts alike.
+    """Changes a block's sky in `work`: brighter around the sun, thin veils, no two parts alike.
 
-    The share towards and away from the sun follows the shape of CIE's clear sky (ISO 15469) by eye.
+    v: m down per m ahead of the block's row; sun: (3,) towards the sun in camera axes. The share
+    towards and away from the sun follows the shape of CIE's clear sky (ISO 15469) by eye.
     """
     r = view.rotation
     x_u, x_1 = np.float32(r[0, 0]), np.float32(r[1, 0]) * v + np.float32(r[2, 0])

@@ -90,7 +90,7 @@ class Shading:
         self._braking = np.zeros(len(table), dtype=np.bool_)
 
     def set_braking(self, braking: NDArray[np.bool_]) -> None:
-        """Light the brake lamps of these actors (n,)."""
+        """Lights the brake lamps of these actors (n,), and puts out those of all others."""
         if np.array_equal(braking, self._braking):
             return
         self._braking[:] = braking
@@ -100,7 +100,7 @@ class Shading:
         tails[braking, GLOW] = 1.0
 
     def surfaces(self, key: NDArray[np.int32]) -> Floats32:
-        """(H, W, COLUMNS): colour in linear light, and behaviour, of what each pixel shows."""
+        """Returns (H, W, COLUMNS): colour in linear light, and behaviour, of what each pixel shows."""
         found: Floats32 = self._table[(key >> 16) * MATERIALS + (key & 255)]
         return found
 
@@ -112,9 +112,9 @@ class Shading:
         key: NDArray[np.int32],
         out: NDArray[np.uint32],
     ) -> None:
-        """Write the rows of a view of a picture, (H, W) of packed bytes red, green, blue, 255.
+        """Writes the rows of a view of a picture, (H, W) of packed bytes red, green, blue, 255, into `out`.
 
-        ego: the pose that carries the headlights.
+        ego: the pose that carries the headlights. inverse, key: (H, W) inverse depth and key.
         """
         light = self.light
         r = view.rotation
@@ -138,7 +138,7 @@ class Shading:
 
 
 def _look_up(palette: Floats32, table: ActorTable, light: Lighting, snow_on_road: bool) -> Floats32:
-    """((n + 1) * 256, COLUMNS): colour and behaviour of each material on each actor."""
+    """Returns ((n + 1) * 256, COLUMNS): colour and behaviour of each material, on the map and each actor."""
     n = len(table)
     out = np.zeros((n + 1, MATERIALS, COLUMNS), dtype=np.float32)
     out[:, :, :3] = np.square(palette / np.float32(255.0))
@@ -188,7 +188,10 @@ def beam_at(
     slope: np.float32,
     reach: np.float32,
 ) -> np.float32:
-    """Light of the beam at a point in the lamps' frame: a soft cone that falls above its cut-off."""
+    """Returns the light of the beam at a point (m, lamps' frame): a soft cone that falls above its cut-off.
+
+    beam, slope, reach: as by `beam_of`. 0 behind the lamps.
+    """
     lead = px if px > _NEAR_LAMP else _NEAR_LAMP
     side = py / (lead + _LAMP_APART)
     rise = pz / lead * slope
@@ -201,7 +204,7 @@ def beam_at(
 
 @inner_kernel
 def beam_of(light: Lighting) -> tuple[np.float32, np.float32, np.float32]:
-    """Power, slope of the cut-off and reach of the ego's beam."""
+    """Returns power, slope of the cut-off and reach (1/m^2) of the ego's beam; power 0 where it is off."""
     beam = np.float32(light.headlights) * _BEAM_POWER
     slope = _HIGH_SLOPE if light.high else _CUT_SLOPE
     reach = _HIGH_RANGE if light.high else _BEAM_RANGE
@@ -212,9 +215,9 @@ def beam_of(light: Lighting) -> tuple[np.float32, np.float32, np.float32]:
 def behind_lamps(
     view: View, v: np.float32, first: int, count: int, to_body: Floats32, before: np.float32
 ) -> bool:
-    """Whether no point that a block can show lies before the lamps.
+    """Returns whether no point that a block can show lies before the lamps.
 
-    before: m by which the camera stands before them.
+    before: m by which the camera stands before them. v: m down per m ahead of the block's row.
     """
     ahead = -np.inf
     for column in (first, first + count):
@@ -232,7 +235,7 @@ def _headlights(
     offset: Floats32,
     work: Floats32,
 ) -> None:
-    """Light of the ego's beam on a block."""
+    """Writes the light of the ego's beam on a block's pixels into lane H of `work`."""
     beam, slope, reach = beam_of(light)
     b00, b01, b02 = to_body[0, 0], to_body[0, 1], to_body[0, 2]
     b10, b11, b12 = to_body[1, 0], to_body[1, 1], to_body[1, 2]
@@ -251,7 +254,7 @@ def _headlights(
 def _surfaces(
     v: np.float32, count: int, light: Lighting, sun: Floats32, up: Floats32, work: Floats32
 ) -> None:
-    """Sun, diffuse light, lamps, wet mirror and haze of a block's surfaces, in place."""
+    """Applies sun, diffuse light, lamps, wet mirror and haze to a block's surfaces in `work`."""
     beta, begins = np.float32(light.extinction), np.float32(light.haze_begins)
     wet = np.float32(light.wet)
     sun_r, sun_g, sun_b = light.sun[0], light.sun[1], light.sun[2]
@@ -315,7 +318,7 @@ def shade(
     key: NDArray[np.int32],
     out: NDArray[np.uint32],
 ) -> None:
-    """The deferred pass over the rows of the view.
+    """Writes the colours of the view's rows into `out`, from key and inverse depth (deferred shading).
 
     sun, up: (3,) camera axes; to_body, offset: camera to ego frame.
     """

@@ -15,7 +15,10 @@ _GLOW_SHARE, _DISC_SHARE = np.float32(0.25), np.float32(3.0)
 
 @inner_kernel
 def sky(v: np.float32, count: int, light: Lighting, up: Floats32, work: Floats32) -> None:
-    """The sky where a block shows nothing else."""
+    """Writes the colour of the sky into `work` where a block shows nothing else.
+
+    v: m down per m ahead of the block's row; up: (3,) camera axes.
+    """
     hor_r, hor_g, hor_b = light.horizon[0], light.horizon[1], light.horizon[2]
     zen_r, zen_g, zen_b = light.zenith[0] - hor_r, light.zenith[1] - hor_g, light.zenith[2] - hor_b
     up0, up1, up2 = up[0], up[1], up[2]
@@ -33,7 +36,10 @@ def sky(v: np.float32, count: int, light: Lighting, up: Floats32, work: Floats32
 
 @inner_kernel
 def disc(v: np.float32, count: int, light: Lighting, sun: Floats32, work: Floats32) -> None:
-    """The sun and its glow in a block's sky."""
+    """Adds the sun and its glow to a block's sky in `work`.
+
+    v: m down per m ahead of the block's row; sun: (3,) towards the sun in camera axes.
+    """
     bright = np.float32(light.disc)
     sun_r, sun_g, sun_b = light.sun[0], light.sun[1], light.sun[2]
     sun0, sun1, sun2 = sun[0], sun[1], sun[2]

@@ -19,7 +19,7 @@ _NOWHERE = np.float32(-1.0)
 def add_street_light(
     view: View, v: np.float32, count: int, share: np.float32, lamps: StreetLight, work: Floats32
 ) -> None:
-    """Add the light of street lamps, `share` of it, to the beams that fall on a block."""
+    """Adds the light of street lamps, `share` of it, to the beams that fall on a block (lane H of `work`)."""
     r = view.rotation
     x_u, x_1 = np.float32(r[0, 0]), np.float32(r[1, 0]) * v + np.float32(r[2, 0])
     y_u, y_1 = np.float32(r[0, 1]), np.float32(r[1, 1]) * v + np.float32(r[2, 1])

@@ -40,15 +40,15 @@ class RayHits(NamedTuple):
 
 
 def sectors_of(azimuth: Floats) -> Ints:
-    """The quarter of the turn in which each azimuth (rad) lies; the first is around 0."""
+    """Returns the quarter of the turn, 0 to 3, in which each azimuth (rad) lies; the first is around 0."""
     sector: Ints = np.round(azimuth * (SECTORS / (2.0 * pi))).astype(np.int64) % SECTORS
     return sector
 
 
 def look_around(scene: LiveScene, pose: Pose, fan: Fan, reach: float, hidden: int) -> RayHits:
-    """The nearest surfaces along rays from `pose`.
+    """Returns the nearest surfaces along rays from `pose`; rays that meet none within `reach` m are left out.
 
-    reach: m. hidden: row of the actor that no ray meets, or -1.
+    hidden: row of the actor that no ray meets, or -1.
     """
     quarter = sectors_of(fan.azimuth)
     turn = fan.azimuth - quarter * 2.0 * pi / SECTORS
@@ -71,7 +71,7 @@ def look_around(scene: LiveScene, pose: Pose, fan: Fan, reach: float, hidden: in
 
 
 def directions(fan: Fan, ray: Ints) -> Floats:
-    """Unit vectors of these rays, (m, 3): forward, left, up."""
+    """Returns unit vectors of these rays, (m, 3): forward, left, up. ray: (m,) indices in the fan."""
     column, channel = fan.column[ray], fan.channel[ray]
     flat = np.cos(fan.elevation)[channel]
     direction = np.empty((len(ray), 3))
@@ -84,7 +84,7 @@ def directions(fan: Fan, ray: Ints) -> Floats:
 def _cast_sector(
     scene: LiveScene, facing: Pose, u: Floats, v: Floats, reach: float, hidden: int
 ) -> Hits:
-    """Hits of one pyramid's rays, which go u right and v down per metre along its axis."""
+    """Returns the hits of one pyramid's rays, which go u right and v down per metre along its axis."""
     focal = CELLS / 2.0
     rows = 8 * ceil((float(np.abs(v).max()) + 1e-6) * focal / 4.0)
     place = np.array([facing.x, facing.y, facing.z])
@@ -98,7 +98,10 @@ def _cast_sector(
 
 @kernel
 def _settle(part: Hits, u: Floats, v: Floats, mine: Ints, hits: Hits, distance: Floats) -> None:
-    """What the rays `mine` met into all hits, and how far away."""
+    """Writes what the rays `mine` met into `hits`, and their lengths in m into `distance`.
+
+    u, v: m right and down per m ahead. `distance` stays as it was where nothing was met.
+    """
     for i in range(mine.size):
         to = mine[i]
         if part.inverse[i] > 0.0:

@@ -43,14 +43,17 @@ class Sprayed(NamedTuple):
 
 
 def no_spray() -> Sprayed:
-    """Returns what is there without spray."""
+    """Returns the value for beams without any spray: empty arrays."""
     none = np.empty(0)
     return Sprayed(none, none, none)
 
 
 @inner_kernel
 def _span(cloud: Floats, back: float, left: float) -> float:
-    """Half the angle over which an eye `back` m behind the rear and `left` m of its middle sees a cloud."""
+    """Returns half the angle in rad over which an eye sees a cloud; pi from inside.
+
+    The eye is `back` m behind the rear and `left` m of its middle. cloud: (8,) as in `spray_of`.
+    """
     length, half = cloud[4], cloud[5]
     if 0.0 <= back <= length and abs(left) <= half:
         return pi
@@ -67,10 +70,11 @@ def spray_of(
     clouds: Floats, eye: Floats, azimuth: Floats, ways: Floats, distance: Floats, key: np.uint64,
     tick: int,
 ) -> Sprayed:  # fmt: skip
-    """What clouds (k, 8) do to beams from `eye` (3,) with unit vectors ways (n, 3), both of the world.
+    """Returns what clouds (k, 8) do to beams from `eye` (3,) with unit vectors ways (n, 3), of the world.
 
     A cloud: x, y, z of the middle of the rear at the road, yaw, length, half width, height in m,
     extinction in 1/m at its begin. azimuth (m,): of the columns of n / m beams each, roughly.
+    distance (n,): m to the surface that ends each beam.
     """
     n = distance.size
     channels = n // azimuth.size
@@ -154,7 +158,7 @@ class SprayClouds:
         )
 
     def at(self, states: ActorStates) -> Floats:
-        """Returns the clouds (k, 8) of this moment, as `spray_of` takes them."""
+        """Returns the clouds (k, 8) of this moment, as in `spray_of`, but those thinner than LEAST."""
         table, rows = self.table, []
         for i in np.flatnonzero(states.present & (table.kind <= ActorKind.MOTORCYCLE)).tolist():
             speed = float(np.hypot(states.vx[i], states.vy[i]))

@@ -104,7 +104,7 @@ class Lidar:
         seen: RayHits,
         tick: int,
     ) -> Sprayed:
-        """What spray does to every beam of a tick."""
+        """Returns what spray does to every beam of a tick."""
         n = len(fan.column)
         distance = np.full(n, self.spec.range)
         distance[seen.ray] = seen.distance
@@ -114,7 +114,7 @@ class Lidar:
     def _through_weather(
         self, model: ReturnModel, fan: Fan, seen: RayHits, tick: int, spray: Sprayed
     ) -> LidarPoints:
-        """What is noticed of the beams of a tick; false returns have class 0 and no actor."""
+        """Returns what is noticed of the beams of a tick; false returns have class 0 and no actor."""
         n = len(fan.column)
         out = LidarPoints(
             np.empty((n, 3), np.float32), np.empty(n, np.float32), np.empty(n, np.float32),
@@ -131,7 +131,7 @@ def scan_weather(
     air: BeamAir, fan: Fan, seen: RayHits, aside: Floats, up: Floats, key: np.uint64, tick: int,
     out: LidarPoints, spray: Sprayed,
 ) -> int:  # fmt: skip
-    """All beams of a tick into `out`, without those that nothing came back of; their number.
+    """Writes the beams of a tick of which something came back into `out`; returns their number.
 
     aside, up: cosine and sine of the fan's azimuths and elevations.
     """

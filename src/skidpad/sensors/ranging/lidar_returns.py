@@ -80,9 +80,10 @@ class Returns(NamedTuple):
 
 @inner_kernel
 def _strongest_drop(m: BeamAir, chance: float, second: float) -> tuple[float, float]:
-    """Power and distance of a beam's strongest drop, of a number below `drop_share` and another one.
+    """Returns power and distance in m of a beam's strongest drop, of two random numbers in [0, 1).
 
-    The mean number of drops stronger than the strongest is exponential: -log(1 - chance).
+    chance: below `drop_share`. The mean number of drops stronger than the strongest is exponential:
+    -log(1 - chance).
     """
     number = -log1p(-chance)
     low, high = 0, m.mean.size - 1  # mean[low] > number >= mean[high]
@@ -108,9 +109,10 @@ def find_returns(
     tick: int,
     spray: Sprayed,
 ) -> Returns:
-    """What beams bring back; distance: of the surface in the way, inf: none.
+    """Returns what beams bring back. distance: (n,) m of the surface in the way, inf: none.
 
-    One loop: a call per beam that is handed the air's arrays would cost more than all the rest.
+    label: (n,) of the surfaces. One loop: a call per beam that is handed the air's arrays would cost
+    more than all the rest.
     """
     n, sprayed = distance.size, spray.depth.size > 0
     out, strengths, false = np.empty(n), np.empty(n), np.zeros(n, np.bool_)
@@ -148,7 +150,7 @@ def find_returns(
 
 
 def reflectivities() -> Floats:
-    """Return the reflectivities of all classes, by label."""
+    """Returns the reflectivities (256,) of all classes, by label."""
     table = np.full(256, OTHER)
     table[[int(c) for c in GROUND]] = ON_GROUND
     table[int(SemanticClass.TRAFFIC_SIGN)] = SIGN
@@ -173,12 +175,16 @@ class ReturnModel:
     def measure(
         self, distance: Floats, label: NDArray[np.int64], key: int, tick: int = 0
     ) -> Returns:
-        """What beams bring back whose surfaces are so far; inf: they meet none."""
+        """Returns what beams bring back without spray.
+
+        distance: (n,) m of their surfaces, inf: they meet none. label: (n,) of the surfaces.
+        The same key and tick give the same returns.
+        """
         return find_returns(self.air, distance, label, np.uint64(key), tick, no_spray())
 
 
 def fog_response(air: LidarAir, reach: float) -> tuple[float, float]:
-    """Distance in m and power of fog's strongest answer to a pulse."""
+    """Returns distance in m and power of fog's strongest answer to a pulse; power 0 without fog."""
     step = 0.05
     r = np.arange(step, min(reach, 60.0), step)
     low, high = MEETS
@@ -208,19 +214,19 @@ class DropReturns:
         self.places = places / np.maximum(places[:, -1:], 1e-300)
 
     def _diameter_for(self, power: float) -> Floats:
-        """Diameter in mm of a drop at each distance that returns this power."""
+        """Returns the diameter in mm of a drop at each distance `r` that returns this power."""
         beam = 1e3 * np.tan(DIVERGENCE) * self.r
         return np.asarray(beam * np.sqrt(power / np.maximum(self.most, 1e-300)))
 
     def _stronger(self, drops: Drops, power: float) -> Floats:
-        """Mean number of stronger drops per metre of the beam."""
+        """Returns the mean number of stronger drops per metre of the beam, at each distance `r`."""
         area = 0.25 * np.pi * (np.tan(DIVERGENCE) * self.r) ** 2
         diameter = np.maximum(self._diameter_for(power), SMALLEST_MM)
         number = drops.density / drops.slope * np.exp(-drops.slope * diameter)
         return np.where(power < self.most, area * number, 0.0)
 
     def _places(self, drops: Drops, power: float) -> Floats:
-        """Where a drop of just this power is, unnormalised."""
+        """Returns how likely a drop of just this power is at each distance `r`, unnormalised."""
         diameter = self._diameter_for(power)
         density = self.r**2 * diameter * np.exp(-drops.slope * diameter)
         return np.where((power < self.most) & (diameter > SMALLEST_MM), density, 0.0)

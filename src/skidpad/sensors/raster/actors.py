@@ -14,7 +14,7 @@ from skidpad.sensors.scene.static import pixel_key
 
 
 def make_actors(table: ActorTable) -> Actors:
-    """Meshes of the table's actors; actors of the same shape share one."""
+    """Returns the meshes of the table's actors; those of the same shape share one. None is present yet."""
     meshes: list[Mesh] = []
     known: dict[tuple[int, float, float, float], int] = {}
     which = []

@@ -34,7 +34,7 @@ class SceneMap(Protocol):
 
 
 def scene_of(map: SceneMap) -> StaticScene:
-    """The triangulated map; the last few maps of a process are kept."""
+    """Returns the triangulated map; the last KEPT_SCENES maps of a process are kept by content hash."""
     scene = _SCENES.pop(map.content_hash, None)
     if scene is None:
         scene = build_scene(map.samples, map.lanes, map.roadside)
@@ -61,7 +61,10 @@ class LiveScene:
         self._scratch = make_scratch(largest, widest)
 
     def place(self, states: ActorStates, elapsed: float) -> None:
-        """Put the actors where they are, `elapsed` s after the last time; vz from the height."""
+        """Puts the actors where they are, `elapsed` s after the last time; vz from the height.
+
+        vz is 0 at the first call and for a climb faster than MAX_CLIMB.
+        """
         place_actors(states, self.actors)
         climb = (states.z - self._height) / elapsed
         self._height[:] = states.z
@@ -70,11 +73,14 @@ class LiveScene:
         self.motion[:, 3] = states.yaw_rate
 
     def show(self, lights: Mapping[int, LightState]) -> None:
-        """Let the lights, by signal id, shine as they do now."""
+        """Writes the keys of the signal lamps as the lights, by signal id, show now; all others are dark."""
         self.key[self.static.lamps.triangle] = self.static.lamp_keys(lights)
 
     def draw(self, view: View, hidden: int, level: int, out: Pass) -> None:
-        """Inverse depth and keys of a view's rows. hidden: row of the actor left out, or -1."""
+        """Writes inverse depth and keys of a view's rows into `out`.
+
+        hidden: row of the actor left out, or -1. level: of detail, or AUTO_LEVEL.
+        """
         rasteriser.raster(
             self.static.chunks,
             self.key,
@@ -88,7 +94,10 @@ class LiveScene:
         )
 
     def cast(self, view: View, hidden: int, reach: float, along: Rays, hits: Hits) -> None:
-        """The nearest surface on every ray; a hit beyond `reach` (m) may or may not be told."""
+        """Writes the nearest surface on every ray into `hits`; one beyond `reach` m may or may not be told.
+
+        hidden: row of the actor that no ray meets, or -1.
+        """
         rays.cast(
             self.static.chunks,
             self.key,

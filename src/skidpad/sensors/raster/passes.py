@@ -42,7 +42,7 @@ class Pass:
         self.instances = self.key.view(np.uint16).reshape(*shape, 2)[..., 1]
 
     def missing(self, rows: range) -> range:
-        """What must be drawn before `rows` show the present; nothing if they do."""
+        """Returns the rows to draw before `rows` show the present; NOTHING if they do."""
         done = self.drawn
         if not done:
             return rows
@@ -51,7 +51,7 @@ class Pass:
         return range(min(done.start, rows.start), max(done.stop, rows.stop))
 
     def limit_sight(self, view: View) -> None:
-        """Remove what the weather hides from the rows of the view."""
+        """Removes what the weather hides from the rows of the view, in place."""
         if min(self.sight) < LAND:
             depth, labels = (np.float32(min(s, 10.0 * LAND)) for s in self.sight)
             hide_beyond(depth, labels, view, self.inverse, self.key)
@@ -65,7 +65,7 @@ def hide_beyond(
     inverse: NDArray[np.float32],
     key: NDArray[np.int32],
 ) -> None:
-    """Clear the depth, and turn the class to sky, of pixels whose ray is longer than the sight."""
+    """Clears the depth, and turns the class to sky, of pixels whose ray is longer than the sight in m."""
     width = inverse.shape[1]
     start = np.float32((0.5 - view.cx) / view.focal)
     step = np.float32(1.0 / view.focal)
@@ -84,6 +84,6 @@ def hide_beyond(
 
 
 def poison(*buffers: NDArray[Any]) -> None:
-    """Fill with what no sensor delivers, so that a reader of a stale frame fails loudly."""
+    """Fills buffers with what no sensor delivers, so that a reader of a stale frame fails loudly."""
     for buffer in buffers:
         buffer.view(np.uint8)[...] = 0xA5 if buffer.dtype.kind != "f" else 0xFF

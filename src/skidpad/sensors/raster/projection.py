@@ -27,7 +27,7 @@ class Scratch(NamedTuple):
 
 
 def make_scratch(largest_block: int, width: int) -> Scratch:
-    """Room for blocks of so many vertices and images of so many columns."""
+    """Returns room for blocks of so many vertices and images of so many columns."""
     return Scratch(
         np.empty((largest_block, 3)),
         np.empty((largest_block, 3)),
@@ -46,7 +46,10 @@ def project_block(
     view: View,
     scratch: Scratch,
 ) -> None:
-    """Vertices to camera axes, screen and frustum codes. turn, shift: their frame to camera."""
+    """Writes `count` vertices from `first` on to `scratch`: camera axes, screen and frustum codes.
+
+    turn, shift: their frame to camera.
+    """
     m00, m01, m02 = turn[0, 0], turn[0, 1], turn[0, 2]
     m10, m11, m12 = turn[1, 0], turn[1, 1], turn[1, 2]
     m20, m21, m22 = turn[2, 0], turn[2, 1], turn[2, 2]
@@ -81,7 +84,10 @@ def project_block(
 
 @inner_kernel
 def clip_near(a: int, b: int, c: int, view: View, scratch: Scratch, out: Floats) -> int:
-    """Corners (k, 3) of the part of a triangle beyond the near plane, on screen; k is 0, 3 or 4."""
+    """Writes the corners (k, 3) on screen of a triangle's part beyond the near plane into `out`; returns k.
+
+    k is 0, 3 or 4. a, b, c: vertices in `scratch`.
+    """
     corners = (a, b, c)
     k = 0
     for e in range(3):
@@ -108,7 +114,10 @@ def clip_near(a: int, b: int, c: int, view: View, scratch: Scratch, out: Floats)
 
 @inner_kernel
 def sphere_visible(centre: Floats, radius: float, view: View, sides: Floats, shift: Floats) -> bool:
-    """Whether any of a sphere may lie in the frustum. sides: (4,) lengths of the side normals."""
+    """Returns whether any of a sphere may lie in the frustum. sides: (4,) lengths of the side normals.
+
+    shift: (3,) of the world's origin in camera axes.
+    """
     r = view.rotation
     x = r[0, 0] * centre[0] + r[0, 1] * centre[1] + r[0, 2] * centre[2] + shift[0]
     y = r[1, 0] * centre[0] + r[1, 1] * centre[1] + r[1, 2] * centre[2] + shift[1]
@@ -127,7 +136,7 @@ def sphere_visible(centre: Floats, radius: float, view: View, sides: Floats, shi
 
 @inner_kernel
 def frustum_sides(view: View) -> Floats:
-    """(4,) lengths of the inward normals of the left, right, upper and lower plane."""
+    """Returns (4,) lengths of the inward normals of the left, right, upper and lower plane."""
     sides = np.empty(4)
     sides[0] = np.hypot(view.focal, view.cx)
     sides[1] = np.hypot(view.focal, view.width - view.cx)
@@ -138,7 +147,7 @@ def frustum_sides(view: View) -> Floats:
 
 @inner_kernel
 def rotated(m: Floats, v: Floats) -> Floats:
-    """m @ v of a (3, 3) and a (3,), in a fixed order of additions."""
+    """Returns m @ v of a (3, 3) and a (3,), in a fixed order of additions."""
     out = np.empty(3)
     for i in range(3):
         out[i] = m[i, 0] * v[0] + m[i, 1] * v[1] + m[i, 2] * v[2]
@@ -147,7 +156,7 @@ def rotated(m: Floats, v: Floats) -> Floats:
 
 @inner_kernel
 def composed(a: Floats, b: Floats) -> Floats:
-    """a @ b of two (3, 3), in a fixed order of additions."""
+    """Returns a @ b of two (3, 3), in a fixed order of additions."""
     out = np.empty((3, 3))
     for i in range(3):
         for j in range(3):

@@ -71,7 +71,7 @@ def _fill(
     inverse: NDArray[np.float32],
     key: Ints32,
 ) -> None:
-    """Draw one projected triangle: columns x, rows y, inverse depths w at its corners."""
+    """Draws a projected triangle where it is nearest: columns x, rows y, inverse depths w at its corners."""
     width = inverse.shape[1]
     top = max(first_row, ceil(min(y0, y1, y2) - 0.5))
     bottom = min(end_row, ceil(max(y0, y1, y2) - 0.5))
@@ -132,7 +132,10 @@ def _draw_block(
     inverse: NDArray[np.float32],
     key: Ints32,
 ) -> None:
-    """Draw triangles whose vertices `project_block` has prepared."""
+    """Draws triangles whose vertices `project_block` has prepared into `inverse` and `key`.
+
+    instance: row of the actor + 1, shifted left by 16; 0: the map.
+    """
     screen, code, ramp = scratch.screen, scratch.code, scratch.ramp
     for t in range(first, first + count):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
@@ -181,7 +184,7 @@ def _draw_block(
 
 @inner_kernel
 def chunk_level(centre: Floats, radius: float, view: View, level: int) -> int:
-    """The level of detail of a chunk, unless one is prescribed."""
+    """Returns the level of detail of a chunk by its distance, or `level` unless that is negative."""
     if level >= 0:
         return level
     dx, dy, dz = (
@@ -209,7 +212,7 @@ def raster(
     inverse: NDArray[np.float32],
     key: Ints32,
 ) -> None:
-    """Draw the view's rows into `inverse` (H, W) and `key` (H, W), cleared there first.
+    """Draws the view's rows into `inverse` (H, W) and `key` (H, W), cleared there first.
 
     static_key: `chunks.key` with the lamps as they shine now. hidden: index of the actor that is
     not drawn, or -1. level: a level of detail for all chunks, or AUTO_LEVEL.

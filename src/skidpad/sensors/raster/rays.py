@@ -49,7 +49,7 @@ class Hits(NamedTuple):
 
 
 def make_rays(n: int, width: int, height: int) -> Rays:
-    """Room for n rays in width x height cells."""
+    """Returns room for n rays in width x height cells."""
     return Rays(
         np.zeros(n),
         np.zeros(n),
@@ -65,7 +65,7 @@ def make_hits(n: int) -> Hits:
 
 @inner_kernel
 def sort_into_cells(view: View, rays: Rays) -> None:
-    """Fill `start` and `order` from the rays' columns and rows (a counting sort)."""
+    """Fills `start` and `order` from the rays' columns and rows (a counting sort)."""
     rays.start[:] = 0
     for i in range(rays.column.size):
         x = min(max(floor(rays.column[i]), 0), view.width - 1)
@@ -86,7 +86,7 @@ def sort_into_cells(view: View, rays: Rays) -> None:
 
 @inner_kernel
 def _in_axes(view: View, point: Floats, shift: Floats) -> tuple[float, float, float]:
-    """A point (3,) of the world in camera axes."""
+    """Returns a point (3,) of the world in camera axes."""
     r = view.rotation
     x = r[0, 0] * point[0] + r[0, 1] * point[1] + r[0, 2] * point[2] + shift[0]
     y = r[1, 0] * point[0] + r[1, 1] * point[1] + r[1, 2] * point[2] + shift[1]
@@ -98,7 +98,7 @@ def _in_axes(view: View, point: Floats, shift: Floats) -> tuple[float, float, fl
 def _is_touched(
     centre: Floats, radius: float, view: View, shift: Floats, rays: Rays, hits: Hits
 ) -> bool:
-    """Whether any ray comes to within the sphere before its hit so far.
+    """Returns whether any ray comes to within the sphere before its hit so far.
 
     Only rays of the cells that the sphere's box covers on screen are asked.
     """
@@ -131,7 +131,7 @@ def _is_touched(
 
 @inner_kernel
 def _meet(corners: Floats, value: int, view: View, rays: Rays, hits: Hits) -> None:
-    """Test one projected triangle (3, 3) against the rays of the cells that it touches."""
+    """Writes one projected triangle (3, 3) into `hits` of those rays that meet it nearer than before."""
     x0, y0, w0 = corners[0, 0], corners[0, 1], corners[0, 2]
     x1, y1, w1 = corners[1, 0], corners[1, 1], corners[1, 2]
     x2, y2, w2 = corners[2, 0], corners[2, 1], corners[2, 2]
@@ -168,7 +168,10 @@ def _meet(corners: Floats, value: int, view: View, rays: Rays, hits: Hits) -> No
 
 @inner_kernel
 def _incidence(a: float, b: float, w: float, px: float, py: float, view: View) -> float:
-    """Cosine between the ray and the normal of the plane whose inverse depth has slopes a, b."""
+    """Returns the cosine between the ray and the normal of the plane whose inverse depth has slopes a, b.
+
+    w: inverse depth; px, py: column and row.
+    """
     u, v = (px - view.cx) / view.focal, (py - view.cy) / view.focal
     nx, ny = a * view.focal, b * view.focal
     nz = w - nx * u - ny * v
@@ -222,7 +225,7 @@ def cast(
     rays: Rays,
     hits: Hits,
 ) -> None:
-    """The nearest surface along every ray into `hits`.
+    """Writes the nearest surface along every ray into `hits`; inverse depth 0 where there is none.
 
     hidden: the actor that carries the sensor, or -1. reach: chunks and actors wholly beyond it
     (m) are skipped; a hit beyond it may still be reported.

@@ -27,13 +27,13 @@ class View(NamedTuple):
 
 
 def world_to_camera(pose: Pose) -> NDArray[np.float64]:
-    """(3, 3) for a camera that looks along the pose's x axis."""
+    """Returns (3, 3) world to camera axes (right, down, forward) for one that looks along the pose's x."""
     forward, left, up = pose.rotation().T
     return np.ascontiguousarray(np.stack([-left, -up, forward]))
 
 
 def camera_view(spec: CameraSpec, pose_world_body: Pose) -> View:
-    """The view of a mounted camera while its carrier stands at the pose."""
+    """Returns the view of a mounted camera while its carrier stands at the pose."""
     pose = pose_world_body @ spec.mount
     return View(
         spec.width,

@@ -29,7 +29,7 @@ WHEEL_SIDES = 10
 
 
 def body_mesh(kind: ActorKind, length: float, width: float, height: float) -> Mesh:
-    """The mesh of one actor, in metres in its own frame."""
+    """Returns the mesh of one actor, in metres in its own frame; it fills its box."""
     shapes = {
         ActorKind.CAR: _car,
         ActorKind.VAN: _van,
@@ -44,7 +44,10 @@ def body_mesh(kind: ActorKind, length: float, width: float, height: float) -> Me
 
 
 def _hull(label: int, stations: Sequence[tuple[float, float, float, float]], half: float) -> Mesh:
-    """Painted lower body: stations (x, half-width share, z low, z high), edges rounded."""
+    """Returns a painted lower body: stations (x, half-width share, z low, z high), edges rounded.
+
+    half: m, half of the width.
+    """
     rings = []
     for x, share, low, high in stations:
         y, rise = half * share, high - low
@@ -65,7 +68,11 @@ def _cabin(
     half: tuple[float, float],
     pillars: Sequence[float] = (0.0, 0.52, 1.0),
 ) -> Mesh:
-    """Glasshouse: (x rear, x front, z) of sill and roof, their half-widths; painted roof, pillars."""
+    """Returns a glasshouse with a painted roof and pillars.
+
+    bottom, top: x rear, x front and z of sill and roof; half: their half-widths, all in m. pillars:
+    where along the side, as shares from rear to front.
+    """
     (xr, xf, z0), (tr, tf, z1) = bottom, top
     corners = np.array(
         [
@@ -116,14 +123,17 @@ def _wheels(label: int, axles: Sequence[float], half: float, radius: float, brea
 def _plate(
     label: int, x: float, y: tuple[float, float], z: tuple[float, float], material: Material
 ) -> Mesh:
-    """An upright rectangle that looks along x."""
+    """Returns an upright rectangle that looks along x; y, z: limits in m."""
     left = np.array([[x, y[0], z[0]], [x, y[0], z[1]]])
     right = np.array([[x, y[1], z[0]], [x, y[1], z[1]]])
     return patches(left, right, np.array([[0, 1]]), label, material)
 
 
 def _lamps(label: int, length: float, width: float, z: float, size: tuple[float, float]) -> Mesh:
-    """Head lamps, tail lamps, number plates; the outermost faces of the mesh in x."""
+    """Returns head lamps, tail lamps and number plates; the outermost faces of the mesh in x.
+
+    z: m, lower edge of the head lamps; size: width and height of a lamp.
+    """
     front, rear = length / 2, -length / 2
     inner, outer = 0.40 * width - size[0], 0.40 * width
     parts = []
@@ -216,7 +226,7 @@ def _van(label: int, length: float, width: float, height: float) -> Mesh:
 def _windscreen(
     label: int, top: tuple[float, float], bottom: tuple[float, float], half: float
 ) -> Mesh:
-    """A sloped pane from (x, z) to (x, z), 2 cm in front of the body."""
+    """Returns a sloped pane from (x, z) to (x, z) and `half` m to either side, 2 cm in front of the body."""
     left = np.array([[top[0] + 0.02, half, top[1]], [bottom[0] + 0.02, half, bottom[1] + 0.01]])
     return patches(left, left * (1, -1, 1), np.array([[0, 1]]), label, Material.GLASS)
 
@@ -224,7 +234,7 @@ def _windscreen(
 def _side_windows(
     label: int, x: tuple[float, float], z: tuple[float, float], half: float
 ) -> list[Mesh]:
-    """One pane on either side, flush with the box."""
+    """Returns one pane on either side, `half` m from the middle; x, z: limits in m."""
     panes = []
     for s in (-1.0, 1.0):
         left: Points = np.array([[x[0], s * half, z[0]], [x[1], s * half, z[0]]])

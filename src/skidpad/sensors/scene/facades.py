@@ -39,7 +39,7 @@ def storeys_of(thing: Box) -> int:
 
 
 def flat_roofed_levels(thing: Box, material: int) -> list[Mesh]:
-    """Returns a building with a flat roof, one mesh per level."""
+    """Returns a building with a flat roof, one mesh per level of detail, the nearest first."""
     a, b, h = thing.length / 2, thing.width / 2, thing.height
     rng = np.random.default_rng(thing.variant)
     body = box((-a, a), (-b, b), (0.0, h - 0.9), thing.label, material)
@@ -56,7 +56,7 @@ def flat_roofed_levels(thing: Box, material: int) -> list[Mesh]:
 
 
 def gabled_levels(thing: Box, material: int) -> list[Mesh]:
-    """Returns a building with a gable roof along its length, one mesh per level."""
+    """Returns a building with a gable roof along its length, one mesh per level, the nearest first."""
     eaves = 0.35
     a, b, h = thing.length / 2 - eaves, thing.width / 2 - eaves, thing.height
     rng = np.random.default_rng(thing.variant)
@@ -73,7 +73,10 @@ def gabled_levels(thing: Box, material: int) -> list[Mesh]:
 def _gable(
     thing: Box, wall: float, top: float, material: int, a: float, b: float, rng: np.random.Generator
 ) -> Mesh:
-    """Two slopes that reach over the walls, and the two triangles below them."""
+    """Returns two slopes that reach over the walls, and the two triangles below them.
+
+    wall, top: m, height of walls and ridge; a, b: m, half length and width between the walls.
+    """
     length, width = thing.length / 2, thing.width / 2
     low = wall - 0.2
     slopes = np.array(
@@ -92,13 +95,16 @@ def _gable(
 
 
 def _panes(corners: Points, thing: Box, material: int) -> Mesh:
-    """Quads (q, 4, 3) of one material."""
+    """Returns the quads (q, 4, 3) as a mesh of one material."""
     index = np.arange(4 * len(corners), dtype=np.int32).reshape(-1, 4)
     return Mesh.of(corners.reshape(-1, 3), quads(index), thing.label, material)
 
 
 def _fronts(a: float, b: float) -> list[tuple[Points, Points, float]]:
-    """Middle of the foot, direction along, and half length of the four walls."""
+    """Returns middle of the foot, direction along, and half length of the four walls.
+
+    a, b: m, half length and width between them.
+    """
     p = PROUD
     return [
         (np.array([0.0, -b - p, 0.0]), np.array([1.0, 0.0, 0.0]), a),
@@ -111,7 +117,7 @@ def _fronts(a: float, b: float) -> list[tuple[Points, Points, float]]:
 def _quads_on(
     front: tuple[Points, Points, float], u: Points, z: Points, width: float, height: float
 ) -> Points:
-    """(q, 4, 3) upright rectangles around places u along a wall whose lower edges are at z."""
+    """Returns (q, 4, 3) upright rectangles around places u along a wall whose lower edges are at z, in m."""
     middle, along, _ = front
     sides = np.array([-0.5, 0.5, 0.5, -0.5]) * width
     rise = np.array([0.0, 0.0, 1.0, 1.0]) * height
@@ -123,7 +129,7 @@ def _quads_on(
 
 
 def _windows(thing: Box, a: float, b: float, rng: np.random.Generator) -> Mesh:
-    """All windows and a door: those of the ground floor of larger buildings are shops."""
+    """Returns all windows, and two doors unless the ground floor of a larger building is shops."""
     style = STYLES[int(rng.integers(len(STYLES)))]
     storeys = storeys_of(thing)
     has_shops = storeys > 2 and rng.random() < 0.6
@@ -153,7 +159,7 @@ def _windows(thing: Box, a: float, b: float, rng: np.random.Generator) -> Mesh:
 
 
 def _door(front: tuple[Points, Points, float], thing: Box) -> Mesh:
-    """A door in the last bay of a wall."""
+    """Returns a door in the last bay of a wall."""
     middle, along, half = front
     place = np.array([half - 0.9])
     shifted = (middle + (middle / max(np.abs(middle).max(), 1e-9)) * PROUD, along, half)
@@ -163,7 +169,7 @@ def _door(front: tuple[Points, Points, float], thing: Box) -> Mesh:
 
 
 def _bands(thing: Box, a: float, b: float) -> Mesh:
-    """A strip of glass per storey and wall: windows from afar."""
+    """Returns a strip of glass per storey and wall: windows from afar. Walls below 2.4 m have none."""
     z: Points = FOOT + np.arange(storeys_of(thing), dtype=np.float64) * STOREY + 1.1
     panes = [
         _quads_on(front, np.zeros(len(z)), z, 2.0 * front[2] - 1.6, 0.75)

@@ -32,12 +32,15 @@ Pieces = Iterator[tuple[ChunkKey, list[Mesh]]]
 
 
 def cell(x: float, y: float) -> ChunkKey:
-    """The chunk of things that stand alone."""
+    """Returns the key of the chunk that holds things at (x, y) m which stand alone."""
     return ("side", floor(x / CHUNK), floor(y / CHUNK), 0)
 
 
 def furniture_pieces(roadside: Roadside, box_material: dict[tuple[int, int, int], int]) -> Pieces:
-    """Everything beside the road but the lamps, which change: chunk key and a mesh per level."""
+    """Yields everything beside the road but the lamps, which change: chunk key and a mesh per level.
+
+    box_material: material of boxes by their colour.
+    """
     for barrier in roadside.barriers:
         yield from _barrier(barrier)
     for thing in roadside.boxes:
@@ -68,7 +71,7 @@ def _barrier(barrier: Barrier) -> Pieces:
 
 
 def _resample_polyline(points: Points, step: float) -> Points:
-    """The polyline at about `step` m, ends kept."""
+    """Returns the polyline (n, 3) in even steps of about `step` m, ends kept."""
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     n = max(1, round(s[-1] / step))
     at = np.linspace(0.0, s[-1], n + 1)
@@ -107,7 +110,7 @@ def _post(foot: Points, height: float) -> Mesh:
 
 
 def _box(thing: Box, material: int) -> list[Mesh]:
-    """Returns one mesh per level."""
+    """Returns one mesh per level of detail of a box or shape, where it stands."""
     rotation = Pose(thing.x, thing.y, thing.z, yaw=thing.yaw).rotation()
     place = np.array([thing.x, thing.y, thing.z])
     if thing.shape is Shape.BOX:
@@ -118,7 +121,7 @@ def _box(thing: Box, material: int) -> list[Mesh]:
 
 
 def _facing(head: SignalHead, mesh: Mesh) -> Mesh:
-    """Turns a mesh from a frame whose x looks back at the traffic to the world."""
+    """Returns a mesh in the world, turned from a frame whose x looks back at the traffic."""
     c, s = -cos(head.heading), -sin(head.heading)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     return mesh.moved(turn, np.array([head.x, head.y, head.z]))
@@ -138,7 +141,7 @@ def _housing(head: SignalHead) -> Mesh:
 
 
 def lamp_mesh(head: SignalHead, place: int) -> Mesh:
-    """One lamp: place 0 is red on top, 1 yellow, 2 green."""
+    """Returns the mesh of one lamp: place 0 is red on top, 1 yellow, 2 green."""
     d = head.lamp_diameter
     centre = (0.02, 0.0, (1 - place) * 1.25 * d)
     lens = disc(centre, 0, d / 2, 12, SemanticClass.TRAFFIC_LIGHT, Material.LAMP_DARK)
@@ -146,7 +149,7 @@ def lamp_mesh(head: SignalHead, place: int) -> Mesh:
 
 
 def _crosswalk(polygon: NDArray[np.float64]) -> Mesh:
-    """Zebra stripes along the polygon's short side, over its first four corners."""
+    """Returns zebra stripes along the polygon's short side, over its first four corners; of three one."""
     p: Points = np.add(polygon[:4], (0.0, 0.0, 1.4 * MARKING_LIFT))
     if len(p) < 4:
         return ribbon(p[:2], p[1:3], SemanticClass.ROAD_LINE, Material.MARKING)

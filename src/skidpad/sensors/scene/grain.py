@@ -30,7 +30,7 @@ LEAVES, WALLS = (0.70, 0.70, 0.26), (0.08, 0.50, 0.14)
 
 
 def grain_table(boxes: Iterable[tuple[int, int]]) -> Floats32:
-    """(256, 3) strengths by material; boxes: class and material of what stands beside the road."""
+    """Returns (256, 3) strengths by material; boxes: class and material of what stands beside the road."""
     table = np.zeros((MATERIALS, 3), dtype=np.float32)
     for material, strengths in GRAIN.items():
         table[material] = strengths

@@ -94,7 +94,7 @@ ACTOR_PAINTED = (Material.PAINT, Material.CLOTH)
 
 
 def base_palette() -> NDArray[np.float32]:
-    """(256, 3) grey levels of the fixed materials; free numbers are mid grey."""
+    """Returns (256, 3) grey levels of the fixed materials; free numbers are mid grey."""
     palette = np.full((MATERIALS, 3), 128.0, dtype=np.float32)
     for material, rgb in BASE_COLOUR.items():
         palette[material] = rgb

@@ -22,7 +22,7 @@ class Mesh(NamedTuple):
 
     @classmethod
     def of(cls, vertices: Points, triangles: NDArray[np.int32], label: int, material: int) -> Mesh:
-        """All triangles with one label and one material."""
+        """Returns the triangles with one label and one material for all."""
         m = len(triangles)
         return cls(
             np.ascontiguousarray(vertices, dtype=np.float64),
@@ -32,7 +32,7 @@ class Mesh(NamedTuple):
         )
 
     def moved(self, rotation: Points, shift: Points) -> Mesh:
-        """Turned by the (3, 3) rotation, then shifted."""
+        """Returns the mesh turned by the (3, 3) rotation, then shifted."""
         return self._replace(vertices=self.vertices @ np.asarray(rotation).T + shift)
 
 
@@ -40,7 +40,7 @@ EMPTY = Mesh.of(np.empty((0, 3)), np.empty((0, 3), dtype=np.int32), 0, 0)
 
 
 def merge(meshes: Sequence[Mesh]) -> Mesh:
-    """Returns all the meshes as one mesh."""
+    """Returns all the meshes as one mesh; EMPTY for none."""
     if not meshes:
         return EMPTY
     offsets = np.cumsum([0, *(len(m.vertices) for m in meshes[:-1])])
@@ -55,13 +55,13 @@ def merge(meshes: Sequence[Mesh]) -> Mesh:
 
 
 def quads(corners: NDArray[np.int32]) -> NDArray[np.int32]:
-    """(q, 4) corner indices around each quad to (2q, 3) triangles."""
+    """Returns (2q, 3) triangles of (q, 4) corner indices around each quad."""
     c = np.asarray(corners, dtype=np.int32).reshape(-1, 4)
     return np.concatenate([c[:, [0, 1, 2]], c[:, [0, 2, 3]]], axis=1).reshape(-1, 3)
 
 
 def ribbon(left: Points, right: Points, label: int, material: int) -> Mesh:
-    """The strip between two polylines of k points each, k >= 2."""
+    """Returns the strip between two polylines of k points each, k >= 2."""
     k = len(left)
     i = np.arange(k - 1, dtype=np.int32)
     corners = np.stack([i, i + 1, i + 1 + k, i + k], axis=1)
@@ -71,7 +71,7 @@ def ribbon(left: Points, right: Points, label: int, material: int) -> Mesh:
 def patches(
     left: Points, right: Points, pairs: NDArray[np.intp], label: int, material: int
 ) -> Mesh:
-    """Separate quads between two polylines, from index pairs[:, 0] to pairs[:, 1] of each."""
+    """Returns separate quads between two polylines, from index pairs[:, 0] to pairs[:, 1] of each."""
     a, b = pairs[:, 0], pairs[:, 1]
     vertices = np.stack([left[a], left[b], right[b], right[a]], axis=1).reshape(-1, 3)
     corners = np.arange(4 * len(pairs), dtype=np.int32).reshape(-1, 4)
@@ -84,7 +84,7 @@ _BOX_FACES = np.array(
 
 
 def hexahedron(corners: Points, label: int, material: int) -> Mesh:
-    """Six faces over 8 corners, ordered by bits: 4 = +x, 2 = +y, 1 = +z."""
+    """Returns six faces over 8 corners, ordered by bits: 4 = +x, 2 = +y, 1 = +z."""
     return Mesh.of(corners, quads(_BOX_FACES), label, material)
 
 
@@ -101,7 +101,7 @@ def box(
 
 
 def loft(rings: Points, label: int, material: int) -> Mesh:
-    """Skin over (r, k, 3) rings of k points, closed around and capped at both ends."""
+    """Returns the skin over (r, k, 3) rings of k points, closed around and capped at both ends."""
     r, k, _ = rings.shape
     i, j = np.meshgrid(np.arange(r - 1), np.arange(k), indexing="ij")
     n = (j + 1) % k
@@ -114,7 +114,7 @@ def loft(rings: Points, label: int, material: int) -> Mesh:
 def disc(
     centre: Sequence[float], normal_axis: int, radius: float, sides: int, label: int, material: int
 ) -> Mesh:
-    """A flat regular polygon across the given axis."""
+    """Returns a flat regular polygon across the given axis (0 x, 1 y, 2 z)."""
     a, b = [(1, 2), (0, 2), (0, 1)][normal_axis]
     vertices = np.tile(np.asarray(centre, dtype=np.float64), (sides, 1))
     for i in range(sides):
@@ -128,7 +128,7 @@ def disc(
 def cylinder_y(
     centre: Sequence[float], radius: float, width: float, sides: int, label: int, material: int
 ) -> Mesh:
-    """A wheel-like cylinder around the y axis, capped."""
+    """Returns a wheel-like cylinder around the y axis, capped."""
     angle = 2.0 * np.pi * (np.arange(sides) + 0.5) / sides
     ring = np.stack([radius * np.cos(angle), np.zeros(sides), radius * np.sin(angle)], axis=1)
     half = np.array([0.0, width / 2, 0.0])

@@ -59,7 +59,7 @@ class Edges(NamedTuple):
 
 
 def road_pieces(samples: LaneSamples, lanes: LaneTable) -> Iterator[tuple[ChunkKey, list[Mesh]]]:
-    """Every lane's pieces: chunk key and one mesh per level."""
+    """Yields the pieces of all lanes, each with its chunk key and one mesh per level."""
     outer = _outermost(lanes)
     for lane in range(len(lanes.road)):
         edges = _edges(samples, lanes, lane)
@@ -104,7 +104,7 @@ def _cut_edges(edges: Edges, part: slice) -> Edges:
 
 
 def _outermost(lanes: LaneTable) -> NDArray[np.bool_]:
-    """(L, 2): no lane of the road's section lies further to the left, to the right."""
+    """Returns (L, 2) whether no lane of the road's section lies further to the left, to the right."""
     result = np.zeros((len(lanes.road), 2), dtype=np.bool_)
     groups: dict[tuple[int, int], list[int]] = {}
     for i, key in enumerate(zip(lanes.road.tolist(), lanes.section.tolist(), strict=True)):
@@ -118,7 +118,7 @@ def _outermost(lanes: LaneTable) -> NDArray[np.bool_]:
 
 
 def _stations(s: NDArray[np.float64], chord: float) -> NDArray[np.intp]:
-    """Indices of the samples that a level keeps: both ends, and one per chord."""
+    """Returns indices of the samples that a level keeps: both ends, and one per `chord` m of s."""
     bins = np.floor(s / chord + 1e-9)
     inner = np.flatnonzero(np.diff(bins)) + 1
     return np.unique(np.concatenate([[0], inner, [len(s) - 1]]))
@@ -148,7 +148,10 @@ def _levels(piece: Edges, lanes: LaneTable, lane: int, outer: NDArray[np.bool_])
 
 
 def _raise_beyond_kerbs(piece: Edges, kind: LaneKind) -> tuple[Edges, bool]:
-    """Returns the piece as high as the kerbs at its edges, and whether it has any."""
+    """Returns the piece as high as the kerbs at its edges, and whether it was raised.
+
+    Only kinds in RAISED with a kerb are; any other piece comes back as it is.
+    """
     kerbs = (piece.marking_left == Marking.CURB) | (piece.marking_right == Marking.CURB)
     if kind not in RAISED or not kerbs.any():
         return piece, False
@@ -157,7 +160,10 @@ def _raise_beyond_kerbs(piece: Edges, kind: LaneKind) -> tuple[Edges, bool]:
 
 
 def _kerb(piece: Edges, at: NDArray[np.intp], side: int, inside: bool) -> list[Mesh]:
-    """Returns the stones of a kerb on one edge of a piece, which lies inside or outside the edge."""
+    """Returns the faces of a kerb on one edge of a piece; [] where none is marked.
+
+    at: indices of the samples; side: 0 left, 1 right; inside: the stones lie inside the edge.
+    """
     style = (piece.marking_left, piece.marking_right)[side][at]
     stretches = np.flatnonzero((style[:-1] == Marking.CURB) & (style[1:] == Marking.CURB))
     if not len(stretches):
@@ -194,7 +200,7 @@ def _paint_edge(piece: Edges, at: NDArray[np.intp], level: int, side: int) -> Me
 def _painted_stretches(
     s: NDArray[np.float64], at: NDArray[np.intp], style: NDArray[np.uint8], level: int
 ) -> NDArray[np.intp]:
-    """(q, 2) index pairs of the painted stretches; dashes keep their length at every level."""
+    """Returns (q, 2) index pairs of the painted stretches; dashes are left out from DASHED_LEVELS on."""
     solid = np.stack([at[:-1], at[1:]], axis=1)
     lines = (Marking.SOLID, Marking.SOLID_SOLID, Marking.SOLID_BROKEN, Marking.BROKEN_SOLID)
     solid = solid[np.isin(style[at[:-1]], [int(m) for m in lines])]

@@ -47,7 +47,7 @@ def _ring(thing: Box, sides: int, z: float, share: float = 1.0) -> Points:
 
 
 def _crown(thing: Box, material: int) -> list[Mesh]:
-    """Lumps of leaves: one in the middle, and smaller ones around it that break its outline."""
+    """Returns lumps of leaves by level: one in the middle, smaller ones around it break its outline."""
     lumps = (4, 3, 0, 0)
 
     def one(level: int) -> Mesh:
@@ -71,7 +71,7 @@ def _crown(thing: Box, material: int) -> list[Mesh]:
 
 
 def _lump_of_leaves(thing: Box, level: int, rng: Rng, size: Points) -> Mesh:
-    """Rings of uneven radius, most in the lower middle, from the ground up."""
+    """Returns rings of uneven radius, most in the lower middle, from the ground up. size: (3,) m."""
     sides, rings = SIDES[level], []
     for h in np.linspace(0.0, 1.0, RINGS[level]).tolist():
         share = (1.0 - abs(2.0 * h - 0.85) ** 2.2 / 2.6) * (0.35 if h in (0.0, 1.0) else 0.97)
@@ -83,7 +83,7 @@ def _lump_of_leaves(thing: Box, level: int, rng: Rng, size: Points) -> Mesh:
 
 
 def _cone(thing: Box, material: int) -> list[Mesh]:
-    """A conifer: skirts of branches one above the other."""
+    """Returns a conifer by level of detail: skirts of branches one above the other."""
 
     def one(level: int) -> Mesh:
         tiers = 4 - level
@@ -109,7 +109,10 @@ def _lamp(thing: Box, material: int) -> list[Mesh]:
 
 
 def _lump(thing: Box, material: int, step: float, rough: float) -> list[Mesh]:
-    """A row of bushes or trees: cross-sections of uneven height, width and top."""
+    """Returns a row of bushes or trees by level: cross-sections of uneven height, width and top.
+
+    step: m between cross-sections; rough: share by which heights differ.
+    """
 
     def one(level: int) -> Mesh:
         rng = np.random.default_rng(thing.variant)
@@ -180,7 +183,10 @@ def _fence(thing: Box, material: int) -> list[Mesh]:
 
 
 def _sign(thing: Box, material: int) -> list[Mesh]:
-    """A plate that looks back along the box, with a red rim where it is not red, and its back."""
+    """Returns a plate that looks back along the box, with its back, and a red rim unless it is an octagon.
+
+    The number of its corners is the box's variant; one mesh for all levels.
+    """
     half, size = 0.5 * thing.length, 0.5 * thing.height
     turn = np.pi / thing.variant if thing.variant != 3 else -np.pi / 2.0  # yield stands on its tip
 

@@ -66,7 +66,7 @@ class StaticScene:
     grain: NDArray[np.float32]  # unevenness by material; of dressed maps only
 
     def lamp_keys(self, lights: Mapping[int, LightState]) -> Ints32:
-        """(n,) keys of the lamp triangles while the lights show these states."""
+        """Returns (n,) keys of the lamp triangles while the lights show these states; others are dark."""
         keys = (self.chunks.key[self.lamps.triangle] & ~0xFF) | int(Material.LAMP_DARK)
         for signal, state in lights.items():
             if state in LIT:
@@ -78,7 +78,7 @@ class StaticScene:
 
 
 def build_scene(samples: LaneSamples, lanes: LaneTable, roadside: Roadside) -> StaticScene:
-    """Triangulate a map: about 2000 triangles per 48 m of a four-lane road at full detail."""
+    """Returns a map's scene: about 2000 triangles per 48 m of a four-lane road at full detail."""
     palette = base_palette()
     box_material = _box_materials({b.rgb for b in roadside.boxes}, palette)
     pieces = chain(
@@ -113,7 +113,7 @@ def _grain_of(
 
 
 def pack(blocks: Iterable[list[Mesh]]) -> Chunks:
-    """Meshes per chunk and level to flat arrays."""
+    """Returns meshes per chunk and level as flat arrays."""
     blocks = list(blocks)
     flat = [mesh for levels in blocks for mesh in levels]
     shape = (len(blocks), LEVELS)
@@ -134,7 +134,7 @@ def pack(blocks: Iterable[list[Mesh]]) -> Chunks:
 
 
 def pixel_key(mesh: Mesh) -> Ints32:
-    """(m,) class << 8 | material; the instance is added when drawn."""
+    """Returns (m,) class << 8 | material; the instance is added when drawn."""
     return mesh.label.astype(np.int32) << 8 | mesh.material.astype(np.int32)
 
 
@@ -152,7 +152,10 @@ def _spheres(blocks: list[list[Mesh]]) -> tuple[Floats, Floats]:
 def _box_materials(
     colours: set[tuple[int, int, int]], palette: NDArray[np.float32]
 ) -> dict[tuple[int, int, int], int]:
-    """Give every box colour a free material; beyond those, the nearest one already given."""
+    """Returns a material for every box colour; writes the colours into the free numbers of `palette`.
+
+    Beyond those, a colour gets the nearest one already given.
+    """
     given: dict[tuple[int, int, int], int] = {}
     for rgb in sorted(colours):
         number = int(Material.FIRST_FREE) + len(given)
@@ -172,7 +175,7 @@ def _find_lamps(
     blocks: Mapping[ChunkKey, list[Mesh]],
     grouped: Mapping[ChunkKey, list[list[Mesh]]],
 ) -> Lamps:
-    """Rows of the lamp triangles: they stand last in their chunk, in the order of the heads."""
+    """Returns the rows of the lamp triangles: they stand last in their chunk, in the order of the heads."""
     order = {key: i for i, key in enumerate(blocks)}
     signal: list[int] = []
     place: list[int] = []
@@ -214,7 +217,7 @@ class Clusters(NamedTuple):
 
 
 def cluster(vertices: Floats, triangles: Ints32, block_size: Ints32) -> tuple[Clusters, Ints32]:
-    """Cut blocks of consecutive triangles into clusters; also how many each block has.
+    """Returns the clusters of blocks of consecutive triangles, and (B,) how many each block has.
 
     vertices: (V, 3); triangles: (T, 3) indices into them; block_size: (B,) triangles, T in all.
     """
@@ -250,7 +253,7 @@ def cluster(vertices: Floats, triangles: Ints32, block_size: Ints32) -> tuple[Cl
 
 
 def ground_pieces(samples: LaneSamples) -> Iterator[tuple[ChunkKey, list[Mesh]]]:
-    """Terrain chunks on a grid of `CHUNK` m, and the apron around them."""
+    """Yields terrain chunks on a grid of `CHUNK` m, and the apron around them: key and a mesh per level."""
     x0, y0, height = terrain_of(samples)
     nx, ny = height.shape
     for i in range(0, nx - 1, COARSE):
@@ -265,7 +268,7 @@ def ground_pieces(samples: LaneSamples) -> Iterator[tuple[ChunkKey, list[Mesh]]]
 
 
 def _bulge(tile: Heights) -> float:
-    """Largest height in m by which a tile differs from the surface through its four corners."""
+    """Returns the largest m by which a tile may differ from the surface through its four corners."""
     t = np.linspace(0.0, 1.0, len(tile))
     a, b = t[:, None], t[None, :]
     flat = (1 - a) * ((1 - b) * tile[0, 0] + b * tile[0, -1]) + a * (
@@ -287,7 +290,7 @@ def _tile(height: Heights, x0: float, y0: float, i: int, j: int, stride: int) ->
 
 
 def _apron(x0: float, y0: float, x1: float, y1: float, z: float) -> Mesh:
-    """Four flat trapezia from the terrain's border to the horizon."""
+    """Returns four flat trapezia at height z from the terrain's border out to APRON m beyond."""
     inner = np.array([[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]])
     out = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * APRON
     corners = np.array([[i, (i + 1) % 4, 4 + (i + 1) % 4, 4 + i] for i in range(4)])

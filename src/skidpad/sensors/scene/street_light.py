@@ -31,7 +31,10 @@ NO_STREET_LIGHT = StreetLight(0.0, 0.0, 1.0, 0, 0, np.zeros(0, dtype=np.float32)
 
 
 def street_light_of(boxes: Sequence[Box]) -> StreetLight:
-    """Returns the light of all lamps among the boxes: each falls off as below a point of light."""
+    """Returns the light on the ground of all lamps among the boxes; NO_STREET_LIGHT without any.
+
+    Each falls off as below a point of light, to 0 at REACH.
+    """
     lamps = np.array([(b.x, b.y) for b in boxes if b.shape is Shape.LAMP]).reshape(-1, 2)
     if not len(lamps):
         return NO_STREET_LIGHT

@@ -18,6 +18,7 @@ from skidpad.campaign.studies.effects import (
 from skidpad.cli.main import app
 from skidpad.core.settings import load_profile
 from skidpad.core.vocabulary import SensorLevel
+from skidpad.roads.bundled import load_map
 
 
 def rows(stack="2", **arms):
@@ -43,6 +44,14 @@ def test_an_arm_is_none_but_for_its_effect_and_all_is_every_effect():
     assert plan_arm("2", "rain-noon", NONE, 1, 5.0).sensors is SensorLevel.OBJECTS
 
 
+def test_puddles_lie_on_every_road_in_their_arm_and_in_all_together():
+    wet, dry, both = (plan_arm("2", "rain-noon", arm, 1, 5.0) for arm in ("puddles", NONE, "all"))
+    assert dry.surface == ()
+    assert wet.surface == both.surface
+    assert {p.side for p in wet.surface} == {"left"}
+    assert {p.road for p in wet.surface} == set(load_map("figure8").lanes.road.tolist())
+
+
 def test_differences_are_of_equal_seeds_with_intervals_from_eight():
     none = [(0, 60.0 + k, f"n{k}") for k in range(8)]
     wind = [(k % 2, 59.0 + k - 0.1 * k, f"w{k}") for k in range(8)]
@@ -60,7 +69,8 @@ def test_differences_are_of_equal_seeds_with_intervals_from_eight():
     [
         ("2", "lidar", NOT_READ), ("2", "radar", NO_CHANGE), ("2", "wind", NO_CHANGE),
         ("camera", "radar", NOT_READ), ("camera", "pictures", NO_CHANGE),
-        ("mine:Stack", "lidar", NOT_READ),
+        ("mine:Stack", "lidar", NOT_READ), ("2", "spray", NOT_READ),
+        ("camera", "ghosts", NOT_READ), ("2", "roll_over", NO_CHANGE),
     ],
 )  # fmt: skip
 def test_what_is_not_read_says_so_and_never_0(stack, arm, note):

@@ -34,6 +34,13 @@ def test_a_friction_campaign_says_what_weather_changed():
     assert answer_text(rows(("lead", "snow", "reduced", "completed"))) == (
         "with weather: 0 collisions in 1 run"
     )
+    rolled = rows(
+        ("lead", "snow", "reduced", "roll_over"), ("lead", "snow", "reduced", "completed")
+    )
+    assert answer_text(rolled) == (
+        "with weather: 0 collisions and 1 roll-over in 2 runs, most in lead in snow (1)"
+    )
+    assert "--preset snow" in next_text(rolled)
 
 
 def test_a_friction_campaign_names_the_next_command():

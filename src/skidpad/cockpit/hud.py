@@ -111,6 +111,7 @@ def list_events(moment: Moment) -> list[str]:
     """Events of this tick in words."""
     truth, frame = moment.truth, moment.frame
     told = [f"contact with {c.static or truth.table.names[c.actor]}" for c in truth.contacts]
+    told += [f"{truth.table.names[row]} rolled over" for row in truth.rolled]
     told += [f"{i.marking} marking crossed" for i in truth.invasions]
     if moment.action.relocate is not None and moment.action.relocate.moved is not None:
         reason = moment.action.relocate.moved.reason.name.lower().replace("_", " ")

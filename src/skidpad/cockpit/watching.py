@@ -17,7 +17,7 @@ from skidpad.campaign.recipes.recipe import cell_of
 from skidpad.cockpit.serving import has_screen
 from skidpad.core.errors import FileError, InputError
 from skidpad.core.names import inside
-from skidpad.core.vocabulary import Outcome
+from skidpad.core.vocabulary import ENDED, Outcome
 from skidpad.evidence.statistics import clopper_pearson
 from skidpad.pages.server import Place, Server
 from skidpad.pages.site import nicegui, site
@@ -100,8 +100,8 @@ def standing(folder: Path) -> Standing:
 
 
 def has_crashed(line: Line) -> bool:
-    """Whether the ego hit something in this run."""
-    if line.key.outcome == Outcome.COLLISION.value:
+    """Whether the ego hit something or lay on its side."""
+    if line.key.outcome in ENDED:
         return True
     metrics = line.metrics or {}
     counts = [metrics[name] for name in FATAL if metrics.get(name) is not None]

@@ -131,6 +131,9 @@ class Outcome(str, Enum):
     TIMEOUT = "timeout"
 
 
+ENDED = (Outcome.COLLISION, Outcome.ROLL_OVER)  # what ends a drive before its route does
+
+
 class HazardType(str, Enum):
     """Hazards and candidate hazards of the channels monitor (C-120, C-127 to C-129)."""
 

@@ -87,13 +87,13 @@ def film_loss_db(depth: float, ghz: float) -> float:
     return float(-20.0 * log10(abs(through)))
 
 
-def radome_film(rain_mm_h: float, speed: float) -> float:
+def radome_film(rain_mm_h: float, speed: float, height: float = RADOME) -> float:
     """Returns the mean depth in m of the film on a radome driven through rain at `speed` m/s; 0 at rest."""
     if rain_mm_h <= 0.0 or speed <= 0.0:
         return 0.0
     drops = rain_drops(rain_mm_h)
     content = pi * WATER * 1e-9 * drops.density / drops.slope**4  # kg/m^3 of air
-    flow = content / WATER * speed * RADOME  # m^2/s at the lower edge
+    flow = content / WATER * speed * height  # m^2/s at the lower edge
     return float(0.75 * (3.0 * NU * flow / GRAVITY) ** (1.0 / 3.0))
 
 

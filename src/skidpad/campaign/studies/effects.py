@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import polars as pl
+from msgspec import structs
 
 from skidpad.campaign.driving.drivers import find_driver
 from skidpad.campaign.recipes.matrix import roads_of, warm_up
@@ -16,6 +17,7 @@ from skidpad.campaign.workers.worker import Job
 from skidpad.core.errors import SkidpadError
 from skidpad.core.run import CameraDriver, RunSpec
 from skidpad.core.settings import load_profile
+from skidpad.core.surface import SurfacePatch
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.evidence.drive.metrics import run_metrics
 from skidpad.evidence.statistics import Comparison, compare_pairs
@@ -36,18 +38,37 @@ class Effect:
     title: str
     values: Mapping[str, Any]
     sensor: str = ""
+    puddles: bool = False  # deep water under the left wheels, on every road
 
 
+PUDDLE_MM = 10.0
 GRIP, RANGE = {"grip": "physical"}, {"range": "physical"}
 EFFECTS: dict[str, Effect] = {
     "grip": Effect("grip of tyres", GRIP),
     "stiffness": Effect("grip and slip stiffness", GRIP | {"tyre_stiffness": True}),
     "water": Effect("grip and drag of water", GRIP | {"water_drag": True}),
     "anti_lock": Effect("grip and anti-lock by wheel speeds", GRIP | {"anti_lock": "wheel_speeds"}),
+    "stability": Effect(
+        "grip and stability control by wheel speeds", GRIP | {"stability": "wheel_speeds"}
+    ),
+    "roll_over": Effect("roll-over", {"roll_over": True}),
+    "puddles": Effect(
+        f"grip, drag and {PUDDLE_MM:g} mm of water under the left wheels",
+        GRIP | {"water_drag": True},
+        puddles=True,
+    ),
     "wind": Effect("wind with gusts of 0.2", {"wind": True, "wind_gusts": 0.2}),
     "sight": Effect("sight of depth, labels, radar", RANGE, "depth"),
     "radar": Effect("sight and physical radar", RANGE | {"radar_model": "physical"}, "radar"),
+    "ghosts": Effect(
+        "sight and physical radar with mirror images",
+        RANGE | {"radar_model": "physical", "radar_multipath": True},
+        "radar",
+    ),
     "lidar": Effect("lidar: lost and false returns", RANGE | {"lidar": "physical"}, "lidar"),
+    "spray": Effect(
+        "lidar: the same and spray", RANGE | {"lidar": "physical", "spray": True}, "lidar"
+    ),
     "pictures": Effect("colour pictures", {"camera": True}, "pictures"),
 }
 # sensors that our drivers read; of another stack it shows only in its drives
@@ -88,13 +109,24 @@ def plan_arm(stack: str, weather: str, arm: str, seed: int, duration: float) -> 
     """Returns the run of an arm; the driver that sees pictures gets them."""
     driver = find_driver(stack)
     pixels = isinstance(driver, CameraDriver)
-    return RunSpec(
+    spec = RunSpec(
         driver=driver,
         weather=find_weather(weather),
         settings=load_profile("recommended", settings_of_arm(arm)),
         sensors=SensorLevel.PIXELS if pixels else SensorLevel.OBJECTS,
         seed=seed,
         duration=duration,
+    )
+    wet = arm == ALL or (arm in EFFECTS and EFFECTS[arm].puddles)
+    return structs.replace(spec, surface=_puddles(roads_of(spec).map)) if wet else spec
+
+
+def _puddles(map_name: str) -> tuple[SurfacePatch, ...]:
+    """Returns deep water on the left half of every lane of a map."""
+    roads = sorted(set(load_map(map_name).lanes.road.tolist()))
+    return tuple(
+        SurfacePatch(name=f"puddle {road}", water_mm=PUDDLE_MM, road=road, side="left")
+        for road in roads
     )
 
 

@@ -15,7 +15,7 @@ from skidpad.cli.options.spread import spread_fields
 from skidpad.core.errors import require_choice
 from skidpad.core.run import Friction, RunSpec, Scenario
 from skidpad.core.simulator import BackendChoice
-from skidpad.core.vocabulary import Outcome, SensorLevel
+from skidpad.core.vocabulary import ENDED, Outcome, SensorLevel
 
 if TYPE_CHECKING:
     import polars as pl
@@ -92,11 +92,14 @@ def answer_text(rows: pl.DataFrame) -> str:
     lines = []
     for friction, title in ((Friction.ORIGINAL, "on dry grip"), (Friction.REDUCED, "with weather")):
         runs = rows.filter(rows["friction"] == friction.value)
-        hit = runs.filter(runs["outcome"] == Outcome.COLLISION.value)
+        hit = runs.filter(runs["outcome"].is_in([one.value for one in ENDED]))
+        rolled = int((runs["outcome"] == Outcome.ROLL_OVER.value).sum())
         if not len(runs):
             continue
         lines.append(
-            f"{title}: {count_text(len(hit), 'collision')} in {count_text(len(runs), 'run')}"
+            f"{title}: {count_text(len(hit) - rolled, 'collision')}"
+            + (f" and {count_text(rolled, 'roll-over')}" if rolled else "")
+            + f" in {count_text(len(runs), 'run')}"
         )
         if friction is Friction.REDUCED and len(hit):
             cells = hit.group_by("scenario", "weather").len()
@@ -108,7 +111,7 @@ def answer_text(rows: pl.DataFrame) -> str:
 
 def next_text(rows: pl.DataFrame) -> str:
     """Returns the command that says how much grip the worst weather leaves, of all if none was hit."""
-    hit = rows.filter(rows["outcome"] == Outcome.COLLISION.value)
+    hit = rows.filter(rows["outcome"].is_in([one.value for one in ENDED]))
     cells = hit.group_by("weather").len().sort("len", "weather", descending=[True, False])
     told = f"--preset {cells['weather'][0]}" if len(cells) else "--table"
     return f"Next: skidpad friction {told} says how far it is to a stop"

@@ -20,7 +20,7 @@ from skidpad.core.arrays import Floats
 from skidpad.core.geometry import kmh_from_mps
 from skidpad.core.lefthanded import mirror_value
 from skidpad.core.states import ContactEvent
-from skidpad.core.vocabulary import ActorKind, Outcome
+from skidpad.core.vocabulary import ENDED, ActorKind, Outcome
 from skidpad.recording.campaign.grip import GripMetrics
 from skidpad.recording.run.log import RunLog
 
@@ -67,9 +67,6 @@ def centre_distance(log: RunLog) -> Floats:
     distance[~log.present[:, 1:]] = np.inf
     nearest: Floats = distance.min(axis=1, initial=np.inf)
     return nearest
-
-
-ENDED = (Outcome.COLLISION, Outcome.ROLL_OVER)  # before the end of the route
 
 
 def grip_metrics(

@@ -36,6 +36,12 @@ _IRREGULAR = (
 )  # fmt: skip
 IRREGULAR = frozenset(re.findall(r"\w+", _IRREGULAR))
 NOT_PARTICIPLES = frozenset({"bed", "embed", "exceed", "feed", "need", "seed", "speed", "shed"})
+EXCEPTIONS = {  # names that read like a breach and are none, each with its reason
+    "left": "a direction, beside `right`",
+    "put": "the verb, as in `Queue.put`",
+    "fit": "the verb, as in scikit-learn",
+    "cut": "the verb",
+}
 PERSONS = re.compile(r"\b(who|whoever|somebody|nobody|anybody)\b", re.IGNORECASE)
 THEATRE_WORDS = frozenset(
     {
@@ -91,6 +97,8 @@ def _in_definition(node: ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef) 
 
 
 def _is_participle(word: str) -> bool:
+    if word in EXCEPTIONS:
+        return False
     regular = word.endswith("ed") and len(word) > 4 and word not in NOT_PARTICIPLES
     return regular or word in IRREGULAR
 

@@ -6,7 +6,17 @@ import json
 
 import pytest
 
-from language_lint import LIMITS, PARTICIPLE, PERSON, RULES, SHORT, THEATRE, find_breaches
+from language_lint import (
+    EXCEPTIONS,
+    IRREGULAR,
+    LIMITS,
+    PARTICIPLE,
+    PERSON,
+    RULES,
+    SHORT,
+    THEATRE,
+    find_breaches,
+)
 
 FINE = '''
 def load_map(name):
@@ -39,6 +49,15 @@ def test_plain_names_and_sentences_are_fine() -> None:
 )
 def test_each_breach_is_found_once(source: str, rule: str) -> None:
     assert [b.rule for b in find_breaches(source)] == [rule]
+
+
+@pytest.mark.parametrize("name", EXCEPTIONS)
+def test_every_exception_has_its_reason_and_is_needed(name: str) -> None:
+    assert EXCEPTIONS[name]
+    assert name in IRREGULAR
+    assert not list(
+        find_breaches(f'def {name}(x):\n    """Returns what comes of it, as it is."""\n')
+    )
 
 
 def test_every_rule_has_a_limit() -> None:

@@ -43,7 +43,7 @@ def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
     link.rate, link.paused = about["rate"], about["paused"]
     desk = Desk(Live(link), spec)
 
-    def shown() -> Shown:
+    def describe() -> Shown:
         told = {
             "kind": "drive",
             "seat": {
@@ -59,7 +59,7 @@ def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
         return Shown(desk.outside, told)
 
     map = stage_of(spec).map
-    screen = Screen(feed, link, map, shown, spec.seed, spec.surface, spec.scenery)
+    screen = Screen(feed, link, map, describe, spec.seed, spec.surface, spec.scenery)
     time = CockpitPacer(link, screen.show, own_gc=about["own_gc"])
     try:
         driven = drive_at_desk(spec, desk, folder, (screen, time))

@@ -121,9 +121,9 @@ class Stage:
         return max(kmh_from_mps(first if speed is None else speed), 1.0)
 
     @property
-    def triggered(self) -> bool:
+    def has_triggered_all(self) -> bool:
         """Every event of the scenario has begun; always so without one."""
-        return self.player is None or self.player.triggered
+        return self.player is None or self.player.has_triggered_all
 
     @property
     def route_length(self) -> float | None:
@@ -137,7 +137,7 @@ class Stage:
         """How a drive ended in which nothing failed (decisions G-2, L-7)."""
         if self.player is not None and self.player.hit:
             return Outcome.COLLISION
-        return Outcome.COMPLETED if self.triggered else Outcome.NOT_TRIGGERED
+        return Outcome.COMPLETED if self.has_triggered_all else Outcome.NOT_TRIGGERED
 
 
 def _number_of(played: scenarios.Scenario, name: str) -> float | None:

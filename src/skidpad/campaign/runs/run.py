@@ -320,7 +320,7 @@ class OpenRun:
             outcome_of(stage, finished) if self.failure is None else Outcome.AGENT_ERROR,
             "" if self.failure is None else story(self.failure),
             tuple(self.snapshots.paths),
-            stage.triggered,
+            stage.has_triggered_all,
             stage.route_length,
             off_road(finished, stage.map),
             str(stage.setup.map),
@@ -338,7 +338,7 @@ class OpenRun:
             backend.reset(stage.setup, self.spec.seed)
             for sink in self.sinks:
                 sink.begin(backend.truth().table)
-            self._failed(error)
+            self._note_failure(error)
             return None
         recorder = ReadingsRecorder(setup, driver.stack.stack)
         sinks = self.sinks
@@ -358,9 +358,9 @@ class OpenRun:
             return
         self.driver.stack.close()
         if self.stepper.failure is not None:
-            self._failed(self.stepper.failure)
+            self._note_failure(self.stepper.failure)
 
-    def _failed(self, failure: StackError) -> None:
+    def _note_failure(self, failure: StackError) -> None:
         """Keeps the stack's failure and notes it in the log at the present tick."""
         self.failure = failure
         self.log.log.notice(self.backend.truth().tick, NoticeSource.STACK, str(failure))

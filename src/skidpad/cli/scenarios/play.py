@@ -109,12 +109,12 @@ def _drive_all(
     campaign = _campaign(template, cross, file, seeds, left_out)
     ends: list[Played] = []
 
-    def concluded(folder: Path) -> str:
+    def conclude(folder: Path) -> str:
         played, text = expected.conclude(folder, left_out)
         ends.append(played)
         return text
 
-    how(campaign, concluded)
+    how(campaign, conclude)
     exit_by_verdicts(ends[0])
 
 

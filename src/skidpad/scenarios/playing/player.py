@@ -105,7 +105,7 @@ class Player:
         self.way_back = 0.0  # m that the ego has gone backwards
 
     @property
-    def triggered(self) -> bool:
+    def has_triggered_all(self) -> bool:
         """Returns whether every event of the scenario has begun."""
         return all(event.happened_at is not None for event in self.telling.events)
 

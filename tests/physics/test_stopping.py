@@ -62,6 +62,12 @@ def test_type_zero_stop_of_the_ego():
     assert physical_stop("dry", 100 / 3.6).mfdd > 6.43
 
 
+def test_a_standing_car_has_stopped_already():
+    standing, moving = stops([GripParams(0.9, 1.0, 0.0, 0.0)] * 2, [0.0, 10.0])
+    assert (standing.distance, standing.mfdd, standing.mu_effective) == (0.0, 0.0, 0.0)
+    assert moving.distance > 1.0
+
+
 def test_no_grip_at_all_is_said():
     with pytest.raises(ConfigError, match="too little grip"):
         stops([GripParams(0.0, 1.0, 0.0, 0.0)], [10.0])

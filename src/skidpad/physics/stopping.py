@@ -33,7 +33,9 @@ class Stop:
 
     @property
     def mu_effective(self) -> float:
-        """The constant friction that gives the same distance: v0^2 / (2 g d)."""
+        """The constant friction that gives the same distance: v0^2 / (2 g d); 0 from standstill."""
+        if self.v0 == 0.0:
+            return 0.0
         return self.v0**2 / (2.0 * G * self.distance)
 
 
@@ -41,8 +43,10 @@ def mean_deceleration(v: NDArray[np.float64], s: NDArray[np.float64]) -> float:
     """Returns the mean fully developed deceleration in m/s^2 between 0.8 and 0.1 of the first speed.
 
     v, s (k,): falling speed in m/s and distance in m. (v_b^2 - v_e^2) / (2 (s_e - s_b)), which is
-    UN R13-H annex 3's (v_b^2 - v_e^2) / (25.92 (s_e - s_b)) with speeds in km/h.
+    UN R13-H annex 3's (v_b^2 - v_e^2) / (25.92 (s_e - s_b)) with speeds in km/h. 0 from standstill.
     """
+    if v[0] == 0.0:
+        return 0.0
     v_b, v_e = 0.8 * v[0], 0.1 * v[0]
     s_b, s_e = np.interp([-v_b, -v_e], -v, s)
     return float((v_b**2 - v_e**2) / (2.0 * (s_e - s_b)))
@@ -57,7 +61,7 @@ def stops(
 ) -> list[Stop]:
     """Returns stops of one vehicle type (the ego's by default), each on its own surface from its own speed.
 
-    params, v0: as many, v0 > 0 in m/s. ConfigError where one takes longer than STOP_TIME_MAX.
+    params, v0: as many, v0 >= 0 in m/s. ConfigError where one takes longer than STOP_TIME_MAX.
     """
     n = len(params)
     fleet = Fleet([vehicle or vehicle_type(EGO_TYPE)] * n, TICK, anti_lock=anti_lock)

@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from lxml.etree import fromstring
 from scipy.integrate import solve_ivp
 
 from skidpad.core.geometry import wrap_angle
 from skidpad.roads.opendrive.bake import bake
+from skidpad.roads.opendrive.document import Reader, _element
 from skidpad.roads.opendrive.reference_line import Clothoid, Element, Parametric, ReferenceLine
 from skidpad.roads.queries import RoadMap
 
@@ -109,6 +111,19 @@ def test_poly3_of_zeros_is_a_line() -> None:
     a, b = road(LINE, LANES), road(POLY, LANES)
     assert np.allclose(a.samples.x, b.samples.x, atol=1e-5)
     assert np.allclose(a.samples.heading, b.samples.heading, atol=1e-6)
+
+
+@pytest.mark.parametrize(("c", "d"), [(0.01, 0.0), (-0.004, 1e-4), (5.0, 0.0)])
+def test_a_curved_poly3_ends_where_its_arc_is_as_long_as_its_length(c: float, d: float) -> None:
+    text = POLY.replace('c="0" d="0"', f'c="{c}" d="{d}"')
+    line = ReferenceLine([_element(Reader("test"), fromstring(text))])
+    end = solve_ivp(
+        lambda s, u: 1.0 / np.hypot(1.0, 2.0 * c * u + 3.0 * d * u * u),
+        (0.0, 100.0), [0.0], t_eval=[50.0, 100.0], rtol=1e-10, atol=1e-10,
+    ).y[0]  # fmt: skip
+    at = line.at(np.array([50.0, 100.0]))
+    assert np.allclose(at.x, end, atol=1e-4)
+    assert np.allclose(at.y, end * end * (c + d * end), atol=1e-3)
 
 
 def test_left_hand_traffic_drives_on_the_left() -> None:

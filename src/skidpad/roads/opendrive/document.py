@@ -17,6 +17,7 @@ from skidpad.roads.opendrive.reference_line import (
     Element,
     Parametric,
     ReferenceLine,
+    poly3_shape,
 )
 
 LARGEST = 1.0e15  # of any number in a file: its square and cube can be computed with
@@ -329,7 +330,7 @@ def _element(read: Reader, node: Node) -> Element:
             shape = Clothoid(read.number(child, "curvStart"), read.number(child, "curvEnd"))
         case "poly3":
             a, b, c, d = (read.number(child, k) for k in "abcd")
-            shape = Parametric((0.0, 1.0, 0.0, 0.0), (a, b, c, d), length)
+            shape = poly3_shape((a, b, c, d), length)
         case "paramPoly3":
             u = tuple(read.number(child, f"{k}U") for k in "abcd")
             v = tuple(read.number(child, f"{k}V") for k in "abcd")

@@ -12,6 +12,8 @@ from skidpad.core.arrays import Floats
 
 STRAIGHTEST = 1e-12  # 1/m^2, slower change of curvature than this is an arc
 TABLE_STEP = 0.25  # m, spacing of the table that turns arc length into a cubic's parameter
+HALVINGS = 60  # at most, of the interval in which a poly3 ends
+ARC_EXACT = 1e-11  # share of the length to which the end of a poly3 is found
 TABLE_MAX = 4096  # steps; an element of more than a kilometre has longer ones
 
 
@@ -145,12 +147,7 @@ def _parametric(e: Element, shape: Parametric, ds: Floats) -> LinePoints:
     """
     from scipy.interpolate import CubicHermiteSpline  # likewise
 
-    steps = int(np.clip(e.length / TABLE_STEP, 8, TABLE_MAX))
-    p_table = np.linspace(0.0, shape.p_end, steps + 1)
-    middle = 0.5 * (p_table[1:] + p_table[:-1])
-    speed, speed_middle = (np.hypot(*_derivatives(shape, p)[2:4]) for p in (p_table, middle))
-    simpson = (speed[:-1] + 4.0 * speed_middle + speed[1:]) / 6.0 * np.diff(p_table)
-    length_table = np.concatenate(([0.0], np.cumsum(simpson)))
+    p_table, length_table, speed = _arc_table(shape, e.length)
     # The file's length decides, so that the element ends where the next one begins.
     inverse = CubicHermiteSpline(length_table, p_table, 1.0 / np.maximum(speed, 1e-9))
     p = inverse(ds * (length_table[-1] / e.length))
@@ -169,6 +166,35 @@ def _parametric(e: Element, shape: Parametric, ds: Floats) -> LinePoints:
         curvature,
         d_curvature,
     )
+
+
+def _arc_table(shape: Parametric, length: float) -> tuple[Floats, Floats, Floats]:
+    """Returns parameters from 0 to p_end, the arc lengths in m up to them, and their m per parameter.
+
+    length: m, decides how many there are.
+    """
+    steps = int(np.clip(length / TABLE_STEP, 8, TABLE_MAX))
+    p_table = np.linspace(0.0, shape.p_end, steps + 1)
+    middle = 0.5 * (p_table[1:] + p_table[:-1])
+    speed, speed_middle = (np.hypot(*_derivatives(shape, p)[2:4]) for p in (p_table, middle))
+    simpson = (speed[:-1] + 4.0 * speed_middle + speed[1:]) / 6.0 * np.diff(p_table)
+    return p_table, np.concatenate(([0.0], np.cumsum(simpson))), speed
+
+
+def poly3_shape(v: tuple[float, float, float, float], length: float) -> Parametric:
+    """Returns the curve v(u) from u = 0 to the u at which its arc is `length` m long (Newton's method)."""
+    low, high, u = 0.0, length, length
+    for _ in range(HALVINGS):
+        shape = Parametric((0.0, 1.0, 0.0, 0.0), v, u)
+        _, arcs, speeds = _arc_table(shape, length)
+        over = float(arcs[-1]) - length
+        if abs(over) <= ARC_EXACT * length:
+            break
+        low, high = (low, u) if over > 0.0 else (u, high)
+        u -= over / float(speeds[-1])
+        if not low < u < high:
+            u = 0.5 * (low + high)
+    return shape
 
 
 def _derivatives(shape: Parametric, p: Floats) -> tuple[Floats, ...]:

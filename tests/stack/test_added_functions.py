@@ -14,7 +14,7 @@ from skidpad.core.run import AdasDriver, Function, run_from_plain
 from skidpad.core.specs import PointSensorSpec
 from skidpad.core.vocabulary import Outcome
 from skidpad.stack.configurations import parse_functions
-from skidpad.stack.functions import FUNCTIONS, FunctionType
+from skidpad.stack.functions import FUNCTIONS, AddedFunctions, FunctionType
 
 OWN = frozenset({Function.ACC, Function.LCA})
 
@@ -150,3 +150,14 @@ def test_a_run_without_added_functions_is_described_as_before():
     assert "added" not in plain["driver"]
     spec = template(driver=AdasDriver(functions=OWN, added=("limp",)))
     assert run_from_plain(spec.to_plain(), "a run") == spec
+
+
+def test_a_package_without_a_factory_is_refused_before_the_run(monkeypatch):
+    entry = FunctionType("idle", "To idle")
+    found = {**FUNCTIONS.sources(), "idle": Source("idle", "a package", lambda: entry)}
+    monkeypatch.setattr(FUNCTIONS, "_sources", found)
+    for ask in (lambda: parse_functions("acc,idle"), lambda: AddedFunctions(["idle"], None, 0.01)):
+        with pytest.raises(
+            ConfigError, match="function 'idle' of the package a package: .*factory"
+        ):
+            ask()

@@ -238,7 +238,7 @@ def extra_switch(panel: Panel, extra: Extra) -> None:
 def drive_controls(panel: Panel) -> None:
     """Functions of our stack, and the headlights."""
     with ui.element("div").classes("switches"):
-        own = [kind for kind in FUNCTIONS.entries() if kind.factory is None]
+        own = [FUNCTIONS.get(n) for n, s in FUNCTIONS.sources().items() if s.package == "skidpad"]
         for key, kind in enumerate(own, start=1):
             function_switch(panel, kind.name, f"{kind.title} ({key})")
     lamps = ui.toggle(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import AdasDriver, Function
-from skidpad.stack.functions import FUNCTIONS
+from skidpad.stack.functions import factory_of
 
 V_CRUISE_KMH = 150.0  # cruise target without a limiter
 V_LIMITER_KMH = 80.0  # limiter of configuration 4
@@ -54,5 +54,5 @@ def parse_functions(text: str) -> tuple[Functions, tuple[str, ...]]:
     own = {function.value for function in Function}
     added = tuple(sorted(names - own))
     for name in added:
-        FUNCTIONS.get(name)
+        factory_of(name)
     return frozenset(Function(name) for name in names & own), added

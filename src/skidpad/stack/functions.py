@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
-from skidpad.core.errors import StackError
+from skidpad.core.errors import ConfigError, StackError
 from skidpad.core.frames import SensorFrame
 from skidpad.core.registry import Registry
 from skidpad.core.run import Function
@@ -31,6 +31,9 @@ class DrivingFunction(Protocol):
         ...
 
 
+Factory = Callable[["RoadMap", float], DrivingFunction]
+
+
 @dataclass(frozen=True, slots=True)
 class FunctionType:
     """A driving function that a configuration of the stack can have.
@@ -45,7 +48,7 @@ class FunctionType:
     name: str
     title: str
     units: str = ""
-    factory: Callable[[RoadMap, float], DrivingFunction] | None = None
+    factory: Factory | None = None
 
 
 def _own_functions() -> tuple[FunctionType, ...]:
@@ -65,18 +68,29 @@ def _own_functions() -> tuple[FunctionType, ...]:
 FUNCTIONS = Registry("function", "skidpad.functions", FunctionType, _own_functions)
 
 
+def factory_of(name: str) -> Factory:
+    """Returns the factory of a function that a package adds; ConfigError where it has none."""
+    factory = FUNCTIONS.get(name).factory
+    if factory is None:
+        package = FUNCTIONS.sources()[name].package
+        raise ConfigError(
+            f"function {name!r} of the package {package}: `factory` must be a callable, got None"
+        )
+    return factory
+
+
 class AddedFunctions:
     """The functions of packages in one run, one after the other."""
 
     def __init__(self, names: Sequence[str], map: RoadMap, dt: float) -> None:
         self.kinds = tuple(FUNCTIONS.get(name) for name in names)
+        self._factories = [factory_of(name) for name in names]
         self._map, self._dt = map, dt
         self.reset()
 
     def reset(self) -> None:
         """Makes all added functions anew from their factories."""
-        factories = [kind.factory for kind in self.kinds if kind.factory is not None]
-        self._functions = [factory(self._map, self._dt) for factory in factories]
+        self._functions = [factory(self._map, self._dt) for factory in self._factories]
 
     def sensors(self) -> tuple[SensorSpec, ...]:
         """Returns the further sensors that the functions ask for; one that two ask for alike is one."""

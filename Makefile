@@ -133,11 +133,12 @@ docs: $(VENV)/.documented-with
 docs-run: $(VENV)/.tested-with
 	$(BIN)/python tools/docs_run.py
 
-# figures of docs/physics.md and the README's pictures; REPORT=out/adas: its first page too
+# figures of docs/physics.md, bodies of vehicles and the README's pictures; REPORT=out/adas: its first page too
 REPORT ?=
 figures: $(VENV)/.tested-with
 	$(BIN)/python tools/vehicle_validation.py docs/img
 	$(BIN)/python tools/readme_pictures.py docs/img $(REPORT)
+	$(BIN)/python tools/body_pictures.py docs/img/bodies
 
 # replays of the site's gallery, by their commands; GALLERY="guardrail": one of docs/gallery.yaml
 GALLERY ?=

@@ -36,7 +36,8 @@ of CARLA. What follows is computed by the physical models ([grip](../physics.md)
 for new winter tyres; braking is the default ego's full stop from 80 km/h."""
 VEHICLE_TEXT = f"""\
 The ego is `{EGO_TYPE}` unless a scenario says otherwise; background traffic draws from the cars. How they
-move is on the page on [physics](../physics.md)."""
+move is on the page on [physics](../physics.md). Pictures show what `--bodywork shaped` draws
+([bodies](../rendering.md#bodies))."""
 TYRE_TEXT = f"""\
 Chosen by `--set tyres=NAME`. A name may end in {", ".join(f"`{s}`" for s in TREADS if s)}, the tread that is
 left; without it the tyre is new. Frictions are those of a road on which a new winter tyre has 0.9."""
@@ -120,6 +121,7 @@ def vehicle_page() -> str:
     ]
     for name, v in vehicle_types().items():
         lines += ["", f"## {name}", "", f"{v.title}. Source: {v.source}.", ""]
+        lines += [f"![{v.title} from five sides](../img/bodies/{name}.webp)", ""]
         lines += _table(
             ("quantity", "value"),
             [

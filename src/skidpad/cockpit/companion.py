@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from skidpad.campaign.driving.loop import Moment
 from skidpad.cockpit import hud
 from skidpad.cockpit.source import Source, index_at
-from skidpad.cockpit.studio import Studio, View, plane
+from skidpad.cockpit.studio import FOR_PEOPLE, Looks, Studio, View, plane
 from skidpad.core.setup import DT
-from skidpad.core.vocabulary import Scenery
 from skidpad.sensors.finish.extras import ALL_EXTRAS, Extra
 from skidpad.simulation.world.world import BRAKING
 
@@ -21,11 +20,11 @@ from skidpad.simulation.world.world import BRAKING
 class Companion:
     """Draws the moment of a run that is as old as the one it is asked for."""
 
-    def __init__(self, source: Source, first: int, scenery: Scenery = Scenery.FULL) -> None:
-        """first: the tick with which the other run begins; scenery: of its pictures."""
+    def __init__(self, source: Source, first: int, looks: Looks = FOR_PEOPLE) -> None:
+        """first: the tick with which the other run begins; looks: of the world in its pictures."""
         self.source, self.first = source, first
         outside = source.seat(0).outside
-        self.studio = Studio(source.map, source.table, outside, source.seed, scenery=scenery)
+        self.studio = Studio(source.map, source.table, outside, source.seed, looks=looks)
 
     def __call__(
         self, moment: Moment, view: View, extras: frozenset[Extra] = ALL_EXTRAS

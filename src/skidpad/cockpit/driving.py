@@ -16,6 +16,7 @@ from skidpad.campaign.takeover.desk import Desk
 from skidpad.cockpit import hud
 from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.screen import Screen, Shown
+from skidpad.cockpit.studio import Looks
 from skidpad.cockpit.words import Link, Live, Pace
 from skidpad.core.run import AdasDriver, Roads, RunSpec, run_from_plain
 from skidpad.core.setup import DT
@@ -59,7 +60,8 @@ def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
         return Shown(desk.outside, told)
 
     map = stage_of(spec).map
-    screen = Screen(feed, link, map, describe, spec.seed, spec.surface, spec.scenery)
+    looks = Looks(spec.scenery, spec.bodywork)
+    screen = Screen(feed, link, map, describe, spec.seed, spec.surface, looks)
     time = CockpitPacer(link, screen.show, own_gc=about["own_gc"])
     try:
         driven = drive_at_desk(spec, desk, folder, (screen, time))

@@ -17,10 +17,9 @@ from skidpad.cockpit.companion import Companion
 from skidpad.cockpit.marks import LightAhead, marks_of, patch_marks
 from skidpad.cockpit.pictures import Picture, colours, draw
 from skidpad.cockpit.source import Source, index_at
-from skidpad.cockpit.studio import Studio, View, plane
+from skidpad.cockpit.studio import FOR_PEOPLE, Looks, Studio, View, plane
 from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.setup import DT
-from skidpad.core.vocabulary import Scenery
 from skidpad.recording.run.surfaces import read_run_surface
 from skidpad.roads.surface_outlines import outline_patches
 from skidpad.simulation.world.world import BRAKING
@@ -50,11 +49,11 @@ def write_film(
     view: View,
     path: Path,
     other: Source | None = None,
-    scenery: Scenery = Scenery.FULL,
+    looks: Looks = FOR_PEOPLE,
 ) -> Path:
     """Write the film, .mp4 or .webp, in its own time.
 
-    other: a run to be shown beside it; scenery: beside the roads of both.
+    other: a run to be shown beside it; looks: of the world in both.
     """
     if path.suffix not in SUFFIXES:
         raise ConfigError(f"a film's file ends in {' or '.join(SUFFIXES)}, got {path}")
@@ -64,9 +63,9 @@ def write_film(
         raise OutputError(f"cannot write the film {path}: {error.strerror}") from error
     dt = source.step * DT
     if path.suffix == ".webp":
-        _webp(frames(source, moments, view, other, scenery), path, dt)
+        _webp(frames(source, moments, view, other, looks), path, dt)
     else:
-        _mp4(frames(source, moments, view, other, scenery), path, dt)
+        _mp4(frames(source, moments, view, other, looks), path, dt)
     return path
 
 
@@ -75,12 +74,12 @@ def frames(
     moments: Sequence[int],
     view: View,
     other: Source | None = None,
-    scenery: Scenery = Scenery.FULL,
+    looks: Looks = FOR_PEOPLE,
 ) -> Iterator[Picture]:
     """Pictures of these moments: the view, mirrors in it, what is said, and another run beside it."""
     first = source.seat(moments[0]).outside
-    studio = Studio(source.map, source.table, first, source.seed, scenery=scenery)
-    companion = None if other is None else Companion(other, source.tick(0), scenery)
+    studio = Studio(source.map, source.table, first, source.seed, looks=looks)
+    companion = None if other is None else Companion(other, source.tick(0), looks)
     camera, light = studio.suite.cameras[view.value], LightAhead(source.map)
     outlines = outline_patches(source.map, read_run_surface(source.folder))
     for k in moments:

@@ -15,12 +15,12 @@ from skidpad.cockpit.film import write_film
 from skidpad.cockpit.opening import open_source
 from skidpad.cockpit.screen import Screen, Shown
 from skidpad.cockpit.source import Source, index_at, opening_tick
-from skidpad.cockpit.studio import MAIN, View
+from skidpad.cockpit.studio import FOR_PEOPLE, MAIN, Looks, View
 from skidpad.cockpit.words import Link
 from skidpad.core.errors import OutputError, SkidpadError
 from skidpad.core.inputs import Beam
 from skidpad.core.setup import DT
-from skidpad.core.vocabulary import Scenery
+from skidpad.core.vocabulary import Bodywork, Scenery
 from skidpad.recording.run.surfaces import read_run_surface
 
 PATIENCE = 0.02  # s between two looks at the words
@@ -35,7 +35,13 @@ def replay_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
     other = None if about["beside"] is None else open_source(Path(about["beside"]))
     feed, link = Feed(feed_name), Link(pipe)
     try:
-        replayer = Replayer(source, feed, link, other=other, scenery=Scenery(about["scenery"]))
+        replayer = Replayer(
+            source,
+            feed,
+            link,
+            other=other,
+            looks=Looks(Scenery(about["scenery"]), Bodywork(about["bodywork"])),
+        )
         link.seek = opening_tick(source) if about["at"] is None else round(about["at"] / DT)
         replayer.run()
     finally:
@@ -49,24 +55,24 @@ class Replayer:
     def __init__(
         self, source: Source, feed: Feed, link: Link,
         clock: Callable[[], float] = perf_counter, other: Source | None = None,
-        scenery: Scenery = Scenery.FULL,
+        looks: Looks = FOR_PEOPLE,
     ) -> None:  # fmt: skip
         """other: a run that is shown beside this one, at the same time since its begin.
 
-        scenery: what stands beside the roads in the pictures of both.
+        looks: of the world in the pictures of both.
         """
-        self.scenery = scenery
+        self.looks = looks
         self.source, self.link, self.clock, self.other = source, link, clock, other
         self.k = 0
         self.note = ""  # what the page is told beside everything else
         self.dt = source.step * DT
         surface = read_run_surface(source.folder)
         self.screen = Screen(
-            feed, link, source.map, self._describe_moment, source.seed, surface, scenery
+            feed, link, source.map, self._describe_moment, source.seed, surface, looks
         )
         self.screen.begin(source.table)
         if other is not None:
-            self.screen.beside = Companion(other, source.tick(0), scenery)
+            self.screen.beside = Companion(other, source.tick(0), looks)
         self._base, self._since, self._rate = 0, clock(), 1.0  # moment from which it plays, ...
         self._shown_k, self._shown_at = -1, 0.0
 
@@ -113,7 +119,7 @@ class Replayer:
         t = source.tick(self.k) * DT
         path = source.folder / FILMS / f"{view.value}-{t:07.2f}s.mp4"
         try:
-            write_film(source, range(self.k, last + 1), view, path, self.other, self.scenery)
+            write_film(source, range(self.k, last + 1), view, path, self.other, self.looks)
             self.note = f"film: {path}"
         except OutputError as error:
             self.note = str(error)
@@ -126,7 +132,7 @@ class Replayer:
         self.show()
         try:
             self.other = drive_again(self.source, change)
-            self.screen.beside = Companion(self.other, self.source.tick(0), self.scenery)
+            self.screen.beside = Companion(self.other, self.source.tick(0), self.looks)
             self.note = f"beside it: {self.other.folder}"
         except SkidpadError as error:
             self.note = str(error)

@@ -13,14 +13,13 @@ from skidpad.campaign.driving.loop import Moment, Sink
 from skidpad.cockpit import hud
 from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.marks import LightAhead, Marks, marks_of, patch_marks
-from skidpad.cockpit.studio import MAIN, Studio, View, plane
+from skidpad.cockpit.studio import FOR_PEOPLE, MAIN, Looks, Studio, View, plane
 from skidpad.cockpit.words import Link
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Outside
 from skidpad.core.setup import DT
 from skidpad.core.states import ActorTable
 from skidpad.core.surface import SurfacePatch
-from skidpad.core.vocabulary import Scenery
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.surface_outlines import outline_patches
 from skidpad.sensors.finish.extras import Extra
@@ -53,12 +52,12 @@ class Screen(Sink):
         ask: Callable[[], Shown],
         seed: int = 0,
         surface: Sequence[SurfacePatch] = (),
-        scenery: Scenery = Scenery.FULL,
+        looks: Looks = FOR_PEOPLE,
     ) -> None:
-        """surface: what lies on parts of the road; scenery: what stands beside it."""
+        """surface: what lies on parts of the road; looks: of the world in the pictures."""
         self.outlines = outline_patches(map, surface)
         self.feed, self.link, self.map, self.ask, self.seed = feed, link, map, ask, seed
-        self.scenery = scenery
+        self.looks = looks
         self.shown = self.dropped = self.collisions = 0
         self.events: deque[tuple[float, str]] = deque(maxlen=TOLD_EVENTS)
         self._at = 0.0
@@ -69,7 +68,7 @@ class Screen(Sink):
     def begin(self, table: ActorTable) -> None:
         """The run begins, with these actors."""
         outside = self.ask().outside
-        self.studio = Studio(self.map, table, outside, self.seed, scenery=self.scenery)
+        self.studio = Studio(self.map, table, outside, self.seed, looks=self.looks)
         self.cameras, self.light = self.studio.suite.cameras, LightAhead(self.map)
 
     def follow_readings(self, latest: Callable[[], list[tuple[str, str]]]) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from enum import Enum
 from math import atan2, hypot, radians
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Outside
 from skidpad.core.specs import CameraSpec, Modality, SensorSpec
 from skidpad.core.states import ActorStates, ActorTable
-from skidpad.core.vocabulary import LightState, Scenery
+from skidpad.core.vocabulary import Bodywork, LightState, Scenery
 from skidpad.roads.queries import RoadMap
 from skidpad.scenery.dressing import dress_map
 from skidpad.sensors.finish.extras import ALL_EXTRAS, Extra
@@ -76,6 +76,16 @@ def cameras() -> tuple[SensorSpec, ...]:
     return tuple(found)
 
 
+class Looks(NamedTuple):
+    """What the world looks like in the pictures for people."""
+
+    scenery: Scenery = Scenery.FULL  # beside the roads
+    bodywork: Bodywork = Bodywork.SHAPED  # of vehicles and people
+
+
+FOR_PEOPLE = Looks()
+
+
 class Studio:
     """Renders the moments of one run."""
 
@@ -86,14 +96,18 @@ class Studio:
         outside: Outside,
         seed: int,
         extras: frozenset[Extra] = ALL_EXTRAS,
-        scenery: Scenery = Scenery.FULL,
+        looks: Looks = FOR_PEOPLE,
     ) -> None:
-        """scenery: what stands beside the roads in these pictures, whatever the run had."""
+        """looks: of the world in these pictures, whatever the run had."""
         settings = PixelSettings(
-            range_model=outside.range_model, seed=seed, in_cockpit=False, extras=extras
+            range_model=outside.range_model,
+            seed=seed,
+            in_cockpit=False,
+            extras=extras,
+            bodywork=looks.bodywork,
         )
         self.suite = PixelSuite(
-            dress_map(map, scenery), table, cameras(), outside.weather, settings
+            dress_map(map, looks.scenery), table, cameras(), outside.weather, settings
         )
         self.outside = outside
         self.suite.change(outside)

@@ -19,7 +19,15 @@ from skidpad.core.settings import Settings, load_profile
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.surface import SurfacePatch
 from skidpad.core.told import on_a_line
-from skidpad.core.vocabulary import Govern, GripModel, Scenery, SensorLevel, Stratum, TrafficStart
+from skidpad.core.vocabulary import (
+    Bodywork,
+    Govern,
+    GripModel,
+    Scenery,
+    SensorLevel,
+    Stratum,
+    TrafficStart,
+)
 from skidpad.core.weather import Weather
 
 VERSION = 2  # of config.yaml; folders without the word were written before there was one value
@@ -283,6 +291,13 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             "and contacts; none: only what the map's file names."
         ),
     ] = Scenery.NONE
+    bodywork: Annotated[
+        Bodywork,
+        Meta(
+            description="shaped: vehicles and people look like what they are, to sensors that see "
+            "surfaces; plain: one coarse body per kind."
+        ),
+    ] = Bodywork.PLAIN
     govern: Annotated[
         Govern,
         Meta(
@@ -385,7 +400,11 @@ def _pack_on_carla(course: Course, backend: BackendChoice) -> bool:
 
 
 # fields that a description leaves out while they have these values, so that it is as before
-LEFT_OUT: dict[str, tuple[Any, ...]] = {"surface": ((), []), "scenery": (Scenery.NONE.value,)}
+LEFT_OUT: dict[str, tuple[Any, ...]] = {
+    "surface": ((), []),
+    "scenery": (Scenery.NONE.value,),
+    "bodywork": (Bodywork.PLAIN.value,),
+}
 OURS = "skidpad."  # stacks of this package are no foreign code
 _DIGITS: dict[type[Struct], int] = {Roads: 3, Scenario: 6, Route: 5}  # of the seed in a name
 

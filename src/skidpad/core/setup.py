@@ -13,6 +13,7 @@ from skidpad.core.surface import SurfacePatch
 from skidpad.core.tyres import REFERENCE
 from skidpad.core.vocabulary import (
     AntiLock,
+    Bodywork,
     Control,
     GripModel,
     Headways,
@@ -121,6 +122,7 @@ class Setup:
     render_all: bool = False  # every image every tick, read or not
     patches: tuple[SurfacePatch, ...] = ()
     scenery: Scenery = Scenery.NONE  # beside the roads (embedded backend)
+    bodywork: Bodywork = Bodywork.PLAIN  # of all actors (embedded backend)
     localisation_noise: float = 0.0  # m, standard deviation of the ego's x and y; 0: exact (L-3)
     dt: float = DT
 

@@ -119,6 +119,13 @@ class Scenery(str, Enum):
     FULL = "full"  # buildings, trees, lamps, hedges, kerbs, by the type of the road
 
 
+class Bodywork(str, Enum):
+    """What vehicles and people look like to cameras, lidars and radars that see surfaces."""
+
+    PLAIN = "plain"  # one coarse body per kind, as in the published profiles
+    SHAPED = "shaped"  # a body per type, with wheels that turn, lamps, mirrors and plates
+
+
 class Outcome(str, Enum):
     """How a run ended; the last three leave every denominator, counted (decision L-7)."""
 

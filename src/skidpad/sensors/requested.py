@@ -131,7 +131,7 @@ class AskedSensors:
     def scene(self) -> LiveScene:
         """Returns the map's surfaces with all actors where they are now."""
         if self._scene is None:
-            self._scene = LiveScene(self.map, self.table)
+            self._scene = LiveScene(self.map, self.table, bodywork=self.setup.bodywork)
         if self._placed != self.tick:
             self._scene.place(self.states, self.setup.dt)
             self._placed = self.tick

@@ -16,7 +16,7 @@ from skidpad.core.inputs import Beam, Outside
 from skidpad.core.setup import DT
 from skidpad.core.specs import CameraSpec, Modality, RadarSpec, SensorSpec
 from skidpad.core.states import ActorStates, ActorTable
-from skidpad.core.vocabulary import LightState, RangeModel
+from skidpad.core.vocabulary import Bodywork, LightState, RangeModel
 from skidpad.core.weather import Weather
 from skidpad.physics.optics import depth_range, label_range, radar_range
 from skidpad.sensors.finish.extras import NO_EXTRAS, Extra
@@ -58,6 +58,7 @@ class PixelSettings:
     dt: float = DT  # s
     render_all: bool = False
     level: int = AUTO_LEVEL  # one level of detail for all (tests)
+    bodywork: Bodywork = Bodywork.PLAIN
     poison_old: bool = False  # spoil buffers that went stale (tests)
 
 
@@ -83,13 +84,13 @@ class PixelSuite:
         self.cameras = {s.id: s for s in specs if isinstance(s, CameraSpec)}
         self.settings, self._table, self._specs = settings, table, specs
         widest = max((c.width for c in self.cameras.values()), default=1)
-        self.scene = LiveScene(map, table, widest)
+        self.scene = LiveScene(map, table, widest, settings.bodywork)
         self._rgb = {
             c.id: np.zeros((c.height, c.width), dtype=np.dtype("<u4"))
             for c in self.cameras.values()
             if c.modality is Modality.RGB
         }
-        self._finish = Finish(table, map.roadside, settings.dt)
+        self._finish = Finish(table, map.roadside, settings.dt, settings.bodywork)
         self._look_out(weather, settings.range_model, None)
         self._ego = Pose(0.0, 0.0)
         self.tick = -1
@@ -140,10 +141,12 @@ class PixelSuite:
         states: ActorStates,
         lights: Mapping[int, LightState],
         braking: NDArray[np.bool_] | None = None,
+        indicating: NDArray[np.bool_] | None = None,
     ) -> Observation:
         """Returns what the sensors see of this state; images are drawn when they are first read.
 
         lights: by signal id. braking: (n,) whose brake lamps are lit; None: as they were.
+        indicating: (n, 2) whose left and right indicators are lit; None: as they were.
         """
         self.tick = tick
         self._ego = states.pose(EGO)
@@ -151,9 +154,13 @@ class PixelSuite:
         self.scene.show(lights)
         if braking is not None:
             self.shading.set_braking(braking)
+        if indicating is not None:
+            self.shading.set_indicating(indicating)
         if self.settings.extras:
-            lit = np.zeros(len(self._table), dtype=np.bool_) if braking is None else braking
-            self._finish.place(tick, states, lights, lit)
+            n = len(self._table)
+            lit = np.zeros(n, dtype=np.bool_) if braking is None else braking
+            turns = np.zeros((n, 2), dtype=np.bool_) if indicating is None else indicating
+            self._finish.place(tick, states, lights, lit, turns)
         for one in self._passes.values():
             one.drawn = NOTHING
             if self.settings.poison_old:

@@ -71,6 +71,7 @@ class Pixels:
                 dt=setup.dt,
                 render_all=setup.render_all,
                 poison_old=poison,
+                bodywork=setup.bodywork,
             ),
         )
 

@@ -10,7 +10,12 @@ import pytest
 from carla_programs import run_program
 from skidpad.simulation.carla_server.process import ServerProcess
 
-BARE = ("--scenery", "none")  # runs there and here are compared, and runs have none
+BARE = (
+    "--scenery",
+    "none",
+    "--bodywork",
+    "plain",
+)  # runs there and here are compared, and runs have none
 
 
 @pytest.fixture

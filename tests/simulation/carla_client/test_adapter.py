@@ -154,7 +154,9 @@ def test_optimisations_change_no_reading(serve: Serve, program: Program) -> None
 
 
 def test_a_server_that_dies_ends_the_run_with_one_sentence() -> None:
-    with ServerProcess(["--idle-exit", "120", "--scenery", "none"]) as server:
+    with ServerProcess(
+        ["--idle-exit", "120", "--scenery", "none", "--bodywork", "plain"]
+    ) as server:
         client = subprocess.Popen(
             [sys.executable, str(HERE / "interrupted.py"), str(server.port)],
             stdout=subprocess.PIPE,

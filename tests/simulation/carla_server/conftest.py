@@ -54,14 +54,16 @@ def without_hang() -> Callable[[Callable[[], str]], str]:
 def serve() -> Iterator[Callable[..., Server]]:
     """Start servers with options; all are stopped at the end.
 
-    What sensors say is compared with bare roads, so there is no scenery unless a test asks for it.
+    What sensors say is compared with bare roads, so there is no scenery unless a test asks for it,
+    and bodies are those that runs have by default.
     """
     pytest.importorskip("carla")
     started: list[Server] = []
 
     def start(*options: str) -> Server:
         bare = () if "--scenery" in options else ("--scenery", "none")
-        started.append(Server(["--idle-exit", "120", *bare, *options]))
+        plain = () if "--bodywork" in options else ("--bodywork", "plain")
+        started.append(Server(["--idle-exit", "120", *bare, *plain, *options]))
         return started[-1]
 
     yield start

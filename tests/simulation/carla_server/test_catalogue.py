@@ -76,6 +76,13 @@ def test_every_vehicle_has_physics_of_its_size() -> None:
             assert 10.0 < model.mass < 40_000.0
 
 
+def test_cars_of_different_makes_have_different_default_colours() -> None:
+    makes = ("tesla.model3", "audi.tt", "mini.cooper_s", "carlamotors.firetruck")
+    found = [load_catalogue()[f"vehicle.{m}"].attributes["color"].recommended for m in makes]
+    assert len({colours[0] for colours in found}) == len(makes)
+    assert len({frozenset(colours) for colours in found}) == 1
+
+
 def test_fixed_attributes_cannot_be_set() -> None:
     blueprint = load_catalogue()["vehicle.audi.tt"]
     assert choose_attributes(blueprint, {"number_of_wheels": "9"})["number_of_wheels"] == "4"

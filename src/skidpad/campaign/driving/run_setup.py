@@ -295,6 +295,7 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
         render_all=spec.render is Render.ALL or _foreign_on_carla(spec),
         patches=spec.surface,
         scenery=spec.scenery,
+        bodywork=spec.bodywork,
     )
 
 

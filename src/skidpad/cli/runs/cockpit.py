@@ -15,7 +15,7 @@ from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.run import Roads, RunSpec, Scenario
 from skidpad.core.setup import VEHICLES_MAX
 from skidpad.core.simulator import BackendChoice, BackendKind
-from skidpad.core.vocabulary import Scenery
+from skidpad.core.vocabulary import Bodywork, Scenery
 
 if TYPE_CHECKING:
     from skidpad.pages.server import Place
@@ -41,7 +41,7 @@ class OnClose(str, Enum):
     PAUSE = "pause"
 
 
-@spread_fields(duration=3600.0, scenery=Scenery.FULL)
+@spread_fields(duration=3600.0, scenery=Scenery.FULL, bodywork=Bodywork.SHAPED)
 def drive(
     drivers: Drivers,
     run: RunSpec,
@@ -165,6 +165,10 @@ def replay(
         Scenery,
         typer.Option(help="Beside the roads in the pictures, whatever the run had: full or none."),
     ] = Scenery.FULL,
+    bodywork: Annotated[
+        Bodywork,
+        typer.Option(help="Of vehicles and people in the pictures, whatever the run had."),
+    ] = Bodywork.SHAPED,
 ) -> None:
     """Scrub through a run in a browser: its pictures are drawn again from what was logged."""
     from skidpad.cli.options.folders import require_run
@@ -179,14 +183,15 @@ def replay(
     from skidpad.cockpit.replaying import replay_job
     from skidpad.cockpit.serving import serve
     from skidpad.cockpit.source import timeline
-    from skidpad.cockpit.studio import View
+    from skidpad.cockpit.studio import Looks, View
     from skidpad.core.errors import require_choice
 
     source = open_source(run, hazard)
     other = None if beside is None else open_source(beside)
     if film is not None:
+        looks = Looks(scenery, bodywork)
         seen = View(require_choice("--view", view, [v.value for v in View]))
-        typer.echo(write_film(source, stretch_of(source, begin, end), seen, film, other, scenery))
+        typer.echo(write_film(source, stretch_of(source, begin, end), seen, film, other, looks))
         return
     what = {
         "path": str(run),
@@ -194,6 +199,7 @@ def replay(
         "at": at,
         "beside": None if beside is None else str(beside),
         "scenery": scenery.value,
+        "bodywork": bodywork.value,
     }
     producer = Producer(replay_job, what)
     shown = About("replay", timeline(source), again=list_changes(source))

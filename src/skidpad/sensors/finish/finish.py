@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.geometry import Pose
 from skidpad.core.states import ActorStates, ActorTable
-from skidpad.core.vocabulary import LightState
+from skidpad.core.vocabulary import Bodywork, LightState
 from skidpad.core.weather import Weather
 from skidpad.roads.roadside import Roadside
 from skidpad.sensors.finish.clouds import DRIFT, SIZE, draw_clouds, layer_of
@@ -41,10 +41,16 @@ WETTABLE[list(ROADLIKE)] = True
 class Finish:
     """Lays the chosen additions over pictures; `look_out` in a new weather, `place` every tick."""
 
-    def __init__(self, table: ActorTable, roadside: Roadside, dt: float) -> None:
+    def __init__(
+        self,
+        table: ActorTable,
+        roadside: Roadside,
+        dt: float,
+        bodywork: Bodywork = Bodywork.PLAIN,
+    ) -> None:
         self._table, self._dt = table, dt
         self._furniture = standing(roadside.boxes)
-        self._lamps = Lamps(table, roadside.heads)
+        self._lamps = Lamps(table, roadside.heads, bodywork)
 
     def look_out(self, weather: Weather, light: Lighting) -> None:
         """Sets what the pictures take from the weather and its light."""
@@ -61,12 +67,13 @@ class Finish:
         states: ActorStates,
         lights: Mapping[int, LightState],
         braking: NDArray[np.bool_],
+        indicating: NDArray[np.bool_],
     ) -> None:
-        """Takes in where all actors are now, and what shines."""
+        """Takes in where all actors are now, and what shines. indicating: (n, 2), left and right."""
         self._tick, self._ego = tick, states.pose(0)
         self._bodies = bodies_of(self._table, states)
         self._near = _within(self._furniture, self._ego, STANDING_REACH)
-        self._sources = self._lamps.shining(states, lights, braking, self._light)
+        self._sources = self._lamps.shining(states, lights, braking, indicating, self._light)
 
     def add(
         self, extras: frozenset[Extra], view: View, own: bool, one: Pass, out: NDArray[np.uint32]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
 from skidpad.core.states import ActorStates, ActorTable
-from skidpad.core.vocabulary import ActorKind, LightState
+from skidpad.core.vocabulary import ActorKind, Bodywork, LightState
 from skidpad.roads.roadside import SignalHead
 from skidpad.sensors.pictures.lighting import Lighting
 
@@ -23,9 +23,11 @@ SIGNAL = {
     LightState.YELLOW: (1.0, 0.62, 0.05),
     LightState.GREEN: (0.06, 0.95, 0.42),
 }
+INDICATOR, INDICATOR_POWER = (1.0, 0.42, 0.02), 2.4
 HEAD_POWER, TAIL_POWER, BRAKE_POWER, SIGNAL_POWER = 5.0, 1.6, 3.2, 1.2
 BY_DAY = 0.25  # share of the bloom that is left in daylight
 HEIGHT = {ActorKind.CAR: 0.40, ActorKind.VAN: 0.31, ActorKind.TRUCK: 0.23, ActorKind.BUS: 0.22}
+SHAPED_HEIGHT = {ActorKind.CAR: 0.49, ActorKind.VAN: 0.37, ActorKind.MOTORCYCLE: 0.56}
 HEIGHT_OF_OTHERS = 0.45  # share of the height at which lamps sit
 TWO = (ActorKind.CAR, ActorKind.VAN, ActorKind.TRUCK, ActorKind.BUS)  # lamps on either side
 LAMPLESS = (ActorKind.PEDESTRIAN, ActorKind.BICYCLE, ActorKind.PROP)
@@ -53,11 +55,18 @@ def _stack(parts: Sequence[Sources]) -> Sources:
 class Lamps:
     """All lamps of a run; what shines depends on the moment."""
 
-    def __init__(self, table: ActorTable, heads: Sequence[SignalHead]) -> None:
+    def __init__(
+        self,
+        table: ActorTable,
+        heads: Sequence[SignalHead],
+        bodywork: Bodywork = Bodywork.PLAIN,
+    ) -> None:
         kinds = [ActorKind(int(k)) for k in table.kind]
-        share = np.array([HEIGHT.get(k, HEIGHT_OF_OTHERS) for k in kinds], dtype=np.float64)
+        shaped = bodywork is Bodywork.SHAPED
+        heights, side = (HEIGHT | SHAPED_HEIGHT, 0.37) if shaped else (HEIGHT, 0.32)
+        share = np.array([heights.get(k, HEIGHT_OF_OTHERS) for k in kinds], dtype=np.float64)
         self._up = share * table.height
-        self._side = np.where([k in TWO for k in kinds], 0.32 * table.width, 0.0)
+        self._side = np.where([k in TWO for k in kinds], side * table.width, 0.0)
         self._front = 0.5 * table.length
         self._has = np.array([k not in LAMPLESS for k in kinds], dtype=np.bool_)
         self._heads = tuple(heads)
@@ -67,9 +76,10 @@ class Lamps:
         states: ActorStates,
         lights: Mapping[int, LightState],
         braking: NDArray[np.bool_],
+        indicating: NDArray[np.bool_],
         light: Lighting,
     ) -> Sources:
-        """Returns the lamps that shine now, as light sources."""
+        """Returns the lamps that shine now, as light sources. indicating: (n, 2), left and right."""
         dark = max(float(light.lamps), BY_DAY)
         on = self._has & states.present
         head = HEAD_POWER * dark if light.lamps > 0.0 or light.wet > WET_DAY else 0.0
@@ -79,19 +89,33 @@ class Lamps:
             ends.append((-1.0, on & ~braking, np.multiply(TAIL, TAIL_POWER * dark)))
         parts = [self._of_signals(lights, SIGNAL_POWER * dark)]
         parts += [self._of_vehicles(states, *end) for end in ends]
+        turn = np.multiply(INDICATOR, INDICATOR_POWER * dark)
+        for column, side in enumerate((1.0, -1.0)):
+            on_side = on & indicating[:, column]
+            if on_side.any():
+                parts += [
+                    self._of_vehicles(states, end, on_side, turn, side) for end in (1.0, -1.0)
+                ]
         return _stack(parts)
 
     def _of_vehicles(
-        self, states: ActorStates, end: float, on: NDArray[np.bool_], lit: Floats
+        self,
+        states: ActorStates,
+        end: float,
+        on: NDArray[np.bool_],
+        lit: Floats,
+        only: float = 0.0,
     ) -> Sources:
         """Returns the lamps at one end of those that have them on: on either side, or in the middle.
 
-        end: 1 front, -1 rear; lit: (3,) colour times power.
+        end: 1 front, -1 rear; lit: (3,) colour times power; only: 1 for the left side alone, -1 right.
         """
         rows = np.flatnonzero(on)
-        one = np.concatenate([rows, rows[self._side[rows] > 0.0]])
+        one = rows if only else np.concatenate([rows, rows[self._side[rows] > 0.0]])
         side = self._side[one]
         side[len(rows) :] *= -1.0
+        if only:
+            side *= 1.15 * only
         c, s = np.cos(states.yaw[one]), np.sin(states.yaw[one])
         along, slope = end * self._front[one], np.sin(states.pitch[one])
         ground = states.z[one] - slope * along

@@ -57,10 +57,11 @@ SNOWY = (
 )
 SNOWED = (Material.ASPHALT, Material.MARKING)
 SNOW_LEFT = 0.72  # share of a driven road that packed snow covers; by eye
-GLOSSY = (Material.PAINT, Material.GLASS)
+GLOSSY = (Material.PAINT, Material.GLASS, Material.LAMP_GLASS)
 WET_DARKENING = 0.52  # of asphalt's albedo; Lekner and Dorf (1988) give 0.4 to 0.7
 SNOW = np.array([0.80, 0.83, 0.88], dtype=np.float32)
-BRAKE_GLOW = 1.5  # tail lamp when braking, against its plain colour
+BRAKE_LIGHT = np.array([1.5, 0.03, 0.03], dtype=np.float32)  # of lit lamps, linear
+INDICATOR_LIGHT = np.array([1.5, 0.55, 0.03], dtype=np.float32)
 BEHIND_BY = 1e-3  # of a ray's length, so that rounding cannot bring a point before the lamps
 HEADLAMP_X, HEADLAMP_Z = 1.75, 0.65  # m, in the ego's frame
 
@@ -88,6 +89,7 @@ class Shading:
         self._plain_tail = self._table.reshape(-1, MATERIALS, COLUMNS)[0, Material.TAIL_LAMP].copy()
         self._work = np.zeros((LANES + MORE_LANES) * BLOCK, dtype=np.float32)
         self._braking = np.zeros(len(table), dtype=np.bool_)
+        self._indicating = np.zeros((len(table), 2), dtype=np.bool_)
 
     def set_braking(self, braking: NDArray[np.bool_]) -> None:
         """Lights the brake lamps of these actors (n,), and puts out those of all others."""
@@ -96,8 +98,25 @@ class Shading:
         self._braking[:] = braking
         tails = self._table.reshape(-1, MATERIALS, COLUMNS)[1:, Material.TAIL_LAMP]
         tails[:] = self._plain_tail
-        tails[braking, :3] = np.array([BRAKE_GLOW, 0.03, 0.03], dtype=np.float32)
+        tails[braking, :3] = BRAKE_LIGHT
         tails[braking, GLOW] = 1.0
+        self._light_up(Material.BRAKE_LAMP, braking, BRAKE_LIGHT)
+
+    def set_indicating(self, indicating: NDArray[np.bool_]) -> None:
+        """Lights the left and right indicators of these actors (n, 2)."""
+        if np.array_equal(indicating, self._indicating):
+            return
+        self._indicating[:] = indicating
+        for column, lamp in enumerate((Material.INDICATOR_LEFT, Material.INDICATOR_RIGHT)):
+            self._light_up(lamp, indicating[:, column], INDICATOR_LIGHT)
+
+    def _light_up(self, lamp: Material, lit: NDArray[np.bool_], light: Floats32) -> None:
+        """Gives a lamp of these actors (n,) its light, and that of all others its plain colour."""
+        table = self._table.reshape(-1, MATERIALS, COLUMNS)
+        lamps = table[1:, lamp]
+        lamps[:] = table[0, lamp]
+        lamps[lit, :3] = light
+        lamps[lit, GLOW] = 1.0
 
     def surfaces(self, key: NDArray[np.int32]) -> Floats32:
         """Returns (H, W, COLUMNS): colour in linear light, and behaviour, of what each pixel shows."""
@@ -154,6 +173,9 @@ def _look_up(palette: Floats32, table: ActorTable, light: Lighting, snow_on_road
         for material in SNOWED:
             out[:, material, :3] += SNOW_LEFT * light.snow * (SNOW - out[:, material, :3])
     out[:, Material.HEADLAMP, GLOW] = 0.9 * light.lamps
+    shining = out[:, Material.HEADLAMP, :3] - out[:, Material.LAMP_GLASS, :3]
+    out[:, Material.LAMP_GLASS, :3] += min(light.lamps, 1.0) * shining
+    out[:, Material.LAMP_GLASS, GLOW] = 0.9 * light.lamps
     out[:, Material.TAIL_LAMP, GLOW] = 0.8 * light.lamps
     out[:, Material.LIT_WINDOW, GLOW] = 1.6 * light.lamps  # of a dull pane, so about a third
     return out.reshape(-1, COLUMNS)

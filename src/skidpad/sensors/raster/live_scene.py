@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from skidpad.core.states import ActorStates, ActorTable
-from skidpad.core.vocabulary import LightState
+from skidpad.core.vocabulary import Bodywork, LightState
 from skidpad.roads.lanes import LaneSamples, LaneTable
 from skidpad.roads.roadside import Roadside
 from skidpad.sensors.raster import rasteriser, rays
@@ -16,6 +16,7 @@ from skidpad.sensors.raster.actors import make_actors, place_actors
 from skidpad.sensors.raster.passes import Pass
 from skidpad.sensors.raster.projection import make_scratch
 from skidpad.sensors.raster.rays import Hits, Rays
+from skidpad.sensors.raster.shaped_actors import ShapedActors
 from skidpad.sensors.raster.view import View
 from skidpad.sensors.scene.static import StaticScene, build_scene
 
@@ -49,15 +50,24 @@ class LiveScene:
 
     UNSAVED = ("static", "key", "actors", "_scratch")  # of the map, or set by `place` and `show`
 
-    def __init__(self, map: SceneMap, table: ActorTable, widest: int = 1) -> None:
+    def __init__(
+        self,
+        map: SceneMap,
+        table: ActorTable,
+        widest: int = 1,
+        bodywork: Bodywork = Bodywork.PLAIN,
+    ) -> None:
         """widest: columns in px of the widest image."""
         self.static = scene_of(map)
         self.key = self.static.chunks.key.copy()  # of the map's triangles, lamps as they shine
-        self.actors = make_actors(table)
+        self._shaped = ShapedActors(table) if bodywork is Bodywork.SHAPED else None
+        self.actors = make_actors(table) if self._shaped is None else self._shaped.near
         self.motion = np.zeros((len(table), 4))  # vx, vy, vz in m/s and yaw rate
         self._height = np.full(len(table), np.nan)
         clusters = self.static.chunks.clusters.vertex_count
         largest = max(int(clusters.max()), int(self.actors.vertex_count.max(initial=0)))
+        if self._shaped is not None:
+            largest = max(largest, int(self._shaped.far.vertex_count.max(initial=0)))
         self._scratch = make_scratch(largest, widest)
 
     def place(self, states: ActorStates, elapsed: float) -> None:
@@ -66,6 +76,8 @@ class LiveScene:
         vz is 0 at the first call and for a climb faster than MAX_CLIMB.
         """
         place_actors(states, self.actors)
+        if self._shaped is not None:
+            self._shaped.turn_wheels(states, elapsed)
         climb = (states.z - self._height) / elapsed
         self._height[:] = states.z
         self.motion[:, 0], self.motion[:, 1] = states.vx, states.vy
@@ -81,10 +93,13 @@ class LiveScene:
 
         hidden: row of the actor left out, or -1. level: of detail, or AUTO_LEVEL.
         """
+        actors = self.actors
+        if self._shaped is not None and level == rasteriser.AUTO_LEVEL:
+            actors = self._shaped.select_for(view)
         rasteriser.raster(
             self.static.chunks,
             self.key,
-            self.actors,
+            actors,
             hidden,
             view,
             level,

@@ -15,7 +15,7 @@ MATERIALS = 256
 
 
 class Material(IntEnum):
-    """Fixed materials; numbers from `FIRST_FREE` on are given out for box colours."""
+    """Fixed materials; numbers from `FIRST_FREE` to `END_FREE` - 1 are given out for box colours."""
 
     SKY = 0
     ASPHALT = 1
@@ -50,6 +50,11 @@ class Material(IntEnum):
     ROOF = 30
     FRAME = 31  # of doors and windows
     FIRST_FREE = 32
+    # of shaped bodies only, from the end of the byte
+    LAMP_GLASS = 252  # of head lamps: glass by day, and as bright as they are when they shine
+    BRAKE_LAMP = 253  # shines when the actor brakes, and at no other time
+    INDICATOR_LEFT = 254
+    INDICATOR_RIGHT = 255
 
 
 BASE_COLOUR: dict[Material, tuple[int, int, int]] = {
@@ -85,7 +90,13 @@ BASE_COLOUR: dict[Material, tuple[int, int, int]] = {
     Material.LIT_WINDOW: (122, 112, 88),
     Material.ROOF: (126, 74, 58),
     Material.FRAME: (196, 194, 188),
+    Material.LAMP_GLASS: (132, 140, 150),
+    Material.BRAKE_LAMP: (96, 14, 16),
+    Material.INDICATOR_LEFT: (170, 92, 24),
+    Material.INDICATOR_RIGHT: (170, 92, 24),
 }
+
+END_FREE = int(Material.LAMP_GLASS)  # box colours have the numbers before it
 
 # Lamps shine of themselves: neither sun nor headlights change them.
 EMISSIVE = (Material.LAMP_RED, Material.LAMP_YELLOW, Material.LAMP_GREEN)

@@ -17,7 +17,7 @@ from skidpad.roads.roadside import Roadside, Shape
 from skidpad.roads.terrain import CELL, COARSE, FINE, Heights, terrain_of
 from skidpad.sensors.scene.furniture import cell, furniture_pieces, lamp_mesh
 from skidpad.sensors.scene.grain import NO_GRAIN, grain_table
-from skidpad.sensors.scene.materials import MATERIALS, Material, base_palette
+from skidpad.sensors.scene.materials import END_FREE, Material, base_palette
 from skidpad.sensors.scene.mesh import Mesh, merge, quads
 from skidpad.sensors.scene.road_mesh import LEVELS, ChunkKey, road_pieces
 from skidpad.sensors.scene.street_light import StreetLight, street_light_of
@@ -159,10 +159,10 @@ def _box_materials(
     given: dict[tuple[int, int, int], int] = {}
     for rgb in sorted(colours):
         number = int(Material.FIRST_FREE) + len(given)
-        if number < MATERIALS:
+        if number < END_FREE:
             palette[number] = rgb
         else:
-            taken = palette[int(Material.FIRST_FREE) :]
+            taken = palette[int(Material.FIRST_FREE) : END_FREE]
             distance = ((taken - np.asarray(rgb)) ** 2).sum(axis=1)
             number = int(Material.FIRST_FREE) + int(distance.argmin())
         given[rgb] = number

@@ -112,7 +112,13 @@ class Episode:
         self.posts = Posts(self.moving.lights)
         self.giving_way = GivingWay(map.roads)
         self.surroundings = Surroundings(
-            map, self.landscape, self.actors, self.vehicles, self.sky, clock
+            map,
+            self.landscape,
+            self.actors,
+            self.vehicles,
+            self.sky,
+            clock,
+            stock.options.bodywork,
         )
         self.relandscape()
         self.sensors = SensorSet(PRODUCERS, seed)

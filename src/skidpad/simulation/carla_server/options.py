@@ -7,7 +7,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from skidpad.core.vocabulary import GripModel, Scenery
+from skidpad.core.vocabulary import Bodywork, GripModel, Scenery
 
 MU_REF = 1.5  # of a tyre with tire_friction 3.5 on a dry road, near CARLA's (decision K-3)
 
@@ -27,6 +27,10 @@ class ServerOptions(Struct, frozen=True, kw_only=True):
             description="full: buildings, trees, lamps beside the roads; none: the file's objects."
         ),
     ] = Scenery.FULL
+    bodywork: Annotated[
+        Bodywork,
+        Meta(description="shaped: a body per blueprint; plain: one coarse body per kind."),
+    ] = Bodywork.SHAPED
     weather_grip: Annotated[GripModel, Meta(description="How weather acts on tyres.")] = (
         GripModel.PHYSICAL
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.setup import Setup, TrafficSetup
-from skidpad.core.vocabulary import Control, Scenery
+from skidpad.core.vocabulary import Bodywork, Control, Scenery
 from skidpad.physics.grip import road_of
 from skidpad.roads.bundled import load_map
 from skidpad.scenery.dressing import dress_map
@@ -43,7 +43,8 @@ def build_world(setup: Setup, seed: int) -> World:
     lanes = lane_frictions(setup)
     if setup.patches or lanes:
         world.patches = Patches(map, setup.patches, road, lanes)
-    paints = seed if setup.scenery is Scenery.FULL else None
+    drawn = setup.scenery is Scenery.FULL or setup.bodywork is Bodywork.SHAPED
+    paints = seed if drawn else None
     ids = world.enter([role.newcomer(i, paints) for i, role in enumerate(roles)])
     world.lay(road)
     world.book = ContactBook(world.obstacles.names, setup.dt)

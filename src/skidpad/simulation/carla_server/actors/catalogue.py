@@ -8,6 +8,7 @@ from enum import Enum
 from functools import cache
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 import yaml
 
@@ -123,7 +124,7 @@ def _vehicle(id: str, row: list[Any], actor: dict[str, Attribute], colours: list
     wheels = 2 if base in ("motorcycle", "bicycle") else 4
     attributes = _roles(actor, "autopilot", "scenario", "ego_vehicle", "hero")
     for attribute in (
-        Attribute("color", AttributeType.COLOUR, tuple(colours)),
+        Attribute("color", AttributeType.COLOUR, _order_colours(id, colours)),
         Attribute("driver_id", AttributeType.INT, ("0", "1"), restricted=True),
         Attribute("sticky_control", AttributeType.BOOL, ("true",)),
         Attribute("terramechanics", AttributeType.BOOL, ("false",)),
@@ -140,6 +141,13 @@ def _vehicle(id: str, row: list[Any], actor: dict[str, Attribute], colours: list
     return Blueprint(
         id, Family.VEHICLE, attributes, (length, width, height), kind, label=CLASS_OF_KIND[kind]
     )
+
+
+def _order_colours(id: str, colours: list[str]) -> tuple[str, ...]:
+    """Returns the recommended colours with another one first by blueprint, as that is the default."""
+    usual = load_data()["usual_colours"].get(id)
+    first = colours.index(usual) if usual else (crc32(id.encode()) >> 8) % len(colours)
+    return (*colours[first:], *colours[:first])
 
 
 def _walker(id: str, row: list[Any], actor: dict[str, Attribute]) -> Blueprint:

@@ -6,11 +6,13 @@ Meshes are made when a camera or ray first needs them, and again when actors com
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidpad.core.constants import G
 from skidpad.core.geometry import Pose
 from skidpad.core.states import ActorStates
 from skidpad.core.states import ActorTable as Bodies
+from skidpad.core.vocabulary import Bodywork
 from skidpad.core.weather import Weather
 from skidpad.roads.queries import RoadMap
 from skidpad.sensors.pictures.lighting import lighting
@@ -28,18 +30,22 @@ from skidpad.simulation.carla_server.weather import Sky
 
 WIDEST = 8192  # px
 PAINT = (160, 160, 160)
+RIGHT_INDICATOR, LEFT_INDICATOR = 0x10, 0x20  # of VehicleLightState
+FLASH = 0.7  # s of a flash of indicators, 86 a minute; UN R48 allows 60 to 120
 SKIN = 0.1  # m around a body within which a camera counts as inside
 
 
 class Pictured:
     """Map and actors with a body for rays and cameras, in the state of one frame."""
 
-    def __init__(self, roads: RoadMap, members: list[Actor]) -> None:
+    def __init__(
+        self, roads: RoadMap, members: list[Actor], bodywork: Bodywork = Bodywork.PLAIN
+    ) -> None:
         self.roads, self.members = roads, members
         self.rows = {a.id: i for i, a in enumerate(members)}
         self.ids = np.array([0, *(a.id for a in members)], dtype=np.int64)  # by instance
         self.bodies = _bodies(members)
-        self.live = LiveScene(roads, self.bodies, WIDEST)
+        self.live = LiveScene(roads, self.bodies, WIDEST, bodywork)
         self.weather: Weather | None = None
         self.elapsed = -np.inf
 
@@ -64,7 +70,9 @@ class Surroundings:
         vehicles: Vehicles,
         sky: Sky,
         clock: Clock,
+        bodywork: Bodywork = Bodywork.PLAIN,
     ) -> None:
+        self.bodywork = bodywork
         self.map, self.actors, self.moving = map, actors, vehicles.moving
         self._landscape = landscape
         self.gravity = G  # m/s^2, as set by clients
@@ -79,7 +87,7 @@ class Surroundings:
         members = [a for a in self.actors if a.family in SOLID]
         seen, roads = self._pictured, self._landscape.roads
         if seen is None or seen.members != members or seen.roads is not roads:
-            self._pictured = seen = Pictured(roads, members)
+            self._pictured = seen = Pictured(roads, members, self.bodywork)
         now = self._clock.elapsed
         if seen.elapsed != now:
             seen.live.place(self._states(members), now - seen.elapsed)
@@ -87,6 +95,8 @@ class Surroundings:
             seen.elapsed = now
         seen.shade(self._sky.weather)
         seen.shading.set_braking(np.array([self._brakes(a) for a in members], dtype=np.bool_))
+        if self.bodywork is Bodywork.SHAPED:
+            seen.shading.set_indicating(self._indicating(members))
         return seen
 
     def carrier_row(self, sensor: Actor) -> int:
@@ -125,6 +135,14 @@ class Surroundings:
     def _brakes(self, actor: Actor) -> bool:
         """Returns whether the actor is a vehicle with its brake pedal pressed."""
         return actor.id in self._vehicles and self._vehicles.of(actor.id).control.brake > 0.0
+
+    def _indicating(self, members: list[Actor]) -> NDArray[np.bool_]:
+        """Returns whose left and right indicators shine now (n, 2): those switched on, while they flash."""
+        shine = self._clock.elapsed % FLASH < 0.5 * FLASH
+        flags = [self.lamps(a) if a.id in self._vehicles else 0 for a in members]
+        switched = [(f & LEFT_INDICATOR, f & RIGHT_INDICATOR) for f in flags]
+        lit: NDArray[np.bool_] = shine & (np.array(switched, dtype=int).reshape(-1, 2) != 0)
+        return lit
 
     def _states(self, members: list[Actor]) -> ActorStates:
         """Poses and motion of all members: bodies by columns, what is attached one by one."""

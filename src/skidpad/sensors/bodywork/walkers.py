@@ -1,0 +1,130 @@
+"""Walkers within their boxes in m, in mid-step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from skidpad.sensors.bodywork.body import (
+    Body,
+    assemble,
+    ball,
+    skin,
+    tube,
+)
+from skidpad.sensors.scene.materials import Material
+from skidpad.sensors.scene.mesh import Mesh, box, merge
+
+HAIR, SHOE = Material.TRIM, Material.TYRE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WalkerStyle:
+    """What one kind of walker looks like, in shares of the height."""
+
+    hip: float = 0.50
+    neck: float = 0.83
+    head: float = 0.066  # half of its height
+    coat: float | None = None  # lower hem of a coat or skirt
+    pack: bool = False  # on the back
+    hair: float = 0.0  # how far it hangs down
+    trousers: int = Material.TROUSERS
+    sleeves: int = Material.CLOTH
+
+
+WALKERS = {
+    "walker in a jacket": WalkerStyle(),
+    "walker in a coat": WalkerStyle(coat=0.34, hair=0.10, trousers=Material.TRIM),
+    "walker with a pack": WalkerStyle(pack=True, trousers=Material.CARGO, sleeves=Material.SKIN),
+    "child": WalkerStyle(hip=0.46, neck=0.77, head=0.09, pack=True, hair=0.05),
+}
+
+
+def make_walker(label: int, style: WalkerStyle, length: float, width: float, height: float) -> Body:
+    """Returns the body of a walker in mid-step."""
+    mesh = _walker(label, style, 0.5 * length / height, 0.5 * width / height)
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    size = np.array([length, width, height])
+    place = (mesh.vertices - low) / (high - low) * size - (0.5 * length, 0.5 * width, 0.0)
+    return assemble([mesh._replace(vertices=place)], ())
+
+
+def _walker(label: int, style: WalkerStyle, deep: float, wide: float) -> Mesh:
+    """A walker of height 1 with one leg and the other arm ahead, so far in and across as is asked."""
+    hip, neck = style.hip, style.neck
+    chest, k = neck - 0.09, min(1.0, (wide - 0.042) / 0.112)
+    rows = [
+        (hip - 0.02, 0.058, 0.085 * k),
+        (hip + 0.10, 0.052, 0.080 * k),
+        (chest, 0.066, 0.112 * k),
+        (neck - 0.02, 0.045, 0.095 * k),
+        (neck, 0.03, 0.04 * k),
+    ]
+    parts = [
+        _torso(label, rows),
+        tube(
+            ((0.0, 0.0, neck - 0.02), (0.01, 0.0, neck + 0.04)), (0.03, 0.028), label, Material.SKIN
+        ),
+        ball((0.012, 0.0, 1.0 - style.head), (0.052, 0.043, style.head), label, Material.SKIN),
+        ball(
+            (-0.006, 0.0, 1.0 - 0.82 * style.head), (0.054, 0.047, 0.82 * style.head), label, HAIR
+        ),
+    ]
+    if style.hair > 0.0:
+        z = 1.0 - style.head
+        parts.append(
+            tube(((-0.03, 0.0, z), (-0.035, 0.0, z - style.hair)), (0.045, 0.03), label, HAIR)
+        )
+    for s in (1.0, -1.0):
+        foot = (deep - 0.075 if s > 0.0 else 0.03 - deep, 0.048 * s * k, 0.045)
+        knee = (0.5 * foot[0] + 0.025, 0.046 * s * k, 0.52 * hip)
+        parts += [
+            tube(((0.0, 0.046 * s * k, hip), knee), (0.052, 0.038), label, style.trousers),
+            tube((knee, foot), (0.038, 0.026), label, style.trousers),
+            box(
+                (foot[0] - 0.03, foot[0] + 0.075),
+                (foot[1] - 0.024, foot[1] + 0.024),
+                (0.0, 0.05),
+                label,
+                SHOE,
+            ),
+        ]
+        swing = -0.3 * s * min(deep, 0.16)
+        shoulder = (0.0, 0.114 * s * k, neck - 0.045)
+        elbow = (0.5 * swing, s * min(0.115 + 0.02 * k, wide - 0.028), neck - 0.19)
+        hand = (swing + 0.03, s * (wide - 0.018), neck - 0.335)
+        parts += [
+            tube((shoulder, elbow), (0.034, 0.027), label, Material.CLOTH),
+            tube((elbow, hand), (0.026, 0.02), label, style.sleeves),
+            ball(hand, (0.022, 0.018, 0.03), label, Material.SKIN, 6),
+        ]
+    if style.coat is not None:
+        hem = [
+            (style.coat, min(0.095, 0.9 * deep), 0.105 * k),
+            (hip, 0.068, 0.092 * k),
+            (hip + 0.1, 0.054, 0.081 * k),
+        ]
+        parts.append(_torso(label, hem))
+    if style.pack:
+        back = max(-0.13, -deep)
+        parts.append(
+            box(
+                (back, -0.04),
+                (-0.075 * k, 0.075 * k),
+                (hip + 0.06, neck - 0.04),
+                label,
+                Material.FENCE,
+            )
+        )
+    return merge(parts)
+
+
+def _torso(label: int, rows: Sequence[tuple[float, float, float]]) -> Mesh:
+    """An upright body of elliptic sections: height, half depth and half width of each."""
+    angle = 2.0 * np.pi * (np.arange(10) + 0.5) / 10
+    rings = [
+        np.stack([a * np.cos(angle), b * np.sin(angle), np.full(10, z)], axis=1) for z, a, b in rows
+    ]
+    return skin(np.array(rings), label, Material.CLOTH)

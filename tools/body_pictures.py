@@ -108,6 +108,7 @@ def draw_strip(
         states.yaw[:] = turn + pi, place.yaw
         states.z[:], states.present[:] = place.z, True
         rgb = suite.observe(0, states, {}).images["c"].rgb
+        assert rgb is not None
         pictures.append(cv2.resize(rgb, SHOWN, interpolation=cv2.INTER_AREA))
     return np.asarray(np.hstack(pictures), dtype=np.uint8)
 

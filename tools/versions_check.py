@@ -3,13 +3,14 @@
     python tools/versions_check.py            # both, each in an empty environment of its own
     python tools/versions_check.py oldest     # one of them
 
-Every module is imported, which reads presets and the types of maps; then a map is loaded by the command.
+Every module is imported, which reads presets and the types of maps; then commands load a map and print help.
 Parts that need an extra are passed over where it is missing. Pythons are looked for on PATH and among
 those of pyenv.
 """
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import subprocess
@@ -77,13 +78,19 @@ def copy_source(place: Path) -> Path:
 
 
 def try_versions(python: str, place: Path, source: Path, *options: str) -> bool:
-    """Install the package into an empty environment, import all of it, and load a map."""
+    """Install the package into an empty environment, import all of it, load a map, print help."""
     subprocess.run([python, "-m", "venv", str(place)], check=True)
     own = str(place / "bin" / "python")
     install = [own, "-m", "pip", "install", "--quiet", "--prefer-binary", *options, str(source)]
     subprocess.run(install, check=True)
-    calls = ([own, "-c", IMPORT_ALL], [own, "-m", "skidpad", "map", "info", "figure8"])
-    return all(subprocess.run(call, cwd=place, check=False).returncode == 0 for call in calls)
+    calls = (
+        [own, "-c", IMPORT_ALL],
+        [own, "-m", "skidpad", "map", "info", "figure8"],
+        [own, "-m", "skidpad", "adas", "--help"],
+    )
+    alone = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+    done = [subprocess.run(call, cwd=place, env=alone, check=False).returncode for call in calls]
+    return not any(done)
 
 
 def main(words: list[str]) -> int:

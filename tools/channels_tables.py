@@ -99,7 +99,7 @@ def driven(results: Path) -> str:
     run, report = _read(results, "run"), _read(results, "report")
     parts = report["strata"] | _on_ice(results)
     hours = ", ".join(
-        f"{part['hours']:.2f} h among {drivers} drivers ({part['segments']} segments)"
+        f"{part['hours']:.2f} h among {drivers} drivers ({_segments(part)})"
         for drivers, part in parts.items()
     )
     model = report["model"]
@@ -230,9 +230,7 @@ def _rules_table(results: Path, name: str, hazards: tuple[str, ...] = HAZARDS) -
         for rule, of in part["rules"].items()
         if (row := of.get(hazard)) and row["tp"] + row["fn"] and not rule.startswith(REFERENCE)
     ]  # fmt: skip
-    hours = ", ".join(
-        f"{p['hours']:.2f} h {n} ({p['segments']} segments)" for n, p in told["drives"].items()
-    )
+    hours = ", ".join(f"{p['hours']:.2f} h {n} ({_segments(p)})" for n, p in told["drives"].items())
     when = f"Driven {told['date']} at commit `{told['commit']}`, seeds from {seeds}: {hours}."
     return f"{when}{_cost(told)}\n\n{_table(head, rows)}"
 
@@ -361,6 +359,10 @@ def _rate(rate: list[float | None]) -> str:
 
 def _harmonic(tp: float, fp: float, fn: float) -> float:
     return 2.0 * tp / max(2.0 * tp + fp + fn, 1.0)
+
+
+def _segments(part: dict[str, Any]) -> str:
+    return "1 segment" if part["segments"] == 1 else f"{part['segments']} segments"
 
 
 def _words(name: str) -> str:

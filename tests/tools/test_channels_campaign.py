@@ -70,7 +70,7 @@ def test_a_page_is_filled_and_what_is_written_by_hand_stays(published):
 
 def test_every_table_says_what_it_holds(published):
     said = {name: make(published) for name, make in tables.TABLES.items()}
-    assert "0.00 h among natural drivers (1 segments)" in said["driven"]
+    assert "0.00 h among natural drivers (1 segment)" in said["driven"]
     assert "seeds from 6300000" in said["driven"]
     assert "| tracked | ego tailgated | 1 | 0 | 0 | 100.0 " in said["scores"]
     assert "| natural | tracked | ego tailgated |" in said["curves"]

@@ -22,6 +22,7 @@ from tests.scenarios.files import (
     teleport,
     time,
     to,
+    trajectory,
     vehicle,
     write,
 )
@@ -172,6 +173,20 @@ def test_a_file_that_lets_the_ego_reverse_is_void_where_it_did_not(tmp_path, dri
     found = verdict_of(tmp_path / "out")
     assert found["verdict"] == verdict, done.output
     assert ("never went backwards" in found["reasons"]) == (verdict == "void")
+
+
+@pytest.mark.parametrize(("driver", "verdict"), [(BLIND, "void"), (("--stack", "ideal"), "failed")])
+def test_a_file_that_lets_the_ego_turn_off_is_void_where_it_went_another_way(
+    tmp_path, driver, verdict
+):
+    """As in Euro NCAP's CCFtap: the ego turns across the way of an oncoming car."""
+    way = trajectory((100.0, -1.75), (125.0, -1.75), (125.0, 40.0))
+    begins = init("ego", teleport(on_lane(-1, 100)), speed(to(8)), way) + at("other", 1, 160, 8)
+    file = write(tmp_path, init=begins, end=6.0)
+    done = play(file, "--out", tmp_path / "out", *driver, *NO_HIT)
+    found = verdict_of(tmp_path / "out")
+    assert found["verdict"] == verdict, done.output
+    assert ("turn off" in found["reasons"]) == (verdict == "void")
 
 
 def test_an_event_that_waits_for_a_collision_is_no_part_of_the_interaction(tmp_path):

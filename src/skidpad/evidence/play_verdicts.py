@@ -138,6 +138,8 @@ def void_reasons(staging: Staging, others: Sequence[Counterpart]) -> list[str]:
     ]
     if staging.unreversed:
         reasons.append("the file lets the ego reverse, and it never went backwards")
+    if staging.unturned:
+        reasons.append("the file lets the ego turn off, and it went another way")
     partners = [c for c in others if c.staged] or ([] if staging.partners else list(others))
     if not partners:
         gone = ", ".join(staging.partners)

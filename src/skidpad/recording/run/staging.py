@@ -41,6 +41,7 @@ class Staging(Struct, frozen=True, kw_only=True):
     events: tuple[StagedEvent, ...] = ()
     criteria: tuple[FileCriterion, ...] = ()
     unreversed: bool = False  # the file lets the ego go backwards, and it never did
+    unturned: bool = False  # the file leads the ego round a corner, and it went another way
 
     @property
     def missing(self) -> list[StagedEvent]:

@@ -17,7 +17,7 @@ from skidpad.scenarios.actions.routing import go_on_after_track
 from skidpad.scenarios.movement.motion import Guide
 from skidpad.scenarios.movement.network import Place
 from skidpad.scenarios.playing.piloting import control
-from skidpad.scenarios.playing.staging import staging_of
+from skidpad.scenarios.playing.staging import WayOfEgo, staging_of
 from skidpad.scenarios.playing.telling import Telling
 from skidpad.scenarios.reading.entities import TYRES, Box
 from skidpad.scenarios.scenario import Scenario
@@ -103,6 +103,7 @@ class Player:
         self.going: list[Running] = []  # what <Init> began and is under way
         self.hit = False  # the ego has touched something
         self.way_back = 0.0  # m that the ego has gone backwards
+        self.way = WayOfEgo()
 
     @property
     def has_triggered_all(self) -> bool:
@@ -120,7 +121,10 @@ class Player:
         boxes = {name: entity.box for name, entity in self.scenario.entities.items()}
         story = tuple(self.scene.story)
         driven_by_file = self.modes.get(self.scenario.ego, ActorMode.PHYSICAL) is not None
-        staging = staging_of(self.scenario, story, driven_by_file, self.way_back > WAY_BACK)
+        staging = staging_of(
+            self.scenario, story, driven_by_file,
+            went_back=self.way_back > WAY_BACK, left_way=self.way.is_left,
+        )  # fmt: skip
         return Played(story, boxes, staging, tuple(self.scene.lamps))
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
@@ -138,8 +142,10 @@ class Player:
         if first:
             self._begin()
         self.hit = self.hit or bool(truth.contacts)
-        v = self.actors[self.scenario.ego].motion.speed
-        self.way_back += max(-v, 0.0) * self.scene.dt
+        ego = self.actors[self.scenario.ego]
+        self.way_back += max(-ego.motion.speed, 0.0) * self.scene.dt
+        if self.modes.get(ego.name, ActorMode.PHYSICAL) is None:
+            self.way.look(ego)
         self.signals.step(self.scene)
         self.telling.look(self.scene)
         self.going = [action for action in self.going if not action.step(self.scene)]

@@ -3,25 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from math import hypot, pi
 
+from skidpad.core.geometry import wrap_angle
 from skidpad.recording.run.staging import StagedEvent, Staging
 from skidpad.scenarios.actions.base import NoEffect
 from skidpad.scenarios.actions.speed import Speed
 from skidpad.scenarios.actions.world import SetValue
 from skidpad.scenarios.conditions.by_entity import Collision
 from skidpad.scenarios.conditions.by_value import Value
+from skidpad.scenarios.movement.lines import Line
+from skidpad.scenarios.movement.tracking import PacedTrack, TimedTrack
 from skidpad.scenarios.scenario import Scenario
-from skidpad.scenarios.scene import Happening, Move
+from skidpad.scenarios.scene import Actor, Happening, Move
 from skidpad.scenarios.storyboard import Event, Group
 from skidpad.scenarios.triggers import AnyEntity, Trigger
 
+CORNER = pi / 4  # rad between a way's first and last direction, from which it turns off; assumption
+ASIDE = 3.5  # m beside its way, a lane's width, at which the ego has left it; assumption
+
 
 def staging_of(
-    scenario: Scenario, story: Iterable[Happening], driven_by_file: bool, went_back: bool = False
+    scenario: Scenario,
+    story: Iterable[Happening],
+    driven_by_file: bool,
+    *,
+    went_back: bool = False,
+    left_way: bool = False,
 ) -> Staging:
     """Returns what the file stages, with the times at which its events began in this story.
 
-    driven_by_file: the ego is no stack's; went_back: the ego has gone backwards.
+    driven_by_file: the ego is no stack's; went_back: the ego has gone backwards; left_way: it has left
+    a way round a corner of the file.
     """
     began: dict[tuple[str, ...], float] = {}
     for happening in story:
@@ -49,7 +62,29 @@ def staging_of(
         ),
         criteria=scenario.criteria,
         unreversed=not went_back and _lets_ego_reverse(scenario),
+        unturned=left_way,
     )
+
+
+class WayOfEgo:
+    """Watches whether an ego that the file does not drive leaves a way round a corner.
+
+    The way is the last trajectory of the ego whose direction turns by `CORNER` or more.
+    """
+
+    def __init__(self) -> None:
+        self.line: Line | None = None
+        self.is_left = False
+
+    def look(self, ego: Actor) -> None:
+        """Measures how far the ego is from its way, in each step."""
+        track = ego.track
+        if isinstance(track, PacedTrack | TimedTrack) and track.line is not self.line:
+            turn = wrap_angle(track.line.tangent(track.line.length) - track.line.tangent(0.0))
+            self.line = track.line if abs(turn) >= CORNER else None
+        if self.line is not None and not self.is_left:
+            at = self.line.at_length(self.line.nearest(ego.pose.x, ego.pose.y))
+            self.is_left = hypot(at.x - ego.pose.x, at.y - ego.pose.y) > ASIDE
 
 
 def _lets_ego_reverse(scenario: Scenario) -> bool:

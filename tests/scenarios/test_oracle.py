@@ -24,6 +24,11 @@ EXCEPTIONS = (
     "track_headings_straight",
     "meets_plain_reverse",
     "meets_final_reverse",
+    "meets_plain_arc",
+    "meets_final_arc",
+    "ego_waits_collision_arc",
+    "when_collision_time_euclidean_crossing",
+    "beside_rigid_banked",
 )
 
 

@@ -38,6 +38,7 @@ from tests.scenarios.oracle.actions import (
     smooth_profile,
     timing,
 )
+from tests.scenarios.oracle.cells import cells
 from tests.scenarios.oracle.conditions import conditions
 from tests.scenarios.oracle.ends import at_once, at_the_same_time, backwards, without_road
 from tests.scenarios.oracle.everywhere import everywhere
@@ -377,6 +378,7 @@ CASES: dict[str, Case] = {
         pairs,
         everywhere,
         turns,
+        cells,
     )
     for c in part()
 }

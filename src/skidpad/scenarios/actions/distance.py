@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from math import copysign, inf, sqrt
+from math import copysign, cos, inf, sqrt
 
 from skidpad.scenarios.actions.base import note_bound
 from skidpad.scenarios.context import Context
-from skidpad.scenarios.movement.measures import Axes, along_road, between
+from skidpad.scenarios.movement.measures import Axes, along_road, between, extents_along_road
 from skidpad.scenarios.reading.document import Node
 from skidpad.scenarios.reading.entities import Performance
 from skidpad.scenarios.scene import Actor, Running, Scene
@@ -107,12 +107,29 @@ class KeepGap:
         gap = found[0] if found else scene.between(actor.name, self.other)[0]
         if not self.free:
             return gap
+        on_road = self._free_on_road(scene, actor, other) if self.road else None
+        if on_road is not None:
+            return on_road
         own = actor.entity.box
         shift = gap - scene.between(actor.name, self.other)[0]  # of a road that is not straight
         its = [between(actor.pose, x, y)[0] + shift for x, y in other.outline()]
         if gap >= 0.0:
             return max(min(its) - own.forward - own.length / 2.0, 0.0)
         return min(max(its) - own.forward + own.length / 2.0, 0.0)
+
+    def _free_on_road(self, scene: Scene, actor: Actor, other: Actor) -> float | None:
+        """Returns how far the other outline is ahead along the road of both, m; None off one road."""
+        a, b = (
+            extents_along_road(scene.network, one.outline(), one.pose) for one in (actor, other)
+        )
+        if a is None or b is None or a[0] != b[0]:
+            return None
+        here = scene.network.coordinates(actor.pose)
+        sign = 1.0 if here is None or cos(here.turn) >= 0.0 else -1.0
+        own, its = ([sign * s for s in found[1]] for found in (a, b))
+        if sum(its) >= sum(own):
+            return max(min(its) - max(own), 0.0)
+        return min(max(its) - min(own), 0.0)
 
     def wanted_gap(self, scene: Scene, side: Displacement) -> float:
         """Returns how far the other one should be ahead, m; negative where the entity is to lead."""

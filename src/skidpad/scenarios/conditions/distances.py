@@ -16,6 +16,7 @@ from skidpad.scenarios.movement.measures import (
     between,
     clearance,
     extent_gap,
+    extents_along_road,
 )
 from skidpad.scenarios.places.positions import Position, position
 from skidpad.scenarios.reading.document import Node
@@ -44,6 +45,9 @@ class Measure:
         if self.axes in (Axes.ROAD, Axes.LANE):
             found = along_road(scene.network, actor.pose, goal)
             if found is not None:
+                room = self._room_on_road(scene, actor, other) if self.free else None
+                if room is not None:
+                    return room
                 way = found[0 if forward else 1]
                 return max(abs(way) - self._room(actor, other, way, forward), 0.0)
         if self.free:
@@ -56,6 +60,18 @@ class Measure:
         if self.axes is Axes.WORLD:
             dx, dy = goal.x - actor.pose.x, goal.y - actor.pose.y
         return abs(dx if forward else dy)
+
+    def _room_on_road(self, scene: Scene, actor: Actor, other: Actor | None) -> float | None:
+        """Returns the free room between two bodies in the coordinates of their road, m; None off one road."""
+        if other is None:
+            return None
+        a, b = (
+            extents_along_road(scene.network, one.outline(), one.pose) for one in (actor, other)
+        )
+        if a is None or b is None or a[0] != b[0]:
+            return None
+        k = 1 if self.direction is Direction.LONGITUDINAL else 2
+        return extent_gap(a[k], b[k])
 
     def _room(self, actor: Actor, other: Actor | None, way: float, forward: bool) -> float:
         """Returns what the bodies take of a signed distance of their reference points, m.

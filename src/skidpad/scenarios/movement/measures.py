@@ -112,3 +112,14 @@ def along_road(network: Network, a: Pose, b: Pose) -> Point | None:
     ahead, behind = shortest_route(network.map, p, q), shortest_route(network.map, q, p)
     ways = [r.length * sign for r, sign in ((ahead, 1.0), (behind, -1.0)) if r is not None]
     return (min(ways, key=abs), left) if ways else None
+
+
+def extents_along_road(
+    network: Network, outline: Sequence[Point], pose: Pose
+) -> tuple[int, list[float], list[float]] | None:
+    """Returns the road and the s and t in m of the corners of a body at a pose; None off one road."""
+    found = [network.coordinates(Pose(x, y, pose.z, yaw=pose.yaw)) for x, y in outline]
+    known = [at for at in found if at is not None]
+    if len(known) < len(found) or len({at.road for at in known}) != 1:
+        return None
+    return known[0].road, [at.s for at in known], [at.t for at in known]

@@ -36,7 +36,9 @@ from tests.scenarios.oracle.conditions import (
     near,
     towards,
 )
+from tests.scenarios.oracle.pairs import DELETED, added
 from tests.scenarios.oracle.settings import BEGIN, SETTINGS, Case, case, moving
+from tests.scenarios.oracle.turns import drawn
 
 MOMENT = 3.03  # s, between two steps
 RADIUS = 120.0  # m, of the curve, which begins at x = 100 m and turns left
@@ -136,7 +138,7 @@ def places_reached() -> Iterator[Case]:
         place = world(round(x, 3), round(y, 3))
         bodies = {
             "near": towards(place, f'value="{off}" freespace="false" rule="lessThan"'),
-            "reached": f'<ReachPositionCondition tolerance="{off}"><Position>{place}</Position>'
+            "reached_place": f'<ReachPositionCondition tolerance="{off}"><Position>{place}</Position>'
             "</ReachPositionCondition>",
         }
         if setting in COURSES:
@@ -295,6 +297,70 @@ def actions_elsewhere() -> Iterator[Case]:
         yield case(name, "banked", kept)
 
 
+def both(begin: str, stories: str, walks: bool = False) -> dict[str, str]:
+    entities = vehicle("ego") + (pedestrian("other") if walks else vehicle("other"))
+    return {"minor": "3", "entities": entities, "init": begin, "stories": stories}
+
+
+def ends_of_roads() -> Iterator[Case]:
+    """The ego slows down once the other one has been at the end of its road for a second."""
+    ends = {
+        "arc": ("curve", on_lane(-1, 383.7), 10.0),
+        "hill": ("hill", on_lane(-1, 783.7), 10.0),
+        "oncoming": ("straight", on_lane(1, 16.3), 10.0),
+        "reverse": ("straight", on_lane(-1, 12), -6.0),
+        "crossing": ("cross", on_lane(-1, 383.7, road=2), 10.0),
+        "on_foot": ("straight", on_lane(-1, 997), 1.5),
+    }
+    stands = '<EndOfRoadCondition duration="0.975"/>'
+    for setting, (road, place, v) in ends.items():
+        slow = event("e", private(speed(to(4), "linear", 2)), by_entity(stands, "other"))
+        begin = moving("ego", on_lane(-2, 120), 12) + moving("other", place, v)
+        parts = both(begin, story(slow, actor="ego"), setting == "on_foot")
+        yield Case(f"when_end_of_road_{setting}", road, parts, 8.0)
+
+
+def comings() -> Iterator[Case]:
+    """The other one is taken away and put somewhere else in its setting."""
+    for setting, (road, walks, ego, other) in SETTINGS.items():
+        there = on_lane(
+            1 if setting == "oncoming" else -1, 220, road=2 if setting == "crossing" else 1
+        )
+        events = (event("remove", DELETED, time(BEGIN)), event("add", added(there), time(2.975)))
+        parts = both(ego + other, story(*events), walks)
+        yield (
+            Case(f"add_again_{setting}", road, parts, 6.0)
+            if setting != "straight"
+            else Case("add_there_straight", road, parts, 6.0)
+        )
+
+
+ACQUIRED = """<RoutingAction><AcquirePositionAction><Position>{}</Position>
+</AcquirePositionAction></RoutingAction>"""
+
+
+def acquired_places() -> Iterator[Case]:
+    """A place behind a fork is driven to, straight on, round the corner and coming back."""
+    for name, begin, goal in (
+        ("straight_on", on_lane(-1, 60), on_lane(-1, 60, road=2)),
+        ("round", on_lane(-1, 60), on_lane(-1, 60, road=3)),
+        ("back", on_lane(1, 40, road=3), on_lane(1, 20)),
+    ):
+        stories = story(event("e", private(ACQUIRED.format(goal)), time(BEGIN)))
+        places = moving("ego", on_lane(-1, 20), 8) + moving("other", begin, 10)
+        yield Case(f"acquire_{name}_fork", "fork", both(places, stories), 9.0)
+
+
+def trailers_elsewhere() -> Iterator[Case]:
+    change = private(lane_change('<AbsoluteTargetLane value="-1"/>', "sinusoidal", 3))
+    yield drawn("arc", "curve", moving("ego", on_lane(-2, 150), 10), change)
+    back = private(speed(to(-2), "linear", 2))
+    yield drawn("back_arc", "curve", moving("ego", on_lane(-2, 250), 2), back, 6.0)
+    yield drawn(
+        "oncoming", "straight", moving("ego", on_lane(2, 300), 10), private(lane_offset(0.8))
+    )
+
+
 def cells() -> Iterator[Case]:
     yield from distances_across()
     yield from distances_along()
@@ -303,3 +369,7 @@ def cells() -> Iterator[Case]:
     yield from other_measures()
     yield from hits()
     yield from actions_elsewhere()
+    yield from ends_of_roads()
+    yield from comings()
+    yield from acquired_places()
+    yield from trailers_elsewhere()

@@ -45,7 +45,7 @@ class Measure:
         if self.axes in (Axes.ROAD, Axes.LANE):
             found = along_road(scene.network, actor.pose, goal)
             if found is not None:
-                room = self._room_on_road(scene, actor, other) if self.free else None
+                room = self._free_on_road(scene, actor, other) if self.free else None
                 if room is not None:
                     return room
                 way = found[0 if forward else 1]
@@ -61,7 +61,7 @@ class Measure:
             dx, dy = goal.x - actor.pose.x, goal.y - actor.pose.y
         return abs(dx if forward else dy)
 
-    def _room_on_road(self, scene: Scene, actor: Actor, other: Actor | None) -> float | None:
+    def _free_on_road(self, scene: Scene, actor: Actor, other: Actor | None) -> float | None:
         """Returns the free room between two bodies in the coordinates of their road, m; None off one road."""
         if other is None:
             return None
@@ -70,8 +70,9 @@ class Measure:
         )
         if a is None or b is None or a[0] != b[0]:
             return None
-        k = 1 if self.direction is Direction.LONGITUDINAL else 2
-        return extent_gap(a[k], b[k])
+        if self.direction is Direction.LONGITUDINAL:
+            return extent_gap(a[1], b[1])
+        return extent_gap(a[2], b[2])
 
     def _room(self, actor: Actor, other: Actor | None, way: float, forward: bool) -> float:
         """Returns what the bodies take of a signed distance of their reference points, m.

@@ -90,3 +90,22 @@ def test_what_makes_no_sense_is_said(tmp_path, body, message):
     (tmp_path / "many.xosc").write_text(FILE.format("<Deterministic/>"), encoding="utf-8")
     with pytest.raises(FileError, match="no such file"):
         choices(tmp_path / "many.xosc")
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ("<UniformDistribution/>", "needs a Range of two numbers in order, got -inf to inf"),
+        ('<UniformDistribution><Range lowerLimit="4" upperLimit="2"/></UniformDistribution>', "4 to 2"),
+        ('<ProbabilityDistributionSet><Element value="1" weight="0"/></ProbabilityDistributionSet>',
+         "one above 0, got 0"),
+        ('<Histogram><HistogramBin weight="-1"><Range lowerLimit="0" upperLimit="2"/></HistogramBin>'
+         "</Histogram>", "got -1"),
+    ],
+)  # fmt: skip
+def test_a_distribution_without_a_range_or_a_weight_is_refused_with_its_line(
+    tmp_path, body, message
+):
+    """NumPy's OverflowError and ValueError came through and named neither file nor line."""
+    with pytest.raises(FileError, match=rf"many\.xosc.*{message}"):
+        drawn(tmp_path, body)

@@ -146,6 +146,9 @@ def test_a_run_that_switches_no_lamp_has_no_file_of_them(tmp_path):
     (tmp_path / FILE).write_text("time,entity,lamp,mode,on,off\n1,a,sun,on,0.5,0.5\n")
     with pytest.raises(FileError, match=r"lamps\.csv.*sun"):
         read_lamps(tmp_path)
+    (tmp_path / FILE).write_text(f"time,entity,lamp,mode,on,off\n{'1' * 200_000}\n")
+    with pytest.raises(FileError, match=r"lamps\.csv.*field larger"):
+        read_lamps(tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
+from xml.etree import ElementTree
 
 import pytest
 
@@ -10,7 +11,8 @@ from skidpad.campaign.driving.outdoors import environment_of, weather_of
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.physics.presets import preset
 from skidpad.scenarios.export.tracks import Track
-from skidpad.scenarios.export.writer import OscVersion, Sheet, write_scenario
+from skidpad.scenarios.export.writer import OscVersion, Sheet, environment_action, write_scenario
+from skidpad.scenarios.reading.environment import Environment, Fall
 from skidpad.scenarios.scenario import check
 
 
@@ -42,3 +44,12 @@ def test_the_weather_of_a_run_is_that_of_its_file(tmp_path, name, version):
         assert getattr(again, field) == pytest.approx(getattr(weather, field), abs=tolerance), field
     assert again.is_night == weather.is_night
     assert environment.friction_scale == 1.0
+
+
+def test_falling_snow_is_written_as_snow() -> None:
+    action = environment_action(Environment(fall=Fall.SNOW, fall_mm_h=2.0), old=False)
+    precipitation = ElementTree.fromstring(ElementTree.tostring(action.get_element())).find(
+        ".//Precipitation"
+    )
+    assert precipitation is not None
+    assert precipitation.attrib == {"precipitationType": "snow", "precipitationIntensity": "2.0"}

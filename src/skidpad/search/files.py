@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 from skidpad.core.space import Choice, Law, Normal, Space, Uniform, Variable
 from skidpad.recording.campaign.searches import Trial
 from skidpad.recording.files import write_bytes
-from skidpad.scenarios.reading.distributions import scenario_of_choices
+from skidpad.scenarios.reading.distributions import read_weights, scenario_of_choices
 from skidpad.scenarios.reading.document import Node, parse
 from skidpad.scenarios.reading.parameters import inner
 from skidpad.search.space import SEED, WEATHER, check_space
@@ -46,9 +46,7 @@ def _law(node: Node) -> Law:
         return Choice(tuple(e.text("value") for e in node.children("Element")))
     if node.tag == "ProbabilityDistributionSet":
         elements = list(node.children("Element"))
-        return Choice(
-            tuple(e.text("value") for e in elements), tuple(e.number("weight") for e in elements)
-        )
+        return Choice(tuple(e.text("value") for e in elements), read_weights(node, elements))
     found = node.find("Range")
     low = None if found is None else found.number("lowerLimit")
     high = None if found is None else found.number("upperLimit")

@@ -17,8 +17,8 @@ from skidpad.core.states import ActorStates
 
 def map_origin(geo_reference: str) -> tuple[float, float] | None:
     """Returns latitude and longitude in deg of a map's origin, as its projection text says; None without."""
-    number = r"-?[0-9.]+(?:[eE][-+]?[0-9]+)?"
-    found = dict(re.findall(rf"\+(lat_0|lon_0)=({number})", geo_reference))
+    number = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
+    found = dict(re.findall(rf"\+(lat_0|lon_0)=({number})(?![\w.])", geo_reference))
     return (float(found["lat_0"]), float(found["lon_0"])) if len(found) == 2 else None
 
 

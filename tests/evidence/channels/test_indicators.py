@@ -194,6 +194,7 @@ def test_area_ratio_says_what_zero_means():
     assert similarity.area_ratio(0.0, 0.0) == 1.0
     assert similarity.area_ratio(0.0, 3.0) == 0.0
     assert np.isnan(similarity.area_ratio(np.nan, 3.0))
+    assert np.isnan(similarity.area_ratio(3.0, np.nan))
 
 
 @pytest.mark.req("C-054")

@@ -89,7 +89,7 @@ def read_lamps(folder: Path) -> tuple[LampChange, ...]:
     try:
         with file.open(encoding="utf-8", newline="") as lines:
             return tuple(_change(row) for row in csv.DictReader(lines))
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, csv.Error) as error:
         raise FileError(f"{file}: not as this version writes it: {error}") from None
 
 

@@ -144,9 +144,6 @@ def pieces_under_way(
     return [rise, hold, fall]
 
 
-SAME_SLOPE = 1e-6  # m/s^2
-
-
 def settle(v: float, a: float, jerk: Jerk) -> Piece:
     """Returns the piece that brings an acceleration `a` under way to 0 at the limit of jerk.
 

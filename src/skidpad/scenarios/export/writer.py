@@ -296,7 +296,11 @@ def environment_action(environment: Environment, *, old: bool) -> Any:
         round(radians(elevation), 4),
     )
     rain = environment.fall_mm_h / HEAVY if old else environment.fall_mm_h
-    kind = xosc.PrecipitationType.rain if environment.fall is Fall.RAIN else _DRY
+    kind = {
+        Fall.RAIN: xosc.PrecipitationType.rain,
+        Fall.SNOW: xosc.PrecipitationType.snow,
+        Fall.DRY: _DRY,
+    }[environment.fall]
     weather = xosc.Weather(
         _clouds(environment.clouds or 0.0, old=old),
         sun=sun,

@@ -97,6 +97,14 @@ def _range(node: Node) -> tuple[float, float]:
     return found.number("lowerLimit"), found.number("upperLimit")
 
 
+def _finite_range(node: Node) -> tuple[float, float]:
+    """Returns the lower and upper limit; raises an error where they are missing, infinite or swapped."""
+    low, high = _range(node)
+    if not -inf < low <= high < inf:
+        raise node.error(f"needs a Range of two numbers in order, got {low:g} to {high:g}")
+    return low, high
+
+
 Draw = Callable[[np.random.Generator], float | str]
 
 
@@ -119,12 +127,11 @@ def _draw(node: Node) -> Draw:
     """Returns the function of a random generator that draws one value of the distribution."""
     if node.tag == "ProbabilityDistributionSet":
         elements = list(node.children("Element"))
-        return _draw_weighted(
-            [e.text("value") for e in elements], [e.number("weight") for e in elements]
-        )
-    low, high = _range(node)
+        return _draw_weighted([e.text("value") for e in elements], read_weights(node, elements))
     if node.tag == "UniformDistribution":
+        low, high = _finite_range(node)
         return lambda rng: float(rng.uniform(low, high))
+    low, high = _range(node)
     if node.tag in ("NormalDistribution", "LogNormalDistribution"):
         mean, sigma = node.number("expectedValue"), sqrt(max(node.number("variance"), 0.0))
         plain = node.tag == "NormalDistribution"
@@ -139,10 +146,19 @@ def _draw(node: Node) -> Draw:
         return _within(node, low, high, lambda rng: float(rng.poisson(mean)))
     if node.tag == "Histogram":
         bins = list(node.children("HistogramBin"))
-        which = _draw_weighted(list(range(len(bins))), [b.number("weight") for b in bins])
-        edges = [_range(b) for b in bins]
+        which = _draw_weighted(list(range(len(bins))), read_weights(node, bins))
+        edges = [_finite_range(b) for b in bins]
         return lambda rng: float(rng.uniform(*edges[int(which(rng))]))
     raise node.unsupported_fault()
+
+
+def read_weights(node: Node, parts: Sequence[Node]) -> tuple[float, ...]:
+    """Returns the weights of a distribution's parts; raises an error unless one is above 0."""
+    weights = tuple(part.number("weight") for part in parts)
+    if min(weights, default=0.0) < 0.0 or not 0.0 < sum(weights) < inf:
+        given = ", ".join(f"{weight:g}" for weight in weights)
+        raise node.error(f"weights must be 0 or more and one above 0, got {given or 'none'}")
+    return weights
 
 
 def _draw_weighted(values: Sequence[str] | Sequence[int], weights: Sequence[float]) -> Draw:

@@ -129,7 +129,9 @@ def polygon_areas(polygons: Floats, size: Ints) -> Floats:
 
 @kernel
 def area_ratio(a: float, b: float) -> float:
-    """Returns smaller over larger area (C-058): 1 for two areas of zero, 0 for one (C-059)."""
+    """Returns smaller over larger area (C-058): 1 for two areas of zero, 0 for one (C-059), nan of nan."""
+    if a != a or b != b:
+        return np.nan
     larger = max(a, b)
     if larger > 0.0:
         return min(a, b) / larger

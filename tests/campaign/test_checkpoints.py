@@ -176,3 +176,40 @@ def _stacks(folder: Path, name: str) -> str:
     file = folder / "stacks.py"
     file.write_text(STACKS)
     return f"{file}:{name}"
+
+
+def test_a_branch_draws_from_streams_of_its_own():
+    run = OpenRun(spec_of("figure8", 4, duration=12.0))
+    go_on(run, 60)
+    there = run.save()
+    hashes = {}
+    for branch in ("", "a", "b", "a", ""):
+        run.restore(there, branch)
+        go_on(run)
+        log = run.finish().log
+        assert np.array_equal(log.actors.x[:60], run.log.log.finish().actors.x[:60])
+        hashes.setdefault(branch, set()).add(log_hash(log))
+    assert [len(found) for found in hashes.values()] == [1, 1, 1], "each is reproducible"
+    assert len(set.union(*hashes.values())) == 3, "each is another future"
+    assert hashes[""] == {log_hash(drive(spec_of("figure8", 4, duration=12.0)).log)}
+
+
+def test_every_kind_of_state_counts(monkeypatch):
+    """What is left out of a checkpoint shows in the hash: the tests above would find it."""
+    from skidpad.core import checkpoint
+
+    spec = spec_of("figure8", 4, duration=15.0)
+    whole = log_hash(drive(spec).log)
+    kinds = ("_put_array", "_put_object", "_put_by_itself")
+    for kind in kinds:
+        run = OpenRun(spec)
+        go_on(run, 100)
+        saved = run.save()
+        go_on(run, 150)
+        state = saved._state
+        kept = [one for one in state._restoring if one[0] is not getattr(checkpoint, kind)]
+        assert len(kept) < len(state), f"there is state of this kind: {kind}"
+        monkeypatch.setattr(state, "_restoring", kept)
+        run.restore(saved)
+        go_on(run)
+        assert log_hash(run.finish().log) != whole, kind

@@ -9,6 +9,7 @@ from pathlib import Path
 from skidpad.campaign.cells.grip import template
 from skidpad.campaign.driving.drivers import STACK, find_driver
 from skidpad.campaign.driving.loop import Script
+from skidpad.campaign.driving.outdoors import branch_backend
 from skidpad.campaign.driving.run_setup import StackAtWheel, stage_of
 from skidpad.campaign.recipes.files import runs_of
 from skidpad.campaign.runs.checkpoints import RunCheckpoint
@@ -160,9 +161,17 @@ class Scenario:
             raise CheckpointError("a scenario needs at least one step before its state is saved")
         return RunCheckpoint(self, self._truth.tick)
 
-    def restore(self, checkpoint: RunCheckpoint) -> None:
-        """Goes on from a state that `save` gave, as often as you like."""
+    def restore(self, checkpoint: RunCheckpoint, branch: str = "") -> None:
+        """Goes on from a state that `save` gave, as often as you like.
+
+        Args:
+            checkpoint: of this scenario.
+            branch: sensor noise and choices of traffic are drawn from random streams of
+                this name from now on; without a name they go on as they were.
+        """
         checkpoint.restore(self)
+        if branch:
+            branch_backend(self._open.backend, branch)
 
     @property
     def t(self) -> float:

@@ -70,21 +70,23 @@ class Checkpoint:
     def __init__(self, root: object, fixed: tuple[type, ...] = ()) -> None:
         self._restoring: list[tuple[Callable[..., None], Any, Any]] = []
         self.nbytes = 0  # of arrays
+        copiers = _COPIERS_OF.setdefault(fixed, {tuple: _copy_tuple})
         seen: dict[int, object] = {}
-        waiting: list[object] = [root]
+        waiting: list[object] = [(root,)]
         while waiting:
             found = waiting.pop()
-            kind: Any = type(found)
-            copy = _copier(kind, fixed)
-            if copy is None or id(found) in seen:
-                continue
-            seen[id(found)] = found
-            put_back, state, parts = copy(found)
+            put_back, state, parts = copiers[type(found)](found)  # type: ignore[misc]
             if put_back is not None:
                 self._restoring.append((put_back, found, state))
-                if isinstance(state, np.ndarray):
+                if put_back is _put_array:
                     self.nbytes += state.nbytes
-            waiting.extend(parts)
+            for part in parts:
+                kind: Any = type(part)
+                if kind not in copiers:
+                    copiers[kind] = _copier(kind, fixed)
+                if copiers[kind] is not None and id(part) not in seen:
+                    seen[id(part)] = part
+                    waiting.append(part)
 
     def __len__(self) -> int:
         return len(self._restoring)
@@ -98,7 +100,6 @@ class Checkpoint:
 Copied = tuple[Callable[..., None] | None, Any, Iterable[object]]
 
 
-@cache
 def _copier(kind: Any, fixed: tuple[type, ...]) -> Callable[[Any], Copied] | None:
     """Returns what copies objects of a type; None for a type whose objects do not change."""
     if issubclass(kind, (*UNCHANGING, *fixed)) or _is_kernel(kind):
@@ -265,3 +266,5 @@ COPIERS: dict[type, Callable[[Any], Copied]] = {
     FunctionType: _copy_function,
     CellType: _copy_cell,
 }
+# by the fixed types of a checkpoint: what copies objects of each type; None: they do not change
+_COPIERS_OF: dict[tuple[type, ...], dict[type, Callable[[Any], Copied] | None]] = {}

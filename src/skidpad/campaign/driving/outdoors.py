@@ -8,7 +8,7 @@ from math import asin, atan2, cos, degrees, log, pi, radians, sin
 
 from msgspec import structs
 
-from skidpad.core.errors import FileError
+from skidpad.core.errors import CheckpointError, FileError
 from skidpad.core.frames import Frame
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Outside
@@ -72,9 +72,23 @@ class ChangedBackend:
         """The surroundings are others from the next step on."""
         self.inner.change(outside)
 
+    def branch(self, name: str) -> None:
+        """Draws from streams of this name from the next step on; CheckpointError where it cannot."""
+        branch_backend(self.inner, name)
+
     def close(self) -> None:
         """Releases the backend that this one wraps."""
         self.inner.close()
+
+
+def branch_backend(backend: Backend, name: str) -> None:
+    """Lets a backend draw from streams of this name; CheckpointError for one that cannot."""
+    branch = getattr(backend, "branch", None)
+    if branch is None:
+        raise CheckpointError(
+            "a branch with random streams of its own needs the embedded simulator"
+        )
+    branch(name)
 
 
 class FileChanges:

@@ -16,7 +16,7 @@ from skidpad.campaign.cells.matrix import describe_run
 from skidpad.campaign.driving.backends import make_backend
 from skidpad.campaign.driving.drivers import describe_driver
 from skidpad.campaign.driving.loop import Driver, Moment, Sink, Stepper
-from skidpad.campaign.driving.outdoors import ChangedBackend, FileChanges
+from skidpad.campaign.driving.outdoors import ChangedBackend, FileChanges, branch_backend
 from skidpad.campaign.driving.readings import ReadingsRecorder
 from skidpad.campaign.driving.run_setup import (
     StackAtWheel,
@@ -304,9 +304,14 @@ class OpenRun:
             raise CheckpointError("a run needs at least one step before its state is saved")
         return RunCheckpoint(self, self.backend.truth().tick)
 
-    def restore(self, checkpoint: RunCheckpoint) -> None:
-        """Goes back to a state that `save` gave, or forward again; moments before are void."""
+    def restore(self, checkpoint: RunCheckpoint, branch: str = "") -> None:
+        """Goes back to a state that `save` gave, or forward again; moments before are void.
+
+        branch: random streams of this name take the place of the run's own; "": they go on.
+        """
         checkpoint.restore(self)
+        if branch:
+            branch_backend(self.backend, branch)
 
     def close(self) -> None:
         """Releases the backend and what it holds."""

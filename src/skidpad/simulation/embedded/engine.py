@@ -13,7 +13,7 @@ from skidpad.core.errors import BackendError
 from skidpad.core.frames import Frame, SensorFrame
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Outside
-from skidpad.core.randomness import stream
+from skidpad.core.randomness import stream, stream_key
 from skidpad.core.setup import ActorCommand, Setup
 from skidpad.core.states import EgoEstimate, VehicleCommand, WorldTruth
 from skidpad.physics.fleet import shown_gear
@@ -57,6 +57,7 @@ class EmbeddedBackend:
         self._unseen: NDArray[np.bool_] | None = None  # hidden from all sensors; None: none is
         self._brake_lamps: list[tuple[int, bool]] = []
         self._localisation = stream(seed, "ego", "localisation")
+        self._outside: Outside | None = None  # as told last
         self.sensing = sensing_of(self.map, self.world.table, setup, seed, self.poison)
         self._asked = self._make_asked() if setup.asked else None
         return self._frame()
@@ -114,9 +115,20 @@ class EmbeddedBackend:
             self._unseen = np.array([name in outside.unseen for name in names], dtype=np.bool_)
         self._brake_lamps = [(names.index(name), lit) for name, lit in outside.brake_lamps]
         self.sensing.change(outside)
-        self._setup = changed
+        self._setup, self._outside = changed, outside
         if self._asked is not None:
             self._last_asked = self._asked  # which the frame of the moment may still read
+            self._asked = self._make_asked()
+
+    def branch(self, name: str) -> None:
+        """Draws noise and choices of drivers from streams of this name from the next step on."""
+        seed = self._seed = stream_key(self._seed, "branch", name)
+        self.world.change_streams(seed)
+        self._localisation = stream(seed, "ego", "localisation")
+        self.sensing = sensing_of(self.map, self.world.table, self._setup, seed, self.poison)
+        if self._outside is not None:
+            self.sensing.change(self._outside)
+        if self._asked is not None:
             self._asked = self._make_asked()
 
     def _make_asked(self) -> AskedSensors:

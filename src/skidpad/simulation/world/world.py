@@ -224,6 +224,11 @@ class World:
 
     # --- control from outside
 
+    def change_streams(self, seed: int) -> None:
+        """Draws what drivers choose from the streams of another seed from now on."""
+        if self.traffic is not None:
+            self.traffic.change_streams(seed)
+
     @property
     def grip(self) -> GripParams:
         """The grip of vehicles whose tyres are those of the run, outside of patches."""

@@ -132,6 +132,12 @@ class Traffic:
         self.waiting: list[int] = []  # ids of those who enter when there is room
         self.kept_back: set[int] = set()  # ids of those who do so once they are called
 
+    def change_streams(self, seed: int) -> None:
+        """Draws choices and places of drivers from other streams from now on; who they are stays."""
+        self.seed, self.places.rng = seed, stream(seed, "traffic", "places")
+        for id, row in self.row.items():
+            self.drivers.state["key"][row] = stream_key(seed, "traffic", "driver", id)
+
     def arrange(self, members: Sequence[Member], source: Mapping[int, int]) -> None:
         """Carries the drivers over to other rows; source: old row by new row of those that were there.
 

@@ -31,6 +31,7 @@ GAP_TIME = 7.0  # s of free road for crossing 7 m at 1.2 m/s and a second to spa
 RIDE_RIGHT = 0.8  # m right of the lane's centre
 RIDE_STOP = 6.0  # m kept to what stands ahead
 RIDE_BRAKE, RIDE_ACCELERATE = 2.0, 0.8  # m/s^2
+LANES_AHEAD = 3  # that a cyclist knows, its own first
 SIDE = 0.7  # m to both sides of the way in which something is ahead: half a bicycle and a gap
 YIELD_TIME = 8.0  # s after which a cyclist at a minor line goes in any gap
 
@@ -137,18 +138,17 @@ class Crowd:
 
     def _ride(self, r: _Rider, truth: WorldTruth) -> ActorCommand:
         """Moves a cyclist for one period, braking for obstacles and stop lines, and returns its command."""
-        gap = min(self._gap_ahead(r, truth), self._line_ahead(r, truth))
+        gap = min(self._gap_ahead(r, truth), self._line_ahead(r, truth), self._end_ahead(r))
         allowed = np.sqrt(max(2.0 * RIDE_BRAKE * (gap - RIDE_STOP), 0.0)) if gap < 60.0 else r.speed
         target = min(r.speed, float(allowed))
         change = np.clip(target - r.v, -2.0 * RIDE_BRAKE * PERIOD, RIDE_ACCELERATE * PERIOD)
         r.v = max(r.v + float(change), 0.0)
         r.s += r.v * PERIOD
-        while r.s > self.map.lanes.length[r.lanes[0]]:
+        while r.s > self.map.lanes.length[r.lanes[0]] and len(r.lanes) > 1:
             r.s -= float(self.map.lanes.length[r.lanes[0]])
             r.lanes.pop(0)
             r.waited = 0.0
-        while len(r.lanes) < 3:
-            r.lanes.append(_onward(self.map, r.lanes[-1], self._rng))
+        _go_on(self.map, r.lanes, self._rng)
         return ActorCommand(r.name, place=self._pose(r), speed=r.v)
 
     def _pose(self, r: _Rider) -> Pose:
@@ -170,6 +170,12 @@ class Crowd:
         near &= np.abs(across) < SIDE + 0.5 * truth.table.width
         gaps = (along - half)[near]
         return float(gaps.min()) - 0.9 + RIDE_STOP - 2.0 if len(gaps) else 1e3
+
+    def _end_ahead(self, r: _Rider) -> float:
+        """Returns the m to the dead end of the lanes ahead, in which the cyclist stays; 1000 for none."""
+        if len(r.lanes) == LANES_AHEAD:
+            return 1e3
+        return float(self.map.lanes.length[r.lanes].sum()) - r.s
 
     def _line_ahead(self, r: _Rider, truth: WorldTruth) -> float:
         """Returns the m to a line on its lane at which this rider has to stop, plus a margin; 1000 for none.
@@ -273,10 +279,9 @@ def _riders(map: RoadMap, count: int, rng: np.random.Generator) -> list[_Rider]:
         lane = int(lanes[int(rng.integers(len(lanes)))])
         s = float(map.lanes.length[lane]) * float(rng.uniform(0.2, 0.7))
         speed = float(np.clip(rng.normal(RIDE_MEAN, RIDE_SIGMA), 3.0, 6.5))
-        onward = [lane, _onward(map, lane, rng)]
-        found.append(
-            _Rider(f"cyclist_{i + 1:02d}", [*onward, _onward(map, onward[1], rng)], s, speed)
-        )
+        onward = [lane]
+        _go_on(map, onward, rng)
+        found.append(_Rider(f"cyclist_{i + 1:02d}", onward, s, speed))
     return found
 
 
@@ -291,12 +296,15 @@ def _streets(map: RoadMap) -> NDArray[np.intp]:
     )
 
 
-def _onward(map: RoadMap, lane: int, rng: np.random.Generator) -> int:
-    """Returns a lane that follows, drawn, not onto fast roads where there is a choice.
+def _go_on(map: RoadMap, lanes: list[int], rng: np.random.Generator) -> None:
+    """Appends lanes that follow, up to LANES_AHEAD in all, or up to a dead end.
 
-    ValueError at a dead end.
+    They are drawn, not onto fast roads where there is a choice.
     """
-    ways = [n for n in map.successors(lane) if map.arrays.drivable[n]]
-    limits = [float(map.samples.limit[map.lanes.first[n]]) for n in ways]
-    slow = [n for n, v in zip(ways, limits, strict=True) if not v > 14.0] or ways
-    return slow[int(rng.integers(len(slow)))]
+    while len(lanes) < LANES_AHEAD:
+        ways = [n for n in map.successors(lanes[-1]) if map.arrays.drivable[n]]
+        if not ways:
+            return
+        limits = [float(map.samples.limit[map.lanes.first[n]]) for n in ways]
+        slow = [n for n, v in zip(ways, limits, strict=True) if not v > 14.0] or ways
+        lanes.append(slow[int(rng.integers(len(slow)))])

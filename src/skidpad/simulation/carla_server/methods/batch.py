@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 from skidpad.core.errors import SkidpadError
 from skidpad.simulation.carla_server.actors.registry import Attachment
 from skidpad.simulation.carla_server.methods import actors, lights, motion, vehicles, walkers
 from skidpad.simulation.carla_server.protocol import wire
-from skidpad.simulation.carla_server.protocol.rpc import CallError, Shape, Table
+from skidpad.simulation.carla_server.protocol.rpc import Shape, Table
 from skidpad.simulation.carla_server.served import Served
 
 TABLE = Table("batch")
@@ -74,16 +75,35 @@ def _outcome(served: Served, command: Any) -> list[Any]:
         return [[0, [str(error)]]]
 
 
-def run(served: Served, variant: Any, depth: int = 0) -> int:
+def run(served: Served, variant: Any) -> int:
     """Runs one command and returns the actor id that it is about, 0 when there is none.
 
-    WireError or CallError where it cannot be done. depth: of spawn commands around it.
+    WireError or CallError where it cannot be done.
+    """
+    _check(variant)
+    return _run(served, *variant)
+
+
+def _check(variant: Any, depth: int = 0) -> None:
+    """Raises WireError unless this is a command, and so is each that follows a spawning one.
+
+    depth: of spawn commands around it, up to MAX_DEPTH.
     """
     index, body = wire.items(variant, "command", 2)
     number = wire.integer(index, "command", 0, max(COMMANDS))
     members = wire.items(body, "command body")
+    if number != SPAWN:
+        return
+    if len(members) != 6 or depth > MAX_DEPTH:
+        raise wire.WireError("a spawn command has six members and is nested at most four deep")
+    for command in wire.items(members[5], "do_after"):
+        _check(wire.items(command, "command", 1)[0], depth + 1)
+
+
+def _run(served: Served, number: int, members: list[Any]) -> int:
+    """Runs one checked command and returns the id of its actor, or 0."""
     if number == SPAWN:
-        return _spawn(served, members, depth)
+        return _spawn(served, members)
     try:
         COMMANDS[number](served, *members)
     except TypeError as error:
@@ -100,13 +120,11 @@ def _attachment(kind: Any) -> Attachment:
     return Attachment(kind) if kind in tuple(Attachment) else Attachment.RIGID
 
 
-def _spawn(served: Served, members: list[Any], depth: int) -> int:
+def _spawn(served: Served, members: list[Any]) -> int:
     """Spawns an actor, runs the commands that follow for it, and returns its id.
 
-    One of those that cannot be done (CallError) is skipped. WireError beyond MAX_DEPTH.
+    One of those that cannot be done is skipped, as CARLA's server drops what they answer.
     """
-    if len(members) != 6 or depth > MAX_DEPTH:
-        raise wire.WireError("a spawn command has six members and is nested at most four deep")
     description, transform, parent, kind, socket, after = members
     wanted, pose = actors.parse_description(description), wire.pose(transform, "transform")
     parent_id = wire.optional(parent, "parent")
@@ -115,16 +133,11 @@ def _spawn(served: Served, members: list[Any], depth: int) -> int:
     else:
         wire.text(socket, "socket")
         actor = served.episode.attach(wanted, pose, parent_id, _attachment(kind))
-    for command in wire.items(after, "do_after"):
-        (variant,) = wire.items(command, "command", 1)
-        index, body = wire.items(variant, "command", 2)
-        own = wire.items(body, "command body")
-        if index == SPAWN and len(own) == 6:
+    for ((index, own),) in after:
+        if index == SPAWN:
             own = [*own[:2], wire.some(actor.id), *own[3:]]
         elif own:
             own = [actor.id, *own[1:]]
-        try:
-            run(served, [index, own], depth + 1)
-        except CallError:
-            continue
+        with suppress(SkidpadError):
+            _run(served, index, own)
     return actor.id

@@ -90,6 +90,19 @@ def test_every_two_words_combine_as_the_rule_says(road, words):
     assert felt(road, chosen) == pytest.approx(np.full(4, by_rule(chosen)), rel=1e-9)
 
 
+def test_what_is_recorded_before_the_first_step_has_the_tyres_own_friction(road):
+    setup = Setup(
+        map=road, weather=Weather(), specs=(),
+        ego=ActorSetup(name="ego", type="hatchback", place=LanePosition(1, -2, 300.0), speed=V),
+    )  # fmt: skip
+    world = build_world(setup, 1)
+    before = world.mu[0].copy()
+    world.set_tyres(0, [CONTROL] * 4)
+    world.feel_grip()
+    assert world.mu[0] == pytest.approx(before * CONTROL / 3.5, rel=1e-9)
+    assert world.mu[0] == pytest.approx(world.fleet.mu[0], rel=1e-9)
+
+
 def test_words_that_the_rule_says_replace_do_not_multiply():
     """The rule above is checked against its own table: what replaces a factor hides the former word."""
     kinds = {word.said_by: word for word in FRICTION_RULE}

@@ -22,7 +22,7 @@ from skidpad.core.vocabulary import AntiLock, StabilityControl
 from skidpad.physics.contact import CONTACT_LAW, Contacts
 from skidpad.physics.fleet import Fleet
 from skidpad.physics.grip import GripParams, Road
-from skidpad.physics.types import VehicleType
+from skidpad.physics.types import TIRE_FRICTION_REFERENCE, VehicleType
 from skidpad.physics.wind import Gusts
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.world.ground import ROAD_NOISE, RoadSigns, read_signs
@@ -419,7 +419,8 @@ class World:
         """Writes the road's friction where all actors stand into `mu`, before the first step."""
         self._feel_road()
         feel_grip(self.rows, self.on_wheels)
-        self.mu[: self.wheeled] = self.on_wheels.road_mu
+        w = self.on_wheels
+        self.mu[: self.wheeled] = w.road_mu * (w.tire_friction / TIRE_FRICTION_REFERENCE)
 
     def settle(self) -> None:
         """Finds the road under every actor, after some were moved between steps; that is no lane invasion."""

@@ -56,7 +56,7 @@ class Summary:
     damaged: int = 0  # lines of the ledger that were set aside; their runs were driven again
 
     def warnings(self) -> Iterator[str]:
-        """What a reader of the report should know first."""
+        """Yields the sentences that a reader of the report should know first: damage, machines, failures."""
         if self.damaged:
             yield (
                 f"{self.damaged} damaged lines of {LEDGER} were set aside in {DAMAGED}, and their "
@@ -79,7 +79,7 @@ class Estimate:
     cpu_s: float  # per run
 
     def minutes(self, workers: int) -> float:
-        """Wall time on so many workers."""
+        """Returns the wall time in min on so many workers."""
         return self.cpu_s * self.runs / workers / 60.0
 
 
@@ -128,7 +128,10 @@ class Campaign(Generic[T, K, M]):
         }
 
     def batches(self) -> list[list[T]]:
-        """What is driven before a stopping rule looks: whole batches per cell, in the order of tasks."""
+        """Returns the tasks in batches, after each of which a stopping rule looks; one batch without a rule.
+
+        distinct: first runs of all cells, then the rest. until_halfwidth: BATCH runs per cell each.
+        """
         if self.distinct:
             firsts = list({cell_of(t.name): t for t in reversed(self.tasks)}.values())[::-1]
             names = {t.name for t in firsts}
@@ -155,7 +158,7 @@ class Campaign(Generic[T, K, M]):
         on_run: Callable[[Entry[K, M]], None] = lambda _: None,
         on_total: Callable[[int], None] = lambda _: None,
     ) -> Summary:
-        """Drive what the ledger does not have yet, then write the results.
+        """Drives what the ledger does not have yet, then writes the results; returns a summary.
 
         on_run: called with each run that is done, first with those in the ledger.
         on_total: called with the number of runs, when fewer are left than were planned.
@@ -196,7 +199,10 @@ class Campaign(Generic[T, K, M]):
         )
 
     def _uncertain_runs(self, batch: Sequence[T], entries: Sequence[Entry[K, M]]) -> Sequence[T]:
-        """The runs of a batch whose cells are uncertain, or distinct, after the batches before it."""
+        """Returns the runs of a batch whose cells are still uncertain, or distinct, by the entries so far.
+
+        All of it without a rule or entries.
+        """
         if self.distinct and entries:
             cells = distinct_cells(self.batches()[0], entries, self.recipe.drive_of)
             return [t for t in batch if cell_of(t.name) in cells]
@@ -236,11 +242,11 @@ class Campaign(Generic[T, K, M]):
         )
 
     def success(self, entry: Entry[K, M]) -> bool | None:
-        """Whether a run went well, None where it does not count."""
+        """Returns True when a run went well by its recipe, None where it does not count."""
         return None if entry.metrics is None else self.recipe.success(entry.metrics)
 
     def estimate(self) -> Estimate:
-        """Drive a few of the runs here."""
+        """Drives up to PROBES runs in this process, for PROBING_S s; returns the CPU time per run."""
         sample = self.tasks[:: max(len(self.tasks) // PROBES, 1)][:PROBES]
         self.recipe.warm_up()
         probes, began, spent = 0, time.process_time(), 0.0
@@ -255,7 +261,10 @@ class Campaign(Generic[T, K, M]):
 
 
 def uncertain_cells(trials: Iterable[tuple[str, bool | None]], halfwidth: float) -> set[str]:
-    """Cells whose interval of success is still wider than asked for; trials: (cell, success)."""
+    """Returns the cells whose 95 % interval of success is wider than +- halfwidth; trials: (cell, success).
+
+    A success of None is not counted.
+    """
     runs: dict[str, list[bool]] = defaultdict(list)
     for cell, success in trials:
         if success is not None:
@@ -267,7 +276,7 @@ def uncertain_cells(trials: Iterable[tuple[str, bool | None]], halfwidth: float)
 def distinct_cells(
     firsts: Iterable[Task], entries: Iterable[Entry[K, M]], drive_of: Callable[[K], object]
 ) -> set[str]:
-    """The cells with a first run that moved as no other before; what is unknown is distinct."""
+    """Returns the cells whose first run moved as no other before; one without an entry is distinct."""
     by_run = {e.run: e for e in entries}
     seen: set[object] = set()
     found = set()

@@ -56,14 +56,14 @@ class WatchedStack(AdasStack):
 
 
 class DatasetSink(Sink):
-    """Writes what a driver saw, should have seen, and did."""
+    """Writes a driver's images and keeps rows of its commands and of where the lane is."""
 
     def __init__(self, folder: Path, map: RoadMap, every: int) -> None:
         self.folder, self.map, self.every = folder, map, every
         self.rows: list[dict[str, Any]] = []
 
     def see(self, moment: Moment) -> None:
-        """Writes one frame of `every`, unless nothing can be said of the lane."""
+        """Writes the images of every `every`-th tick and keeps its row; nothing where the lane is unknown."""
         frame, command = moment.frame, moment.command
         if frame.tick % self.every:
             return
@@ -95,7 +95,7 @@ class DatasetSink(Sink):
             write_bytes(self.folder / "images" / name, coded.tobytes())
 
     def close(self) -> int:
-        """Write the table; returns its rows."""
+        """Writes frames.parquet and returns its number of rows."""
         table = pl.DataFrame(self.rows, schema={"tick": pl.Int64, **REALS})
         write_parquet(self.folder / FRAMES, table)
         return len(table)
@@ -107,7 +107,11 @@ def camera_name(id: str) -> str:
 
 
 def export_drive(spec: RunSpec, out: Path, every: int) -> tuple[Run, int]:
-    """Drive a run and write its frames; the run, and how many frames there are."""
+    """Drives a run and writes its frames to out/NAME; returns the run and the number of frames.
+
+    every: ticks from frame to frame. Raises ConfigError for a run without pixels or by another driver,
+    StackError when the run failed.
+    """
     if spec.sensors is not SensorLevel.PIXELS:
         raise ConfigError("export-dataset writes images: it needs --sensors pixels")
     if not isinstance(spec.driver, (AdasDriver, CameraDriver)):
@@ -125,7 +129,7 @@ def export_drive(spec: RunSpec, out: Path, every: int) -> tuple[Run, int]:
 
 
 def write_card(out: Path, every: int) -> Path:
-    """What the data are; returns the file."""
+    """Writes dataset.json, which describes columns and cameras, and returns its path."""
     cameras = {camera_name(c.id): _describe_mount(c.mount, c) for c in CAMERAS}
     card = {
         "frames": "frames.parquet of each drive: one row per image of every camera, by tick",
@@ -160,7 +164,7 @@ EGO = 0
 def label_of(
     map: RoadMap, table: ActorTable, states: ActorStates, place: LanePoint | None = None
 ) -> Label | None:
-    """The label of a moment; None off every lane or at its end. place: the ego's on its lane."""
+    """Returns the label of a moment; None off every lane or where it ends. place: the ego's on its lane."""
     pose = states.pose(EGO)
     place = map.project(pose.x, pose.y, pose.z) if place is None else place
     if place is None:
@@ -175,14 +179,14 @@ def label_of(
 
 
 def _in_ego(states: ActorStates, x: float, y: float) -> tuple[float, float]:
-    """A place ahead and left of the ego."""
+    """Returns how far a place in the world lies ahead and left of the ego, m."""
     dx, dy = x - states.x[EGO], y - states.y[EGO]
     c, s = cos(states.yaw[EGO]), sin(states.yaw[EGO])
     return float(c * dx + s * dy), float(c * dy - s * dx)
 
 
 def _gap(map: RoadMap, table: ActorTable, states: ActorStates, place: LanePoint) -> float | None:
-    """Returns the way in m from the ego's front along the lane to the first body that reaches into it."""
+    """Returns m from the ego's front along the lane to the first body that reaches into it; None: none."""
     way = _way(map, place, float(states.yaw[EGO]))
     half = 0.5 * float(table.width[EGO]) + SPARE
     front = 0.5 * float(table.length[EGO])
@@ -201,7 +205,7 @@ def _gap(map: RoadMap, table: ActorTable, states: ActorStates, place: LanePoint)
 
 
 def _way(map: RoadMap, place: LanePoint, yaw: float) -> Floats:
-    """(n, 4) x, y, heading and length of the lane ahead."""
+    """Returns (n, 4) x, y, heading and length of the lane ahead, to REACH m or its end."""
     rows = [(place.x, place.y, place.heading, 0.0)]
     for k in range(1, int(REACH / STEP) + 1):
         point = map.ahead(place, k * STEP, yaw)
@@ -212,7 +216,7 @@ def _way(map: RoadMap, place: LanePoint, yaw: float) -> Floats:
 
 
 def _outline(table: ActorTable, states: ActorStates, i: int) -> Floats:
-    """(8, 2) corners and middles of the sides of a body."""
+    """Returns (8, 2) corners and middles of the sides of actor i's body, world."""
     l, w = 0.5 * float(table.length[i]), 0.5 * float(table.width[i])
     c, s = cos(states.yaw[i]), sin(states.yaw[i])
     local = np.array([(a, b) for a in (-l, 0.0, l) for b in (-w, 0.0, w) if (a, b) != (0.0, 0.0)])
@@ -221,7 +225,7 @@ def _outline(table: ActorTable, states: ActorStates, i: int) -> Floats:
 
 
 def _along(way: Floats, places: Floats) -> tuple[Floats, Floats]:
-    """Length along the way and distance left of it, of each place; nothing lies beyond its end."""
+    """Returns length along the way and m left of it of each (n, 2) place; length -1 beyond its end."""
     dx, dy = places[:, :1] - way[:, 0], places[:, 1:] - way[:, 1]
     k = np.argmin(dx**2 + dy**2, axis=1)
     rows = np.arange(len(places))

@@ -118,9 +118,10 @@ class Scenario:
         return self._wheel
 
     def step(self, n: int = 1, command: VehicleCommand | None = None) -> bool:
-        """Go on by n ticks; returns whether the scenario goes on after them.
+        """Drives n ticks; returns False when the scenario is over, or its stack failed.
 
         command: what drives the ego in these ticks in place of its stack, which still sees them.
+        ConfigError for n < 1.
         """
         if n < 1:
             raise ConfigError(f"step needs at least 1 tick, got {n}")
@@ -136,7 +137,10 @@ class Scenario:
         return not self.player.ended
 
     def send(self, command: ActorCommand) -> None:
-        """Say what another actor does in the next step, in place of what the file says of it."""
+        """Sets what another actor does in the next step, in place of what the file says of it.
+
+        Raises ConfigError for an actor that the file does not have.
+        """
         if command.actor not in self.player.scenario.entities:
             known = ", ".join(self.player.scenario.entities)
             raise ConfigError(f"there is no actor {command.actor!r}; the file has {known}")
@@ -175,12 +179,12 @@ class Scenario:
 
     @property
     def t(self) -> float:
-        """Simulated time of the last tick, s."""
+        """Returns the simulated time of the last tick, s."""
         return self.player.scene.t
 
     @property
     def states(self) -> dict[str, ActorState]:
-        """Every actor that is there, by name."""
+        """Returns the state of every actor that is there, by name; empty before the first step."""
         if self._truth is None:
             return {}
         s = self._truth.states
@@ -192,12 +196,12 @@ class Scenario:
 
     @property
     def elements(self) -> dict[str, str]:
-        """The state of every element of the storyboard that has begun, by its path."""
+        """Returns the state of every element of the storyboard that has begun, by its path with "::"."""
         return {"::".join(path): State(s).value for path, s in self.player.scene.states.items()}
 
     @property
     def conditions(self) -> dict[tuple[str, str], bool]:
-        """Whether each condition that ever held holds now, by path of its element and its name."""
+        """Returns whether each condition that ever held holds now, by path of its element and its name."""
         story = self.player.scene.story
         for happening in story[self._told :]:
             what = happening.what.removeprefix("condition ")
@@ -211,7 +215,10 @@ class Scenario:
         return dict(self._conditions)
 
     def finish(self) -> Run:
-        """Return log and outcome, whether the scenario has ended or not."""
+        """Closes the simulator and returns log and outcome, whether the scenario has ended or not.
+
+        Raises ConfigError before the first step.
+        """
         if self._truth is None:
             raise ConfigError("a scenario needs at least one step before it is finished")
         self._open.close()
@@ -219,7 +226,7 @@ class Scenario:
 
 
 class _Wheel:
-    """The driver, whose command another one may replace."""
+    """Drives by the stack, whose command `command` replaces unless it is None."""
 
     def __init__(self, inner: StackAtWheel) -> None:
         self.inner = inner
@@ -232,7 +239,7 @@ class _Wheel:
 
     @property
     def mode(self) -> str:
-        """The stack's mode in its own words."""
+        """Returns the stack's mode in its own words."""
         return self.inner.mode
 
     def begin(self, table: ActorTable) -> None:
@@ -240,13 +247,13 @@ class _Wheel:
         self.inner.begin(table)
 
     def act(self, frame: SensorFrame) -> VehicleCommand:
-        """The stack's command, or the one in its place."""
+        """Returns the stack's command, or the one in its place; the stack sees the frame anyway."""
         own = self.inner.act(frame)
         return own if self.command is None else self.command
 
 
 class _SentCommands:
-    """The script, whose words of the last tick may be replaced until the world steps."""
+    """Passes the script's commands on, which `replace` may change until the world steps."""
 
     def __init__(self, inner: Script) -> None:
         self.inner = inner
@@ -258,10 +265,10 @@ class _SentCommands:
         return self.inner.ended
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
-        """The script's words, as a list that `replace` changes."""
+        """Returns the script's commands as a list that `replace` changes."""
         self.words = list(self.inner.step(truth))
         return self.words
 
     def replace(self, command: ActorCommand) -> None:
-        """Say something else to one actor."""
+        """Replaces the commands of one actor in the last tick by this one."""
         self.words[:] = [c for c in self.words if c.actor != command.actor] + [command]

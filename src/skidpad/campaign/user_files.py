@@ -20,7 +20,10 @@ from skidpad.roads.bundled import KEPT, bundled_maps, kept_name, load_map, map_f
 
 
 def road_file(course: Roads) -> str:
-    """The map of a course as it is driven: with rails where they are asked for and none stand."""
+    """Returns the map of a course as it is driven; with rails where asked for and none stand.
+
+    Such a map is made once, in the user's cache. ConfigError for a baked map.
+    """
     if course.edges is Edges.NONE or load_map(course.map).roadside.barriers:
         return course.map
     from skidpad.roads.opendrive.rails import VERSION, add_rails  # lxml is needed for this only
@@ -36,7 +39,10 @@ def road_file(course: Roads) -> str:
 
 
 def keep_maps(tasks: Sequence[RunSpec]) -> tuple[list[RunSpec], dict[str, Path]]:
-    """The runs with their maps named as the folder keeps them, and the files by these names."""
+    """Returns the runs with maps named as the folder keeps them, and the files by these names.
+
+    Bundled maps keep their names and are not kept.
+    """
     names: dict[str, str] = {}
     files: dict[str, Path] = {}
     out = []
@@ -56,7 +62,7 @@ def keep_maps(tasks: Sequence[RunSpec]) -> tuple[list[RunSpec], dict[str, Path]]
 
 
 def keep_files(folder: Path, files: Mapping[str, Path]) -> None:
-    """Copy what is not there yet."""
+    """Copies to `folder` the files (by name there) that are not there yet."""
     for name, file in files.items():
         target = folder / name
         if not target.is_file():
@@ -64,20 +70,23 @@ def keep_files(folder: Path, files: Mapping[str, Path]) -> None:
 
 
 def keep_road(folder: Path, road: str) -> None:
-    """Keep the road of a scenario that was played."""
+    """Copies the road file of a scenario that was played to `folder`, unless it is bundled."""
     if road not in bundled_maps():
         keep_files(folder, {kept_name(Path(road)): Path(road)})
 
 
 def with_kept_map(run: RunSpec, folder: Path) -> RunSpec:
-    """The run with the map that the campaign in `folder` keeps of it."""
+    """Returns the run with the map that the campaign in `folder` keeps of it, else unchanged."""
     if not isinstance(run.course, (Roads, Route)) or not is_file(folder / run.course.map):
         return run
     return _on(run, str(folder / run.course.map))
 
 
 def found_again(run: RunSpec, folder: Path | None) -> RunSpec:
-    """The run with the file that `folder` keeps, when its own is gone since."""
+    """Returns the run with the map that `folder` keeps, when its own is gone since; else unchanged.
+
+    Unchanged also where several maps of that name are kept.
+    """
     course = run.course
     if folder is None or not isinstance(course, (Roads, Route)):
         return run

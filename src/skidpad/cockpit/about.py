@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 
 class About(NamedTuple):
-    """What a page is of."""
+    """Describes what a page shows: a drive or a replay, with its timeline and choices."""
 
     kind: str  # drive or replay
     timeline: dict[str, Any] | None = None  # of a replay

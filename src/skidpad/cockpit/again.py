@@ -73,9 +73,10 @@ def list_changes(source: Source) -> dict[str, str]:
 
 
 def drive_again(source: Source, word: str) -> RecordedRun:
-    """The run with one thing changed, as long as the stored one; driven unless it was before.
+    """Returns the run with one thing changed, as long as the stored one; driven unless it was before.
 
-    ConfigError for a run in which a person took part, or a change that changes nothing.
+    It is written to the folder `again` within the run's. ConfigError for a run in which a person took
+    part, or a change that changes nothing.
     """
     if not isinstance(source, RecordedRun):
         raise ConfigError("a recording of channels cannot be driven again")

@@ -44,7 +44,10 @@ HIDEABLE = (View.DEPTH, View.SEMANTIC, View.TOP)
 
 
 class Bridge:
-    """One producer, several tabs; the state that words are relative to is the last picture's."""
+    """Passes words of several tabs to one producer, and its newest picture to all of them.
+
+    Words that say no value are relative to the last picture's state.
+    """
 
     def __init__(
         self, producer: Producer, pauses: bool = False, clock: Callable[[], float] = monotonic
@@ -62,7 +65,7 @@ class Bridge:
     # --- pictures
 
     def newest(self, after: int) -> tuple[int, bytes] | None:
-        """The newest picture as a message, if it is not number `after`."""
+        """Returns number and message of the newest picture; None without one or if it is number `after`."""
         if self.producer.feed.last == after:
             return None
         packet = self.producer.feed.take()
@@ -75,7 +78,10 @@ class Bridge:
     # --- tabs
 
     def leave(self, tab: str) -> None:
-        """A tab is gone, or sleeps; the pedals of one that drove are released."""
+        """Removes a tab that was closed or sleeps; if it drove, its pedals are released.
+
+        With `pauses`, the producer pauses when it was the last one.
+        """
         if self.tabs.driver == tab:
             self._release()
         self.tabs.go(tab)
@@ -83,17 +89,17 @@ class Bridge:
             self.producer.say(Pause(True))
 
     def check(self) -> None:
-        """Releases pedals that no tab has touched lately, and tabs that sleep."""
+        """Releases pedals that no tab has touched lately and removes tabs that sleep; to be called often."""
         self.dead_man.check()
         for tab in self.tabs.asleep():
             self.leave(tab)
 
     def may(self, tab: str) -> bool:
-        """Whether this tab's words count."""
+        """Returns True when this tab drives, so that its words count."""
         return self.tabs.driver == tab
 
     def say(self, tab: str, word: str, value: Any = None) -> str | None:
-        """A word of a tab; what was wrong with it, or None."""
+        """Acts on a word of a tab; returns what was wrong with it as a sentence, or None."""
         if not self.may(tab):
             return "another tab drives: this one watches"
         try:
@@ -163,7 +169,7 @@ class Bridge:
         self._move(pedals)
 
     def _move(self, pedals: Pedals) -> None:
-        """Say how the pedals stand, if they stand otherwise than before."""
+        """Sends the pedals to the producer if they stand otherwise than before."""
         if pedals != self.pedals:
             self.pedals = pedals
             self._do(pedals)
@@ -196,7 +202,7 @@ class Bridge:
         return Functions(tuple(sorted(on ^ {Function(value)}, key=lambda f: f.value)))
 
     def _weather(self, value: Any) -> Sky:
-        """A preset by name; None: the next one (A-217)."""
+        """Returns the input for a preset by name; None: the next one (A-217)."""
         names = list(all_presets())
         if value is None:
             now = str(self._seat("weather", names[0])).removesuffix(CUSTOM)
@@ -205,7 +211,7 @@ class Bridge:
         return self._acting(preset(value))
 
     def _change(self, value: Mapping[str, float]) -> Sky:
-        """Single fields of the present weather; what comes out may be a preset, and is called so."""
+        """Returns the input for the present weather with these fields changed, as a preset if it is one."""
         now = self._present()
         name = now.name if now.name.endswith(CUSTOM) else now.name + CUSTOM
         fields = {k: float(v) for k, v in value.items() if k in now.values()}
@@ -216,7 +222,7 @@ class Bridge:
         return self._sky().weather
 
     def _sky(self) -> Sky:
-        """Weather and how it acts, as they were set last."""
+        """Returns weather and how it acts, as set last here, else as the last picture told."""
         if self.acting is None:
             name = str(self._seat("weather", "clear-noon"))
             self.acting = Sky(
@@ -232,7 +238,10 @@ class Bridge:
         grip: GripModel | None = None,
         range: RangeModel | None = None,
     ) -> Sky:
-        """The input for what is set now; ConfigError for what cannot be, and nothing is set then."""
+        """Returns the input for the given and else present weather and models, which it remembers.
+
+        Raises ConfigError for what cannot be combined, and nothing is set then.
+        """
         now = self._sky()
         wanted = Sky(weather or now.weather, grip or now.grip, range or now.range)
         grip_params(wanted.weather, wanted.grip)  # snow, or rain on ice, in the statistical model
@@ -248,14 +257,14 @@ class Bridge:
 
 
 def next_hour(weather: Weather) -> float:
-    """Altitude of the sun (deg) at the next time of day: sunrise, noon, night."""
+    """Returns the sun's altitude in deg at the next time of day: sunrise, noon, night, sunrise."""
     if weather.is_night:
         return SUNRISE
     return NOON if weather.sun_altitude_deg < MORNING else NIGHT
 
 
 def find_preset(weather: Weather) -> Weather:
-    """The preset that this weather is, or itself."""
+    """Returns the preset with the same values as this weather, else the weather itself."""
     known = all_presets().values()
     return next((one for one in known if one.values() == weather.values()), weather)
 
@@ -264,28 +273,28 @@ def find_preset(weather: Weather) -> Weather:
 
 
 class Tabs:
-    """The open tabs in order of coming. One that sleeps goes, and comes anew when it wakes."""
+    """Keeps the open tabs in order of coming; one that sleeps is removed, and is new when it wakes."""
 
     def __init__(self, clock: Callable[[], float] = monotonic) -> None:
         self.clock = clock
         self._open: dict[str, float] = {}  # when each of them was last heard of
 
     def note_tab(self, tab: str) -> None:
-        """A tab is opened, or gives a sign that it is awake."""
+        """Notes that a tab was opened, or is awake."""
         self._open[tab] = self.clock()
 
     def go(self, tab: str) -> None:
-        """A tab is closed, or sleeps; the next one in order drives."""
+        """Removes a tab that was closed or sleeps; the next one in order drives."""
         self._open.pop(tab, None)
 
     def asleep(self) -> list[str]:
-        """Returns tabs that are open, but do not answer: a browser may stop a hidden page."""
+        """Returns the open tabs that were not heard of for ASLEEP_AFTER s."""
         now = self.clock()
         return [tab for tab, heard in self._open.items() if now - heard > ASLEEP_AFTER]
 
     @property
     def driver(self) -> str | None:
-        """The tab whose words count."""
+        """Returns the tab whose words count, the first one; None without tabs."""
         return next(iter(self._open), None)
 
     def __len__(self) -> int:
@@ -293,18 +302,18 @@ class Tabs:
 
 
 class DeadMan:
-    """Releases the pedals when nothing is heard of them any more (A-274)."""
+    """Calls `release` when a pressed pedal was not heard of for RELEASE_AFTER s (A-274)."""
 
     def __init__(self, release: Callable[[], None], clock: Callable[[], float] = monotonic) -> None:
         self.release, self.clock = release, clock
         self._heard: float | None = None  # None: they are released
 
     def note_pedals(self, pressed: bool) -> None:
-        """The tab told how its pedals stand."""
+        """Notes that the driving tab told whether a pedal is pressed; if none is, the clock stops."""
         self._heard = self.clock() if pressed else None
 
     def check(self) -> None:
-        """Release them if it is time."""
+        """Calls `release` once if the time is over."""
         if self._heard is not None and self.clock() - self._heard > RELEASE_AFTER:
             self._heard = None
             self.release()

@@ -81,7 +81,7 @@ class World(NamedTuple):
 
 
 class ChannelSource:
-    """A file of channels, moment by moment in any order."""
+    """Gives the moments of a recording of channels in any order."""
 
     def __init__(self, path: Path) -> None:
         """FileError for a file without a moment, or whose map is not known here."""
@@ -129,12 +129,12 @@ class ChannelSource:
 
     @property
     def table(self) -> ActorTable:
-        """The actors of the recording."""
+        """Returns all actors that ever appear in the recording, the ego first."""
         return self._table
 
     @property
     def ticks(self) -> int:
-        """How many moments there are."""
+        """Returns how many moments there are."""
         return len(self.worlds)
 
     def tick(self, k: int) -> int:
@@ -147,7 +147,7 @@ class ChannelSource:
         return self._seat
 
     def crash(self, k: int) -> Pose | None:
-        """Contacts are not recorded by moments."""
+        """Returns None, as contacts are not recorded by moments."""
         del k
         return None
 
@@ -162,7 +162,7 @@ class ChannelSource:
         return []
 
     def curves(self) -> Curves:
-        """What is drawn along the time; channels have no tiers."""
+        """Returns speed, time to collision and what the monitor found along the time; tiers are None."""
         part = every(self.ticks)
         v = np.hypot(self._state[part, 0, 3], self._state[part, 0, 4])
         none = np.zeros(self.ticks)
@@ -175,7 +175,7 @@ class ChannelSource:
         return Curves(np.round(v * 3.6, 1).tolist(), [None] * len(v), ttc, *self._judged[::-1])
 
     def moment(self, k: int) -> Moment:
-        """Moment k, 0 <= k < ticks."""
+        """Returns moment k, 0 <= k < ticks; its arrays are valid until the next call."""
         world, tick = self.worlds[k], self.tick(k)
         states = self._states(k)
         n = len(self._table)
@@ -217,7 +217,7 @@ class ChannelSource:
     def _objects_as_radar_points(
         self, tick: int, decision: Decision | None, states: ActorStates
     ) -> RadarPoints:
-        """What the driving channel says of others, as points in the radar's frame."""
+        """Returns what the driving channel (else the first) reports of others as points of the radar."""
         name = decision.driving if decision and decision.driving else self._channels[0]
         frame = self._frames.get((name, tick))
         if frame is None or not len(frame.objects):
@@ -233,7 +233,7 @@ class ChannelSource:
         return RadarPoints(*(p.astype(np.float32) for p in points))
 
     def _switches(self) -> list[tuple[int, str, str]]:
-        """Moments at which another channel begins to drive."""
+        """Returns a mark (tick, kind, text) where another channel begins to drive."""
         marks, driving = [], None
         for tick, decision in sorted(self._decisions.items()):
             if decision.driving != driving and driving is not None:
@@ -243,7 +243,7 @@ class ChannelSource:
 
 
 class _Items:
-    """All that a recording says, by kind."""
+    """Reads all messages of a recording, by kind."""
 
     def __init__(self, recording: McapRecording) -> None:
         self.names = recording.channels
@@ -263,7 +263,7 @@ class _Items:
                 self.context.update(item.entries)
 
     def worlds(self) -> list[World]:
-        """The true ones, or those of the first channel."""
+        """Returns the true worlds in order of time, or those of the first channel where none was recorded."""
         if self.truths:
             return [_of_truth(one) for one in sorted(self.truths, key=lambda one: one.t)]
         mine = sorted((tick, f) for (name, tick), f in self.frames.items() if name == self.names[0])
@@ -284,7 +284,7 @@ def _of_truth(one: TruthFrame) -> World:
 
 
 def _of_channel(one: ChannelFrame) -> World:
-    """Rows by the channel's own identity, or by class and place in the list."""
+    """Returns a channel's world, with rows by its own ids, or by class and place in the list."""
     keys: list[Key] = []
     for n, (id, label) in enumerate(zip(one.ids.tolist(), one.classes.tolist(), strict=True)):
         keys.append(("object", id) if id >= 0 else (f"class {label}", n))
@@ -299,7 +299,7 @@ def _of_channel(one: ChannelFrame) -> World:
 
 
 def _size(polygon: Floats) -> Floats:
-    """Length and width of an outline in its own frame."""
+    """Returns length and width in m of an outline in its own frame, at least 0.2; SPARE where unknown."""
     if not np.isfinite(polygon).any():
         return np.array(SPARE)
     found: Floats = np.maximum(np.nanmax(polygon, axis=0) - np.nanmin(polygon, axis=0), 0.2)
@@ -317,7 +317,7 @@ def _height(label: int) -> float:
 
 
 def _paint(row: int) -> tuple[int, int, int]:
-    """White for the ego, and muted colours in turn."""
+    """Returns the RGB colour of a row: white for the ego, muted ones in turn for others."""
     colours = ((60, 90, 140), (150, 50, 45), (70, 75, 80), (190, 190, 185), (40, 95, 70))
     return (235, 235, 235) if row == 0 else colours[row % len(colours)]
 
@@ -330,7 +330,10 @@ def _mode(decision: Decision | None) -> str:
 
 
 def _where(path: Path, context: dict[str, str]) -> tuple[RoadMap, Weather, int]:
-    """Map, weather and seed: of the file beside the recording, else of its own words."""
+    """Returns map, weather and seed: of the file beside the recording, else of its own words, seed 0.
+
+    Raises FileError for a map that is not here.
+    """
     if path.with_suffix(".json").is_file():
         spec = with_kept_map(read_segment(path), path.resolve().parents[1])
         assert isinstance(spec.course, Route)
@@ -343,7 +346,10 @@ def _where(path: Path, context: dict[str, str]) -> tuple[RoadMap, Weather, int]:
 
 
 def weather_of(context: dict[str, str]) -> Weather:
-    """The weather of a recording's own words."""
+    """Returns the weather of a recording's words: rain, as much wetness and cloud, and the sun.
+
+    Unsaid, there is no rain and the sun stands 75 deg high.
+    """
     rain = float(context.get("precipitation", 0.0))
     sun = float(context.get("sun_altitude_deg", 75.0))
     return Weather(
@@ -362,12 +368,15 @@ class MonitoredRun(NamedTuple):
 
     @property
     def marks(self) -> list[tuple[int, str, str]]:
-        """Where each hazard begins: tick, kind and text."""
+        """Returns a mark (tick, kind, text) where each hazard begins."""
         return [(first, "hazard", f"hazard: {text}") for first, _, text in self.hazards]
 
 
 def read_judgements(recording: Path, ticks: Sequence[int]) -> MonitoredRun:
-    """What the folder NAME.monitor beside a recording with moments at `ticks` says."""
+    """Returns what the folder NAME.monitor beside a recording says; empty where there is none.
+
+    ticks: of the recording's moments.
+    """
     folder = recording.with_suffix(MONITORED)
     hazards, violated = [], np.zeros(len(ticks), dtype=np.int64)
     if (folder / INDEX_FILE).is_file():

@@ -18,7 +18,7 @@ from skidpad.simulation.world.world import BRAKING
 
 
 class Companion:
-    """Draws the moment of a run that is as old as the one it is asked for."""
+    """Draws another run at the same time since its begin as the moment it is called with."""
 
     def __init__(self, source: Source, first: int, looks: Looks = FOR_PEOPLE) -> None:
         """first: the tick with which the other run begins; looks: of the world in its pictures."""
@@ -29,7 +29,7 @@ class Companion:
     def __call__(
         self, moment: Moment, view: View, extras: frozenset[Extra] = ALL_EXTRAS
     ) -> tuple[NDArray[Any], Mapping[str, Any]]:
-        """The plane of a view, and what is said of it."""
+        """Returns the image of a view of the other run, and what is said beside it."""
         source = self.source
         k = index_at(source, moment.truth.tick - self.first + source.tick(0))
         mine = source.moment(k)

@@ -27,7 +27,10 @@ from skidpad.simulation.pacing import Pacer
 def about(
     spec: RunSpec, folder: Path, rate: float = 1.0, paused: bool = False, own_gc: bool = True
 ) -> dict[str, Any]:
-    """What `drive_job` is given; ConfigError for a rate out of range. own_gc: see `RealTime`."""
+    """Returns the plain data that `drive_job` is given; ConfigError for a rate out of range.
+
+    own_gc: see `RealTime`.
+    """
     return {
         "spec": spec.to_plain(),
         "folder": str(folder),
@@ -38,7 +41,7 @@ def about(
 
 
 def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
-    """Drive a run and write its folder; the sentence of its end."""
+    """Drives a run with pictures for the page and writes its folder; returns a sentence on its end."""
     spec, folder = run_from_plain(about["spec"], "the drive"), Path(about["folder"])
     feed, link = Feed(feed_name), Link(pipe)
     link.rate, link.paused = about["rate"], about["paused"]
@@ -74,14 +77,14 @@ def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
 
 
 def crowd(spec: RunSpec, desk: Desk) -> int | None:
-    """Background vehicles that are wanted; None: this course has none that could leave."""
+    """Returns how many background vehicles are wanted; None: this course has none that could leave."""
     if not isinstance(spec.course, Roads):
         return None
     return spec.course.vehicles if desk.density.wanted is None else desk.density.wanted
 
 
 def functions_on(spec: RunSpec, desk: Desk) -> list[str] | None:
-    """The functions of our stack that are on; None: another stack drives, which has no switches."""
+    """Returns the names of our stack's functions that are on; None for another stack, without switches."""
     if not isinstance(spec.driver, AdasDriver):
         return None
     on = {f.value for f in (spec.driver.functions if desk.functions is None else desk.functions)}
@@ -123,11 +126,11 @@ class CockpitPacer(Sink):
         self._last = self._window = self.clock()
 
     def end(self) -> None:
-        """Garbage is collected as ever."""
+        """Gives garbage collection back to Python."""
         self.pacer.end()
 
     def see(self, moment: Moment) -> None:
-        """A tick is done: wait for its time (A-262)."""
+        """Takes in the page's words, stands while paused, then waits for the tick's time (A-262)."""
         self._count()
         self.link.drain()
         if self.link.paused and not self.link.ended:

@@ -46,7 +46,7 @@ class Packet(NamedTuple):
 
 
 class Feed:
-    """One end of it; the end that creates it also removes it."""
+    """Passes pictures between two processes through shared memory; the end that creates it removes it."""
 
     def __init__(self, name: str | None = None) -> None:
         """name: of a feed that another process created; None: a new one."""
@@ -64,16 +64,16 @@ class Feed:
 
     @property
     def last(self) -> int:
-        """Number of the picture that was finished last; 0: none yet."""
+        """Returns the number of the picture that was written last; 0: none yet."""
         return int(self._state[LAST])
 
     @property
     def last_read(self) -> int:
-        """Number of the picture that was read last."""
+        """Returns the number of the picture that was read last; 0: none yet."""
         return int(self._state[TAKEN])
 
     def write_picture(self, told: bytes, views: dict[str, Array]) -> int:
-        """Write the next picture; returns its number."""
+        """Writes the next picture and returns its number; ValueError when it is larger than a slot."""
         number = self.last + 1
         planes = tuple(Plane(n, a.dtype.name, a.shape) for n, a in views.items())
         head = msgspec.json.encode(Head(number, msgspec.Raw(told), planes))
@@ -90,7 +90,7 @@ class Feed:
         return number
 
     def take(self) -> Packet | None:
-        """A copy of the newest picture; None: there is none yet."""
+        """Returns a copy of the newest picture and marks it as read; None: there is none yet."""
         while (number := self.last) > 0:
             data = self._slot(number)
             copy = data.copy()
@@ -101,7 +101,7 @@ class Feed:
         return None
 
     def close(self) -> None:
-        """Let go of it; safe to call twice."""
+        """Releases the memory and, as its creator, removes it; safe to call twice."""
         if self._state.size:
             self._state = np.empty(0, dtype=np.int64)
             self._memory.close()
@@ -118,7 +118,7 @@ class Feed:
 
 
 def _align_size(size: int) -> int:
-    """Bytes that an array takes, so that the next one begins where any type may."""
+    """Returns `size` rounded up to whole HEAD bytes, so that the next array is aligned for any type."""
     return -(-size // HEAD) * HEAD
 
 

@@ -33,7 +33,7 @@ SUFFIXES = (".mp4", ".webp")
 
 
 def stretch_of(source: Source, begin_s: float, end_s: float) -> range:
-    """The moments between two times; ConfigError for a stretch that is not in the run."""
+    """Returns the moments between two times in s; ConfigError for a stretch that is not in the run."""
     first, last = (source.tick(k) * DT for k in (0, source.ticks - 1))
     if not first <= begin_s < end_s:
         raise ConfigError(f"--from {begin_s:g} must be >= {first:g} and below --to {end_s:g}")
@@ -51,9 +51,10 @@ def write_film(
     other: Source | None = None,
     looks: Looks = FOR_PEOPLE,
 ) -> Path:
-    """Write the film, .mp4 or .webp, in its own time.
+    """Writes a film, .mp4 or .webp, of these moments in their own time, and returns its path.
 
-    other: a run to be shown beside it; looks: of the world in both.
+    other: a run to be shown beside it; looks: of the world in both. ConfigError for another ending,
+    OutputError when it cannot be written.
     """
     if path.suffix not in SUFFIXES:
         raise ConfigError(f"a film's file ends in {' or '.join(SUFFIXES)}, got {path}")
@@ -76,7 +77,7 @@ def frames(
     other: Source | None = None,
     looks: Looks = FOR_PEOPLE,
 ) -> Iterator[Picture]:
-    """Pictures of these moments: the view, mirrors in it, what is said, and another run beside it."""
+    """Yields a picture per moment: the view, mirrors in it, what is said, and another run beside it."""
     first = source.seat(moments[0]).outside
     studio = Studio(source.map, source.table, first, source.seed, looks=looks)
     companion = None if other is None else Companion(other, source.tick(0), looks)
@@ -107,7 +108,7 @@ def frames(
 
 
 def _other(companion: Companion, moment: Moment, view: View) -> Picture:
-    """The run beside it, with a line of its own."""
+    """Returns the picture of the other run at the same time, with a line of its own."""
     shown, said = companion(moment, view)
     picture = colours(shown)
     height = picture.shape[0]
@@ -170,7 +171,7 @@ def _mp4(pictures: Iterator[Picture], path: Path, dt: float) -> None:
 
 
 def _webp(pictures: Iterator[Picture], path: Path, dt: float) -> None:
-    """An animation that a page shows by itself: smaller, every second moment."""
+    """Writes an animated WebP that a page shows by itself: 0.6 of the size, every second moment."""
     shown = [
         Image.fromarray(
             np.ascontiguousarray(

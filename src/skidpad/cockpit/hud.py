@@ -26,7 +26,7 @@ TIERS = tuple("No action" if tier is Tier.NONE else _title(tier) for tier in Tie
 
 
 def round_value(value: float | None, digits: int = 2) -> float | None:
-    """A number for the page; None stays None, and NaN is None."""
+    """Returns a number rounded for the page; None for None and nan."""
     if value is None or value != value:
         return None
     return round(float(value), digits)
@@ -45,7 +45,7 @@ def stopping_distance(v: float, mu: NDArray[np.float32]) -> float | None:
 
 
 def motion(moment: Moment) -> dict[str, Any]:
-    """How the ego moves and what moves it."""
+    """Returns how the ego moves and what commands move it, by the names that the page uses."""
     ego, truth = moment.frame.ego, moment.truth
     throttle, brake, steer, handbrake, reverse = truth.commands[0].tolist()
     return {
@@ -83,7 +83,7 @@ def opinion(moment: Moment) -> dict[str, Any]:
 
 
 def radar(moment: Moment) -> list[list[float]]:
-    """Radar returns as x forward, y left (m) and range rate (m/s)."""
+    """Returns radar points as [x forward, y left (m), range rate (m/s)]."""
     p = moment.frame.radar
     x, y = p.range * np.cos(p.azimuth), p.range * np.sin(p.azimuth)
     points: list[list[float]] = np.stack([x, y, p.velocity], axis=1).round(1).tolist()
@@ -91,7 +91,7 @@ def radar(moment: Moment) -> list[list[float]]:
 
 
 def seat(desk: Desk) -> dict[str, Any]:
-    """What the person has set."""
+    """Returns what the person at the desk has set, by the names that the page uses."""
     beam = desk.outside.beam
     return {
         "manual": desk.manual,
@@ -108,7 +108,7 @@ def seat(desk: Desk) -> dict[str, Any]:
 
 
 def list_events(moment: Moment) -> list[str]:
-    """Events of this tick in words."""
+    """Returns the events of this tick in words: contacts, roll-overs, markings, relocation, recovery."""
     truth, frame = moment.truth, moment.frame
     told = [f"contact with {c.static or truth.table.names[c.actor]}" for c in truth.contacts]
     told += [f"{truth.table.names[row]} rolled over" for row in truth.rolled]

@@ -30,14 +30,14 @@ def ttc_ahead(bodies: Sequence[Body], present: NDArray[np.bool_]) -> Floats:
 
 
 def every(n: int) -> slice:
-    """About `CURVE` of n moments."""
+    """Returns a slice that takes about CURVE of n moments."""
     return slice(None, None, max(1, n // CURVE))
 
 
 def least_of(values: Floats) -> list[float | None]:
-    """The least value from each shown moment to the next, so that no short one is missed.
+    """Returns the least value from each shown moment to the next, so that no short one is missed.
 
-    None: not below `NEAR`.
+    None where it is not below NEAR.
     """
     if not len(values):
         return []

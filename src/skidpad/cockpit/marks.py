@@ -59,7 +59,7 @@ RADAR_MOUNT = next(
 
 
 def project(camera: CameraSpec, points: Floats, body: Pose = BODY) -> Floats:
-    """(n, 3) column, row and depth of points (n, 3) in the ego's frame; depth <= 0: behind.
+    """Returns (n, 3) column, row (px) and depth (m) of points (n, 3) in a camera; depth <= 0: behind.
 
     body: the pose of the ego in the frame of the points.
     """
@@ -72,7 +72,7 @@ def project(camera: CameraSpec, points: Floats, body: Pose = BODY) -> Floats:
 
 
 def patch_marks(camera: CameraSpec, outlines: Sequence[PatchOutline], ego: Pose) -> list[PatchMark]:
-    """Return the polygons of what lies on the road, as a camera of the ego sees them."""
+    """Returns kind and polygon in px of what lies on the road within PATCH_REACH m, as a camera sees it."""
     view = camera_view(camera, ego)
     found = []
     for outline in outlines:
@@ -87,7 +87,7 @@ def patch_marks(camera: CameraSpec, outlines: Sequence[PatchOutline], ego: Pose)
 
 
 def _before_camera(p: Floats) -> Floats:
-    """Return the part of a polygon (n, 3) in a camera's axes that lies before it."""
+    """Returns the part of a polygon (n, 3) in a camera's axes that lies NEAR m or more before it."""
     kept = []
     for a, b in zip(p, np.roll(p, -1, axis=0), strict=True):
         if a[2] >= NEAR:
@@ -105,7 +105,7 @@ def _px(value: float) -> int:
 def marks_of(
     camera: CameraSpec, radar: RadarPoints, report: StackReport, light: LightMark | None = None
 ) -> Marks:
-    """What the ego's sensors said, as seen by a camera."""
+    """Returns radar points in the picture and a bracket at the reported distance, as a camera sees them."""
     shown = project(camera, _radar_points(radar))
     points = [
         (int(u), int(v), bool(rate < CLOSING))
@@ -125,7 +125,7 @@ def marks_of(
 
 
 def _radar_points(radar: RadarPoints) -> Floats:
-    """(n, 3) in the ego's frame."""
+    """Returns the radar's points as (n, 3) in the ego's frame, m."""
     flat = radar.range * np.cos(radar.altitude)
     along = np.stack(
         [
@@ -144,7 +144,7 @@ def _radar_points(radar: RadarPoints) -> Floats:
 
 
 class LightAhead:
-    """Finds the heads of the light that a stack reports: it says where the stop line is."""
+    """Finds the heads of the traffic light that a stack reports, by the distance of its stop line."""
 
     def __init__(self, map: RoadMap) -> None:
         self.map, self.scan = map, LightScan(map)
@@ -153,7 +153,7 @@ class LightAhead:
             self.heads.setdefault(head.signal, []).append(head)
 
     def mark(self, camera: CameraSpec, moment: Moment) -> LightMark | None:
-        """The light as a camera sees it; None: none is reported, or it is not in the picture."""
+        """Returns the light as a camera sees it; None: none is reported, or it is not in the picture."""
         report, pose = moment.report, moment.truth.states.pose(0)
         if report.light_distance is None:
             return None
@@ -169,7 +169,10 @@ class LightAhead:
         return LightMark(frames, state, f"{state} {report.light_distance:.0f} m{seen}")
 
     def _reported_heads(self, moment: Moment, distance: float) -> list[SignalHead]:
-        """Returns the heads that the stack meets along the lane, from where it believes to be."""
+        """Returns the heads of the next light on the lane; none where its stop line lies elsewhere.
+
+        distance: m to the line as the stack reports it, LIGHT_AGREES m may be between.
+        """
         ego = moment.frame.ego
         here = self.map.project(ego.pose.x, ego.pose.y, ego.pose.z)
         view = LaneView(here, None, 0.0, 0.0)

@@ -22,7 +22,10 @@ REPLAYS, SCENARIOS = "replays", "scenarios"  # folders within that of the hazard
 
 
 def open_source(path: Path, hazard: str | None = None) -> Source:
-    """What lies at a path. hazard: the id of one, in a folder of hazards."""
+    """Returns what lies at a path: recording of channels, run, or hazard, which may be driven first.
+
+    hazard: its id, in a folder of hazards; ConfigError for an unknown one.
+    """
     if (path / TEXT_FILE).is_file():
         return RecordedRun(play_hazard(path, hazard))
     if hazard is not None:
@@ -31,7 +34,10 @@ def open_source(path: Path, hazard: str | None = None) -> Source:
 
 
 def play_hazard(folder: Path, id: str | None) -> Path:
-    """The folder of a run in which a hazard's scenario is played; driven if it is not there yet."""
+    """Returns the folder of a run that plays a hazard's scenario; it is driven if it is not there yet.
+
+    id: None where the folder holds one hazard. ConfigError for an unknown one.
+    """
     records = {record.id: record for record in read_hazards(folder)}
     if id is None and len(records) == 1:
         id = next(iter(records))
@@ -47,7 +53,10 @@ def play_hazard(folder: Path, id: str | None) -> Path:
 
 
 def run_of(record: HazardRecord, folder: Path) -> RunSpec:
-    """The run that moves everybody as one channel saw them: the driving one, else the first."""
+    """Writes a hazard's scenario and returns a run that moves all actors as one channel saw them.
+
+    That is the driving channel, else the first.
+    """
     scenario, _ = export_hazard(record, folder, OscVersion.V1_0)
     course = Scenario(file=str(scenario.resolve()), actors=ActorMode.IDEAL)
     return RunSpec(

@@ -97,7 +97,7 @@ KEYS: dict[str, Keys] = {
 
 
 class Canvases(Element, component="cockpit.js"):
-    """Pictures, heads-up display and keys."""
+    """Shows pictures, heads-up display and keys."""
 
     def __init__(self, tab: str, kind: str, timeline: dict[str, Any] | None) -> None:
         super().__init__()
@@ -109,7 +109,7 @@ class Canvases(Element, component="cockpit.js"):
 
 
 class Panel:
-    """The controls of one tab; they follow what is really the case."""
+    """Holds the controls of one tab; they follow what the run tells."""
 
     def __init__(self, bridge: Bridge, tab: str, vehicles: int = 0) -> None:
         """vehicles: in the background as the run began; 0: there is nothing to choose."""
@@ -119,18 +119,21 @@ class Panel:
         self.elements: list[Any] = []
 
     def say(self, word: str, value: Any = None) -> None:
-        """Say a word as this tab."""
+        """Says a word as this tab, and shows a warning if something was wrong with it."""
         wrong = self.bridge.say(self.tab, word, value)
         if wrong is not None:
             ui.notify(wrong, type="warning")
 
     def button(self, text: str, word: str, value: Any = None, icon: str | None = None) -> None:
-        """A button that says a word."""
+        """Adds a button that says a word with this value."""
         made = ui.button(text, icon=icon, on_click=lambda: self.say(word, value))
         self.elements.append(made.props("dense no-caps unelevated").classes(f"say-{word}"))
 
     def follow(self, name: str, element: Any, read: Callable[[dict[str, Any]], Any]) -> Any:
-        """Let an element show what `read` finds in the seat, unless it was just moved by hand."""
+        """Lets an element show what `read` finds in the seat, unless it was just moved by hand; returns it.
+
+        name: of the control. A value of None leaves the element as it is.
+        """
 
         def sync(seat: dict[str, Any]) -> None:
             value = read(seat)
@@ -144,7 +147,10 @@ class Panel:
         return element
 
     def apply_change(self, name: str, now: Any, word: str, value: Any) -> None:
-        """A control was on_moved, by hand or by the look at what is the case."""
+        """Says the word of a control that was moved, unless it already shows what is the case.
+
+        now: the control's new state; value: said with the word.
+        """
         seat = self.bridge.told.get("seat", {})
         if now == self._real(name, seat):
             return
@@ -162,7 +168,7 @@ class Panel:
         return seat.get(name)
 
     def sync(self) -> None:
-        """Look at how things stand."""
+        """Sets all controls to how things stand, and enables them if this tab drives."""
         seat = self.bridge.told.get("seat", {})
         for one in self.syncing:
             one(seat)
@@ -172,7 +178,7 @@ class Panel:
 
 
 def build(bridge: Bridge, about: About) -> Callable[[], None]:
-    """The builder of the page."""
+    """Returns a function that builds the page of one tab each time it is called."""
     kind = about.kind
 
     def page() -> None:
@@ -220,7 +226,7 @@ def again_controls(panel: Panel, changes: Mapping[str, str]) -> None:
 
 
 def picture_controls(panel: Panel) -> None:
-    """What is added to the pictures for people; of this page, not of the run."""
+    """Adds switches of what is added to the pictures for people; they do not change the run."""
     with ui.expansion("pictures (G)").props("dense"), ui.element("div").classes("switches"):
         for extra in Extra:
             extra_switch(panel, extra)
@@ -236,7 +242,7 @@ def extra_switch(panel: Panel, extra: Extra) -> None:
 
 
 def drive_controls(panel: Panel) -> None:
-    """Functions of our stack, and the headlights."""
+    """Adds the switches of our stack's functions and the choice of headlights."""
     with ui.element("div").classes("switches"):
         own = [FUNCTIONS.get(n) for n, s in FUNCTIONS.sources().items() if s.package == "skidpad"]
         for key, kind in enumerate(own, start=1):
@@ -260,7 +266,7 @@ def _has(names: list[str] | None, name: str) -> bool | None:
 
 
 def weather_controls(panel: Panel) -> None:
-    """Weather by name and by slider, and how it acts."""
+    """Adds the choices of weather and how it acts, and sliders of its fields."""
     titles = {name: one.title or name for name, one in all_presets().items()}
     with ui.element("div").classes("selects"):
         weather = ui.select(
@@ -280,7 +286,7 @@ def weather_controls(panel: Panel) -> None:
 
 
 def acting_select(panel: Panel, word: str, kinds: type[Enum]) -> None:
-    """How weather acts: on tyres, or on sight."""
+    """Adds the choice of a model by which weather acts: `grip` on tyres, `range` on sight."""
     select = ui.select(
         [k.value for k in kinds],
         label=word,

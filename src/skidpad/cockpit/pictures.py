@@ -37,7 +37,7 @@ def colours(array: Array) -> Picture:
 
 
 def views_of(packet: Packet, told: Mapping[str, Any]) -> dict[str, Picture]:
-    """All views of a packet in colours, with the marks in them."""
+    """Returns all views of a packet in colours, with the marks drawn into them."""
     marks = told.get("marks", {})
     found = {}
     for name, array in packet.views.items():
@@ -59,7 +59,10 @@ def draw(
     light: list[Any] | None,
     patches: Sequence[tuple[str, list[list[int]]]] = (),
 ) -> None:
-    """Patches of road, radar points, the bracket at the measured distance and the light, in place."""
+    """Draws patches of road, the light, radar points and the bracket at the reported distance, in place.
+
+    Coordinates are px; lead: left, top, right, bottom.
+    """
     draw_patches(picture, patches)
     if light is not None:
         draw_light(picture, *light)
@@ -78,7 +81,7 @@ def draw(
 
 
 def draw_patches(picture: Picture, patches: Sequence[tuple[str, list[list[int]]]]) -> None:
-    """What lies on the road: a thin coat of colour within a line, in place."""
+    """Draws what lies on the road as a thin coat of colour within a line, in place."""
     for kind, corners in patches:
         area = np.array(corners, dtype=np.int32)
         coat = picture.copy()
@@ -88,7 +91,7 @@ def draw_patches(picture: Picture, patches: Sequence[tuple[str, list[list[int]]]
 
 
 def draw_light(picture: Picture, frames: list[list[int]], state: str, label: str) -> None:
-    """A frame about every head of the light, and what is known of it, in place."""
+    """Draws a frame about every head of the light, and what is known of it, in place."""
     ink = LIGHTS.get(state, LIGHT_OFF)
     for left, top, right, bottom in frames:
         cv2.rectangle(picture, (left, top), (right, bottom), ink, 2, cv2.LINE_AA)
@@ -98,13 +101,13 @@ def draw_light(picture: Picture, frames: list[list[int]], state: str, label: str
 
 
 class Encoder:
-    """Packets as messages: each is encoded once, however many tabs look."""
+    """Encodes packets as messages, each packet once, however many tabs look."""
 
     def __init__(self) -> None:
         self._number, self._message = 0, b""
 
     def message(self, packet: Packet) -> bytes:
-        """Length of the head, the head (JSON), and the pictures (JPEG) one after the other."""
+        """Returns a packet's message: length of the head, the head (JSON), then pictures (JPEG)."""
         if packet.number == self._number:
             return self._message
         told = msgspec.json.decode(packet.told)

@@ -38,7 +38,7 @@ class Producer:
         self._theirs.close()
 
     def say(self, word: Word) -> None:
-        """Say a word; one that comes too late is lost."""
+        """Sends a word to the job; one that comes too late is lost."""
         try:
             self._pipe.send_bytes(encode(word))
         except (BrokenPipeError, OSError):
@@ -46,7 +46,7 @@ class Producer:
 
     @property
     def result(self) -> tuple[str, str] | None:
-        """("done", "refused" or "failed", a sentence) once it has ended; None: it still works."""
+        """Returns ("done", "refused" or "failed", a sentence) once it has ended; None: it still works."""
         if self._said is None and self._pipe.poll():
             try:
                 self._said = self._pipe.recv()
@@ -55,13 +55,16 @@ class Producer:
         return self._said
 
     def wait(self, seconds: float) -> bool:
-        """Wait for the end at most so long; True when it has ended."""
+        """Waits at most so many s for the end; True when it has ended."""
         if self.result is None:
             self._pipe.poll(seconds)
         return self.result is not None
 
     def stop(self) -> None:
-        """End it and let go of everything; safe to call twice."""
+        """Ends the job, kills a process that stays for two times ENDS_WITHIN s, and releases the memory.
+
+        Safe to call twice.
+        """
         self.say(End())
         if self._process.is_alive():
             self.wait(ENDS_WITHIN)
@@ -72,7 +75,7 @@ class Producer:
         self.feed.close()
 
     def outcome(self) -> str:
-        """The sentence of its end; SkidpadError when it failed."""
+        """Returns the sentence of its end; InputError when it was refused, SkidpadError when it failed."""
         kind, text = self.result or ("failed", "the drive was not ended")
         if kind == "refused":
             raise InputError(text)

@@ -64,7 +64,7 @@ WORDS: dict[str, type[Any]] = {
 
 
 class RecordedRun:
-    """A run's folder, moment by moment in any order."""
+    """Gives the moments of a run's folder in any order."""
 
     def __init__(self, folder: Path) -> None:
         """FileError for a folder that holds no run, or a damaged one."""
@@ -90,7 +90,7 @@ class RecordedRun:
 
     @property
     def ticks(self) -> int:
-        """How many moments there are."""
+        """Returns how many moments there are."""
         return len(self.log)
 
     def tick(self, k: int) -> int:
@@ -98,7 +98,7 @@ class RecordedRun:
         return int(self.log.tick[k])
 
     def crash(self, k: int) -> Pose | None:
-        """Where the ego's crash that is nearest in time happened; None: there was none."""
+        """Returns the ego's pose at its contact that is nearest in time; None: there was none."""
         if not self.log.contacts:
             return None
         tick = self.tick(k)
@@ -108,12 +108,12 @@ class RecordedRun:
         return Pose(x, y, z, yaw=yaw)
 
     def collisions(self, k: int) -> int:
-        """How many contacts of the ego there were up to moment k."""
+        """Returns how many contacts of the ego there were up to moment k."""
         return sum(1 for c in self.log.contacts if c.tick <= self.tick(k))
 
     @cached_property
     def _readings(self) -> tuple[dict[str, RecordedSensor], dict[int, dict[str, float]]]:
-        """Further sensors and functions by id, and what they said by tick."""
+        """Returns the further sensors and functions by id, and what they said by tick; empty without any."""
         found = read_readings(self.folder)
         if found is None:
             return {}, {}
@@ -121,17 +121,17 @@ class RecordedRun:
         return {sensor.id: sensor for sensor in found.sensors}, rows
 
     def readings(self, k: int) -> list[tuple[str, str]]:
-        """What further sensors and functions said in moment k, as words and a number for people."""
+        """Returns what further sensors and functions said in moment k: names and numbers as text."""
         sensors, rows = self._readings
         return describe_row(sensors, rows.get(self.tick(k), {}))
 
     def seat(self, k: int) -> Seat:
-        """How the desk stood in moment k."""
+        """Returns what the person at the desk had set in moment k."""
         tick = int(self.log.tick[k])
         return self.seats[max(bisect_right(self._seat_ticks, tick) - 1, 0)]
 
     def moment(self, k: int) -> Moment:
-        """Moment k, 0 <= k < ticks."""
+        """Returns moment k, 0 <= k < ticks, of the log; images, radar and wheel speeds are not recorded."""
         log, tick = self.log, int(self.log.tick[k])
         truth = self._truth(k, tick)
         ego = EgoEstimate(
@@ -180,7 +180,7 @@ class RecordedRun:
         )
 
     def _pitch(self, k: int) -> Floats:
-        """(n,) rad: the road's grade from the way before and after, and the body's own by ax."""
+        """Returns (n,) pitch in rad: the road's grade from the way before and after, and the body's by ax."""
         a = self.log.actors
         before, after = max(k - 1, 0), min(k + 1, self.ticks - 1)
         dx, dy, dz = (v[after] - v[before] for v in (a.x, a.y, a.z))
@@ -198,7 +198,7 @@ class RecordedRun:
         return None
 
     def curves(self) -> Curves:
-        """What is drawn along the time."""
+        """Returns speed, tier and time to collision along the time, of about CURVE moments."""
         log, part = self.log, every(len(self.log))
         tiers = [None if isnan(v) else int(v) for v in log.report.tier[part].tolist()]
         bodies = [body(log, i) for i in range(len(log.table))]
@@ -207,7 +207,7 @@ class RecordedRun:
 
 
 def told_of(event: Any) -> tuple[str, str] | None:
-    """Kind and text of an event worth a mark."""
+    """Returns kind and text of an event worth a mark; None for others."""
     match event:
         case ContactEvent():
             return "crash", f"contact with {event.static or 'a vehicle'}"
@@ -221,7 +221,7 @@ def told_of(event: Any) -> tuple[str, str] | None:
 
 
 def read_folder(folder: Path) -> tuple[RunLog, RunSpec]:
-    """Log and description of a run; FileError in one sentence for anything else."""
+    """Returns log and description of a run; FileError in one sentence for anything else."""
     if not (folder / TICKS).is_file():
         raise FileError(f"{folder} is not the folder of a run: it has no {TICKS}")
     spec = read_run(folder)
@@ -232,7 +232,7 @@ def read_folder(folder: Path) -> tuple[RunLog, RunSpec]:
 
 
 def seats_of(spec: RunSpec, inputs: tuple[Timed, ...]) -> list[Seat]:
-    """How the desk stood from which tick on, in order; the first one is how the run began."""
+    """Returns how the desk stood from which tick on, in order; the first one is how the run began."""
     functions = tuple(spec.driver.functions) if isinstance(spec.driver, AdasDriver) else None
     outside = Outside(weather=spec.weather, grip=spec.grip, range_model=spec.settings.sensors.range)
     now = Seat(-1, outside, False, "keyboard", functions, None)
@@ -268,7 +268,7 @@ def _after(now: Seat, timed: Timed) -> Seat:
 
 
 def report_of(log: RunLog, k: int) -> StackReport:
-    """What the stack said in moment k."""
+    """Returns what the stack reported in moment k; a field without a value is None."""
     values: dict[str, Any] = {}
     for field in fields(StackReport):
         value = float(getattr(log.report, field.name)[k])

@@ -30,7 +30,7 @@ TAKES_WITHIN = 0.25  # s that the page is given to take a picture before the nex
 
 
 def replay_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
-    """Show a run, perhaps with another one beside it, until the page ends it."""
+    """Shows a run, perhaps with another one beside it, until the page ends it; returns a sentence."""
     source = open_source(Path(about["path"]), about["hazard"])
     other = None if about["beside"] is None else open_source(Path(about["beside"]))
     feed, link = Feed(feed_name), Link(pipe)
@@ -50,7 +50,7 @@ def replay_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
 
 
 class Replayer:
-    """State: the moment that is shown, and when that was."""
+    """Plays a source to the page: keeps the moment that is shown, and when that was."""
 
     def __init__(
         self, source: Source, feed: Feed, link: Link,
@@ -111,7 +111,7 @@ class Replayer:
             self.k = min(self._base + done, last)
 
     def _film(self, seconds: float) -> None:
-        """Write a film from here on, beside the run; the page waits meanwhile."""
+        """Writes a film of so many s from here on, beside the run; the page waits and is told the path."""
         self.link.film = None
         source = self.source
         last = min(self.k + max(round(seconds / self.dt), 1), source.ticks - 1)
@@ -140,7 +140,7 @@ class Replayer:
         self.show()
 
     def _is_taken(self) -> bool:
-        """The page has the picture before, or is too slow to be waited for."""
+        """Returns True when the page has the last picture, or takes longer than TAKES_WITHIN s."""
         feed = self.screen.feed
         return feed.last_read >= feed.last or self.clock() - self._shown_at > TAKES_WITHIN
 
@@ -182,7 +182,7 @@ class Replayer:
         return Shown(seat.outside, told)
 
     def _events(self) -> list[tuple[float, str]]:
-        """The last ones before this moment."""
+        """Returns the last twelve marks up to this moment: time in s and text."""
         tick = self.source.tick(self.k)
         marks = [e for e in self.source.marks if e[0] <= tick]
         return [(round(t * DT, 2), text) for t, _, text in marks[-12:]]

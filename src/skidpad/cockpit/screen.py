@@ -31,7 +31,7 @@ MARKED = (View.DRIVER, View.FOLLOW)
 
 
 class Shown(NamedTuple):
-    """What a screen asks its producer at every picture."""
+    """Holds what a screen is told for a picture: surroundings, and plain data for the page."""
 
     outside: Outside
     told: Mapping[str, Any]  # goes to the page as it is
@@ -42,7 +42,7 @@ Beside = Callable[[Moment, View, frozenset[Extra]], tuple[Any, Mapping[str, Any]
 
 
 class Screen(Sink):
-    """Draws the views that are looked at, when the page has taken the picture before."""
+    """Draws the views that are looked at, once the page has taken the picture before."""
 
     def __init__(
         self,
@@ -66,17 +66,17 @@ class Screen(Sink):
         self.beside: Beside | None = None  # another run in step with this one
 
     def begin(self, table: ActorTable) -> None:
-        """The run begins, with these actors."""
+        """Builds the scene for these actors as a run begins."""
         outside = self.ask().outside
         self.studio = Studio(self.map, table, outside, self.seed, looks=self.looks)
         self.cameras, self.light = self.studio.suite.cameras, LightAhead(self.map)
 
     def follow_readings(self, latest: Callable[[], list[tuple[str, str]]]) -> None:
-        """What further sensors and functions say is shown beside the pictures."""
+        """Takes a function that gives the latest readings, which are shown beside the pictures."""
         self.latest = latest
 
     def see(self, moment: Moment) -> None:
-        """Show it, or drop it: a page that is slow, or not there, costs nothing."""
+        """Notes a tick's events and shows it, or drops it, as a slow or absent page costs nothing."""
         t = round(moment.truth.tick * DT, 2)
         self.collisions += len(moment.truth.contacts)
         if moment.truth.contacts:
@@ -90,7 +90,7 @@ class Screen(Sink):
         self.show(moment)
 
     def show(self, moment: Moment) -> None:
-        """Draw the views and hand them on."""
+        """Draws the views of a moment and writes them to the feed."""
         shown, truth = self.ask(), moment.truth
         self.studio.change(shown.outside, self.link.extras)
         braking = truth.commands[:, 1] > BRAKING
@@ -105,7 +105,7 @@ class Screen(Sink):
         self.feed.write_picture(msgspec.json.encode(self._describe_moment(moment, shown)), planes)
 
     def _is_wanted(self, view: View) -> bool:
-        """The main view, and all small ones that are not hidden."""
+        """Returns True for the main view and all small ones that are not hidden."""
         if view is self.link.main:
             return True
         return view not in self.link.hidden and (view not in MAIN or view is View.TOP)

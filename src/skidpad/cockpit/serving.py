@@ -31,7 +31,11 @@ def serve(
     say: Callable[[str], None],
     browser: bool = True,
 ) -> str:
-    """Serve until the end and return its sentence."""
+    """Serves the page until the run ends or Ctrl-C; returns a sentence on its end.
+
+    say: takes the address. browser: opens one where there is a screen. InputError or SkidpadError
+    when the run was refused or failed.
+    """
     try:
         _serve(producer, about, place, say, browser)
     finally:
@@ -64,7 +68,7 @@ def _serve(
 
 
 def application(bridge: Bridge, about: About) -> FastAPI:
-    """The page and its stream."""
+    """Returns the application with the page at / and the stream of pictures."""
     nicegui()
     from skidpad.cockpit.page import STYLE, build
     from skidpad.cockpit.stream import add_stream
@@ -80,7 +84,7 @@ def application(bridge: Bridge, about: About) -> FastAPI:
 
 
 def has_screen() -> bool:
-    """A browser could be seen here; a terminal's text browser would only take the terminal."""
+    """Returns True where a browser could be seen; a text browser would only take the terminal."""
     if sys.platform in ("darwin", "win32"):
         return True
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

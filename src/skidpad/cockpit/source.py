@@ -58,7 +58,7 @@ class Curves(NamedTuple):
 
 
 class Source(Protocol):
-    """A run that was driven."""
+    """Gives the moments of a run that was driven."""
 
     folder: Path  # beside which films are written
     map: RoadMap
@@ -73,7 +73,7 @@ class Source(Protocol):
 
     @property
     def ticks(self) -> int:
-        """How many moments there are."""
+        """Returns how many moments there are."""
         ...
 
     def tick(self, k: int) -> int:
@@ -81,32 +81,32 @@ class Source(Protocol):
         ...
 
     def moment(self, k: int) -> Moment:
-        """Moment k, 0 <= k < ticks."""
+        """Returns moment k, 0 <= k < ticks."""
         ...
 
     def seat(self, k: int) -> Seat:
-        """How the desk stood in moment k."""
+        """Returns what the person at the desk had set in moment k."""
         ...
 
     def crash(self, k: int) -> Pose | None:
-        """Where the ego's crash that is nearest in time happened; None: there was none."""
+        """Returns the ego's pose at its contact that is nearest in time; None: there was none."""
         ...
 
     def collisions(self, k: int) -> int:
-        """How many contacts of the ego there were up to moment k."""
+        """Returns how many contacts of the ego there were up to moment k."""
         ...
 
     def readings(self, k: int) -> list[tuple[str, str]]:
-        """What further sensors and functions said in moment k, as words and a number for people."""
+        """Returns what further sensors and functions said in moment k: names and numbers as text."""
         ...
 
     def curves(self) -> Curves:
-        """What is drawn along the time."""
+        """Returns what is drawn along the time, at about CURVE moments."""
         ...
 
 
 def index_at(source: Source, tick: int) -> int:
-    """The first moment that is not before a tick, or the last one."""
+    """Returns the index of the first moment that is not before a tick, or of the last one."""
     return min(bisect_left(range(source.ticks), tick, key=source.tick), source.ticks - 1)
 
 
@@ -114,7 +114,7 @@ BEFORE = 5.0  # s, with which a replay begins before what is worth seeing
 
 
 def opening_tick(source: Source) -> int:
-    """The tick with which a replay begins: shortly before the crash at the highest speed, or a hazard.
+    """Returns the tick BEFORE s ahead of the crash at the highest speed, else of the first hazard.
 
     The first one of the source where there is neither.
     """
@@ -137,7 +137,7 @@ def _speed_before(source: Source, tick: int) -> float:
 
 
 def timeline(source: Source) -> dict[str, Any]:
-    """What the page draws along the time: speed, time to collision, events, tiers, hazards."""
+    """Returns what the page draws along the time: speed, time to collision, events, tiers, hazards."""
     return {
         "first": source.tick(0),
         "last": source.tick(source.ticks - 1),

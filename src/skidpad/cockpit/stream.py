@@ -18,7 +18,7 @@ LOST_AFTER = 2.0  # s without an acknowledgement after which the next picture is
 
 
 class Stream:
-    """One tab: what was sent and what was taken."""
+    """Sends pictures to one tab and takes its words; keeps what was sent and what was taken."""
 
     def __init__(self, socket: WebSocket, bridge: Bridge, tab: str) -> None:
         self.socket, self.bridge, self.tab = socket, bridge, tab
@@ -26,7 +26,7 @@ class Stream:
         self.role: bool | None = None
 
     async def run(self) -> None:
-        """Until the tab is closed."""
+        """Serves the tab until it is closed or the producer ends, then leaves the bridge."""
         await self.socket.accept()
         self.bridge.tabs.note_tab(self.tab)
         tasks = [asyncio.ensure_future(part()) for part in (self._send, self._receive, self._check)]
@@ -101,7 +101,7 @@ class Stream:
 
 
 def add_stream(app: FastAPI, bridge: Bridge) -> None:
-    """The route of the websocket."""
+    """Adds the route /stream of the websocket to the application."""
 
     @app.websocket("/stream")
     async def stream(socket: WebSocket, tab: str) -> None:

@@ -67,7 +67,7 @@ OWN = {View.FOLLOW: FOLLOW, View.TOP: TOP, View.CRASH: CRASH}
 
 
 def cameras() -> tuple[SensorSpec, ...]:
-    """All cameras of the studio; ids are the words of `View`."""
+    """Returns the cameras of all views; their ids are the words of `View`."""
     by_id = {s.id: s for s in twelve_sensors() if isinstance(s, CameraSpec)}
     found = []
     for view in View:
@@ -87,7 +87,7 @@ FOR_PEOPLE = Looks()
 
 
 class Studio:
-    """Renders the moments of one run."""
+    """Renders pictures of the moments of one run."""
 
     def __init__(
         self,
@@ -113,7 +113,7 @@ class Studio:
         self.suite.change(outside)
 
     def change(self, outside: Outside, extras: frozenset[Extra] | None = None) -> None:
-        """Weather, headlights or additions are others; None: the additions stay."""
+        """Sets other surroundings or additions to the pictures; extras None: the additions stay."""
         wanted = self.suite.settings.extras if extras is None else extras
         if outside != self.outside or wanted != self.suite.settings.extras:
             self.outside = outside
@@ -127,9 +127,9 @@ class Studio:
         braking: NDArray[np.bool_],
         crash: Pose | None = None,
     ) -> Mapping[str, CameraImage]:
-        """The views of this moment by their word, each drawn when it is read.
+        """Returns the images of this moment by word of the view, each drawn when it is read.
 
-        crash: what the crash camera looks at; None: at the ego.
+        crash: what the crash camera looks at; None: at the ego. Valid until the next call.
         """
         ego = states.pose(0)
         mount = mount_in(
@@ -141,7 +141,7 @@ class Studio:
 
 
 def watching(place: Pose) -> Pose:
-    """A camera that stands behind and beside a place and looks at it."""
+    """Returns the pose of a camera that stands behind and beside a place and looks at it, world."""
     at = place.moved(BESIDE.x, BESIDE.y, BESIDE.z)
     dx, dy = place.x - at.x, place.y - at.y
     return Pose(
@@ -150,7 +150,7 @@ def watching(place: Pose) -> Pose:
 
 
 def mount_in(body: Pose, camera: Pose) -> Pose:
-    """The mounting on a body of a camera that stands in the world."""
+    """Returns the mounting on a body of a camera that stands in the world; both poses in the world."""
     turn = body.rotation().T
     x, y, z = turn @ (camera.x - body.x, camera.y - body.y, camera.z - body.z)
     r = turn @ camera.rotation()

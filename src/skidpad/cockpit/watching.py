@@ -75,7 +75,7 @@ class Standing:
 
 
 def standing(folder: Path) -> Standing:
-    """How the campaign in `folder` stands; FileError when there is none."""
+    """Reads how far the campaign in `folder` has come; FileError when it is none."""
     if not (folder / CAMPAIGN).is_file() and not (folder / LEDGER).is_file():
         raise FileError(f"{folder} is not the folder of a campaign: it has no {LEDGER}")
     identity = read_identity(folder)
@@ -100,7 +100,7 @@ def standing(folder: Path) -> Standing:
 
 
 def has_crashed(line: Line) -> bool:
-    """Whether the ego hit something or lay on its side."""
+    """Returns True when the ego hit something or lay on its side, by outcome or by counts."""
     if line.key.outcome in ENDED:
         return True
     metrics = line.metrics or {}
@@ -136,7 +136,7 @@ COLUMNS: list[dict[str, Any]] = [
 
 
 def build(folder: Path) -> Callable[[], None]:
-    """The builder of the page."""
+    """Returns a function that builds the page of a campaign's standing, read anew every REFRESH s."""
 
     def page() -> None:
         from nicegui import ui
@@ -184,12 +184,15 @@ def build(folder: Path) -> Callable[[], None]:
 
 
 def as_address(picture: Path) -> str:
-    """A picture's file as an address that holds it, so that no folder is served."""
+    """Returns a picture's file as a data URI, so that no folder is served."""
     return "data:image/png;base64," + base64.b64encode(picture.read_bytes()).decode()
 
 
 def serve_watch(folder: Path, place: Place, say: Callable[[str], None], browser: bool) -> None:
-    """Serve the page until Ctrl-C."""
+    """Serves the page until Ctrl-C; FileError when `folder` is no campaign's.
+
+    say: takes the address. browser: opens one where there is a screen.
+    """
     standing(folder)
     nicegui()
     with Server(site("Skidpad watch", {"/": build(folder)}), place) as server:

@@ -86,7 +86,7 @@ def encode(word: Word) -> bytes:
 
 
 class Link:
-    """The producer's end: what was said so far. Asked often, it never waits unless told to."""
+    """Holds the producer's end of the pipe and the state that the page's words have set so far."""
 
     def __init__(self, pipe: Connection | None) -> None:
         """pipe: None: no message ever comes."""
@@ -103,7 +103,10 @@ class Link:
         self.reshown = False  # another view is asked for
 
     def drain(self, patience: float = 0.0) -> bool:
-        """Take what was said; wait at most `patience` s for a first word. True: there was one."""
+        """Takes the words that came; waits at most `patience` s for a first. True: there was one.
+
+        When the page's process has ended, `ended` is set.
+        """
         if self.pipe is None:
             return False
         heard = False
@@ -141,7 +144,7 @@ class Link:
 
 
 class Live:
-    """Inputs as they come, at most one of a kind in a tick where only the last one counts."""
+    """Gives a person's inputs as they come; of a kind where the last one counts, one per tick."""
 
     def __init__(self, link: Link, first: Sequence[Input] = (Lamps(LampSwitch.AUTO),)) -> None:
         """first: what is done in the first tick."""
@@ -150,11 +153,11 @@ class Live:
 
     @property
     def ended(self) -> bool:
-        """The person has ended the drive."""
+        """Returns True when the person, or the page's process, has ended the drive."""
         return self.link.ended
 
     def at(self, tick: int) -> Sequence[Input]:
-        """What was done since the last tick."""
+        """Returns what was done since the last call, whatever the tick."""
         del tick
         self.link.drain()
         inputs, self.link.inputs = self.link.inputs, []
@@ -165,7 +168,7 @@ LAST_COUNTS = (Pedals, Sky, Lamps, Functions, Crowd)
 
 
 def drop_void_inputs(inputs: Sequence[Input]) -> list[Input]:
-    """The inputs without those that a later one of the same kind makes void."""
+    """Returns the inputs without those that a later one of the same kind makes void."""
     kept: list[Any] = []
     for one in inputs:
         if isinstance(one, LAST_COUNTS):

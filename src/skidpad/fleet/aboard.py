@@ -34,7 +34,7 @@ LATER = frozenset(
 
 
 def pinned_key(file: Path) -> bytes:
-    """The public key in the fleet's `orders.pub`; FileError when it is none."""
+    """Returns the fleet's public key (KEY_BYTES) of the hexadecimal file; FileError when it is none."""
     try:
         public = bytes.fromhex(file.read_text(encoding="ascii"))
     except (OSError, ValueError) as error:
@@ -55,7 +55,7 @@ class Sent(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, slots=True)
 class _Word:
-    """What the fleet is to be told."""
+    """Holds one request to the fleet that waits to be sent: path, headers and body."""
 
     path: str
     headers: dict[str, str]
@@ -63,7 +63,10 @@ class _Word:
 
 
 class Aboard:
-    """Two threads, from `start` to `close`; `ask` and `tell` are a round of each."""
+    """Asks the fleet for orders and sends it alerts, in two threads from `start` to `close`.
+
+    `ask` and `tell` are a round of each.
+    """
 
     def __init__(
         self,
@@ -90,12 +93,12 @@ class Aboard:
 
     @property
     def v_max(self) -> float:
-        """Most speed that orders leave, m/s; 0: a minimal-risk stop."""
+        """Returns the most speed that orders allow, m/s: inf without one, 0 in a minimal-risk stop."""
         return self.receiver.v_max
 
     @property
     def waiting(self) -> int:
-        """Words that the fleet has not got."""
+        """Returns how many messages the fleet has not taken yet."""
         return len(self._waiting)
 
     def start(self) -> None:
@@ -110,14 +113,14 @@ class Aboard:
         self.tell()
 
     def alert(self, key: str, alert: AlertText) -> None:
-        """Raise an alert at once, without waiting for it; key: of this alert alone."""
+        """Queues an alert and wakes the sending thread, without waiting; key: of this alert alone."""
         headers = {"Idempotency-Key": key, "X-Skidpad-Time": f"{time.time():.3f}"}
         self._waiting.append(_Word("/api/v1/alerts", headers, msgspec.json.encode(alert)))
         self.raised += 1
         self._threads[1].wake()
 
     def ask(self, wait_s: float = WAIT_S) -> None:
-        """Ask for orders, and obey those that are good."""
+        """Asks for orders, obeys the good ones and queues their words; waits AGAIN_S without an answer."""
         asked = {"challenge": self.receiver.challenge(), "wait": f"{wait_s:g}"}
         answer = self._request("GET", "/api/v1/orders", params=asked)
         if answer is None or answer.status_code != 200:
@@ -131,7 +134,7 @@ class Aboard:
             self._judge(one)
 
     def _judge(self, one: Sent) -> None:
-        """Takes an order by its signature, counts it if obeyed, and queues the word of that for the fleet."""
+        """Checks an order and says the verdict; of a well signed one a word is queued for the fleet."""
         verdict = self.receiver.receive(one.order, one.signature)
         what = json.loads(one.order) if verdict in TOLD else {}
         self.say(f"an order{' to ' + what['what'] if what else ''}: {verdict.value}")
@@ -141,7 +144,10 @@ class Aboard:
             self._threads[1].wake()
 
     def tell(self) -> None:
-        """Tell the fleet what waits, in order, until it does not answer."""
+        """Sends what waits, in order, and stops at the first that gets no answer, a 5xx, 408 or 429.
+
+        What is refused otherwise is said and dropped.
+        """
         while self._waiting:
             word = self._waiting[0]
             answer = self._request("POST", word.path, headers=word.headers, content=word.body)
@@ -152,7 +158,7 @@ class Aboard:
             self._waiting.popleft()
 
     def _request(self, method: str, path: str, **rest: Any) -> httpx.Response | None:
-        """Sends a request; None: off line."""
+        """Sends a request and returns its answer, of any status; None when the fleet cannot be reached."""
         try:
             return self.client.request(method, path, **rest)
         except httpx.TransportError:

@@ -105,7 +105,7 @@ _ROWS = msgspec.json.Decoder(IndicatorRow)
 
 
 def hazards_of(content: bytes, limits: Limits) -> list[Found]:
-    """The records of an unpacked batch of hazards; Refused at the first that is not one."""
+    """Returns the records of an unpacked batch of hazards; Refused (413, 422) if any is not one."""
     first, newline, _ = content.partition(b"\n")
     if not newline or first != HEADER.encode() or not content.isascii():
         raise Refused(422, f"hazards must be ASCII text whose first line is {HEADER!r}")
@@ -158,12 +158,12 @@ def _check(head: Head, number: int) -> None:
 
 
 def _are_words(words: Iterable[str]) -> bool:
-    """Whether each can be kept in a column; PostgreSQL keeps no NUL."""
+    """Returns True when each word has at most 200 characters and no NUL, so that a column keeps it."""
     return all(len(word) <= 200 and "\0" not in word for word in words)
 
 
 def _place(head: Head, text: bytes) -> tuple[float, float]:
-    """Where it was, m: the object's place, or the first ego's in the record's first cycle."""
+    """Returns x, y in m of the first object, or of the first ego in the record; (0, 0) if unreadable."""
     if head.objects:
         return head.objects[0].x, head.objects[0].y
     start = text.find(b"\nF ")
@@ -176,7 +176,7 @@ def _place(head: Head, text: bytes) -> tuple[float, float]:
 
 
 def drive_of(content: bytes) -> BatchDrive:
-    """What a drive's summary says; Refused when it is none."""
+    """Returns what is read of a drive's summary; Refused (422) when it is none or out of range."""
     try:
         drive = _DRIVES.decode(content)
     except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
@@ -189,12 +189,12 @@ def drive_of(content: bytes) -> BatchDrive:
 
 
 def drive_text(drive: BatchDrive) -> str:
-    """A drive as it is kept: what was understood of its summary; the body holds all of it."""
+    """Returns the JSON text that is kept of a drive: the fields that were understood."""
     return msgspec.json.encode(drive).decode()
 
 
 def rows_of(content: bytes, limits: Limits) -> list[IndicatorRow]:
-    """The rows of a batch of indicators; Refused at the first that is not one."""
+    """Returns the rows of a batch of indicators; Refused (413, 422) if one is wrong or they are too many."""
     try:
         rows = [_ROWS.decode(line) for line in content.splitlines() if line]
     except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
@@ -211,12 +211,12 @@ def rows_of(content: bytes, limits: Limits) -> list[IndicatorRow]:
 
 
 def weather_class(words: dict[str, str]) -> str:
-    """Day, low sun or night, and dry or rain, from the words of a record."""
+    """Returns light and rain of a record's context in words, such as "low sun, dry"."""
     return f"{_light(words)}, {_wet(words)}"
 
 
 def _light(words: dict[str, str]) -> str:
-    """Returns the class of light of a drive's context: by the sun's altitude, or unknown."""
+    """Returns night below 0 deg of the sun's altitude, low sun below 10, day, or "light unknown"."""
     sun = _number(words, "sun_altitude_deg")
     if sun is None:
         return "light unknown"
@@ -224,7 +224,7 @@ def _light(words: dict[str, str]) -> str:
 
 
 def _wet(words: dict[str, str]) -> str:
-    """Returns the class of rain of a drive's context: by its precipitation, or unknown."""
+    """Returns dry at 0 % precipitation, rain below 60 %, heavy rain, or "rain unknown"."""
     rain = _number(words, "precipitation")
     if rain is None:
         return "rain unknown"

@@ -24,7 +24,7 @@ class Blobs:
         self._local = "file" in ((protocol,) if isinstance(protocol, str) else protocol)
 
     def store(self, content: bytes) -> str:
-        """Store `content` durably before returning its name."""
+        """Writes `content`, on a local disk durably, unless it is there; returns its name, the SHA-256."""
         name = digest(content)
         path = self._path(name)
         if self._fs.exists(path):
@@ -45,7 +45,7 @@ class Blobs:
         return content
 
     def part(self, name: str, start: int, size: int) -> bytes:
-        """Bytes of a blob from `start`; their own digest is the caller's to check."""
+        """Returns `size` bytes of a blob from `start`, whose digest is not checked; FileError if absent."""
         return self._read(name, start, start + size)
 
     def _read(self, name: str, start: int | None, end: int | None) -> bytes:

@@ -44,7 +44,7 @@ def library() -> ModuleType:
 def connect_to(
     broker: Broker, timeout_s: float, largest: int = ANSWER_MAX, waiting: int = 1
 ) -> AbstractAsyncContextManager[Any]:
-    """A connection as MQTT 5.
+    """Returns a client as context that connects by MQTT 5 when entered.
 
     largest: bytes of a message that the broker may pass on. waiting: messages kept until looked at.
     """
@@ -60,14 +60,14 @@ def connect_to(
 
 
 def request_properties(answer_to: str, told: dict[str, str]) -> Any:
-    """Properties of a vehicle's message: where it waits for the answer, and what it says."""
+    """Returns MQTT 5 properties of a vehicle's message: response topic, key, and `told` as user's own."""
     return properties(
         ResponseTopic=answer_to, CorrelationData=told["key"].encode(), UserProperty=[*told.items()]
     )
 
 
 def properties(**values: Any) -> Any:
-    """MQTT 5 properties of a message, by name."""
+    """Returns MQTT 5 properties of a message to publish, by their names."""
     return _properties("PUBLISH", **values)
 
 

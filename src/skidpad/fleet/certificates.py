@@ -20,7 +20,11 @@ SKEW = timedelta(hours=1)  # a vehicle's clock may be behind
 
 
 def make_certificates(folder: Path, hosts: Sequence[str]) -> list[Path]:
-    """Write ca.pem, ca.key, server.pem and server.key; OutputError when one is there already."""
+    """Writes ca.pem, ca.key, server.pem and server.key and returns their paths.
+
+    hosts: names or IP addresses of the server, the first its common name. OutputError when one of
+    the files is there already.
+    """
     names = ("ca.pem", "ca.key", "server.pem", "server.key")
     for name in names:
         if (folder / name).exists():

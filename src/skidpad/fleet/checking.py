@@ -29,7 +29,7 @@ class MessageHead:
 
 
 def check_batch(fleet: Fleet, who: Principal, told: MessageHead, body: bytes) -> Batch:
-    """The batch of a vehicle; Refused when any of it cannot be kept."""
+    """Returns the batch of a vehicle, unpacked and read by its kind; Refused when any of it is wrong."""
     content = unpack(body, fleet.limits)
     operator, manufacturer = owners_of(fleet, str(who.vehicle))
     readers: dict[Kind, Callable[[], dict[str, Any]]] = {
@@ -51,7 +51,7 @@ def check_batch(fleet: Fleet, who: Principal, told: MessageHead, body: bytes) ->
 
 
 def owners_of(fleet: Fleet, vehicle: str) -> tuple[str, str]:
-    """Operator and manufacturer of a vehicle, which never change."""
+    """Returns operator and manufacturer of a vehicle, which are read once and remembered."""
     known = fleet.owners.get(vehicle)
     if known is None:
         with fleet.engine.connect() as connection:

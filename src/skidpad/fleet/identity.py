@@ -11,17 +11,20 @@ PREFIX = "skidpad-"
 
 
 def new_id() -> str:
-    """An identifier that says nothing about what it names (32 hexadecimal digits)."""
+    """Returns a random identifier of 32 hexadecimal digits."""
     return secrets.token_hex(ID_BYTES)
 
 
 def new_token() -> str:
-    """A credential of 256 random bits; only its hash is kept."""
+    """Returns a new credential of 256 random bits."""
     return PREFIX + secrets.token_urlsafe(TOKEN_BYTES)
 
 
 def token_hash(token: str) -> str:
-    """What is kept of a credential: it has 256 random bits, so a plain hash cannot be searched."""
+    """Returns the SHA-256 of a credential, all that is kept of it.
+
+    It has 256 random bits, so a plain hash cannot be searched.
+    """
     return digest(token.encode("utf-8", "surrogatepass"))
 
 

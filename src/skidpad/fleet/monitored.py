@@ -24,7 +24,7 @@ MINUTE = 60.0  # s
 def spool_folder(
     spool: Spool, folder: Path, release: str = "", judged: tuple[int, int] | None = None
 ) -> list[str]:
-    """Spool what `skidpad monitor` wrote into `folder`; returns the keys of its batches.
+    """Spools what `skidpad monitor` wrote into `folder`; returns the keys of its batches.
 
     release: the update under which the vehicle drove, "" for what it came with. judged: errors in
     the drive under it, and under what the vehicle had before.
@@ -44,14 +44,14 @@ def spool_folder(
 
 
 class Lookout:
-    """Folders that a monitor writes drives into; `spool` adds each drive once, when it is complete."""
+    """Watches folders that a monitor writes drives into; adds each drive once, when it is complete."""
 
     def __init__(self, folders: Sequence[Path], release: str = "") -> None:
         self.folders, self.release = folders, release
         self._known: set[Path] = set()
 
     def spool(self, spool: Spool) -> int:
-        """Add the drives that were completed since the last time; how many."""
+        """Adds the drives that were completed since the last call; returns how many."""
         inside = [path for folder in self.folders for path in (folder, *sorted(folder.glob("*")))]
         new = [p for p in inside if p not in self._known and (p / monitored.SUMMARY).exists()]
         for path in new:
@@ -61,7 +61,10 @@ class Lookout:
 
 
 def hazard_batches(folder: Path) -> Iterator[bytes]:
-    """The records of a folder in batches; a record cut off at the end is left out."""
+    """Yields the records of a folder in batches of RECORDS or BYTES at most; a cut-off one is left out.
+
+    Raises FileError where the folder holds no records of a monitor.
+    """
     path = folder / TEXT_FILE
     try:
         text = path.read_bytes()
@@ -88,7 +91,7 @@ def _join_batch(batch: list[bytes]) -> bytes:
 
 
 def indicator_rows(table: pl.DataFrame) -> bytes:
-    """Values of a drive by minute, subject and indicator: one JSON row per line."""
+    """Returns finite values of a drive by minute, subject and indicator: one JSON row per line."""
     found = (
         table.filter(pl.col("value").is_finite())
         .with_columns(minute=(pl.col("t") / MINUTE).floor().cast(pl.Int64))

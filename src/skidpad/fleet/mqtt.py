@@ -33,7 +33,7 @@ log = logging.getLogger(__name__)
 
 
 class BatchListener:
-    """One thread that takes batches from a broker and answers them."""
+    """Takes batches from a broker in one thread and answers them."""
 
     def __init__(self, fleet: Fleet, broker: Broker, timeout_s: float = 10.0) -> None:
         library()
@@ -45,12 +45,12 @@ class BatchListener:
         self._thread = threading.Thread(target=self._run, name="fleet-mqtt")
 
     def start(self) -> None:
-        """Begin to listen, and go on whenever the broker is there."""
+        """Starts the thread, which connects again whenever the broker went away."""
         self._main = self._loop.create_task(self._listen())
         self._thread.start()
 
     def close(self) -> None:
-        """End the thread; a batch without an answer is sent again by its vehicle."""
+        """Ends the thread; a batch without an answer is sent again by its vehicle. Not to be called twice."""
         if self._main is not None:
             self._loop.call_soon_threadsafe(self._main.cancel)
             self._thread.join()
@@ -91,7 +91,11 @@ class BatchListener:
             task.add_done_callback(lambda _: free.release())
 
     async def _answer(self, client: Any, message: Any) -> None:
-        """Takes a message's batch and publishes the answer; none where its response topic is not allowed."""
+        """Takes a message's batch and publishes status and content to its response topic.
+
+        Where that topic is not allowed the batch is taken unanswered; an answer that cannot be published
+        is logged and lost.
+        """
         where = str(getattr(message.properties, "ResponseTopic", ""))
         status, content = await self._take_message(message)
         if not re.fullmatch(ANSWER, where):  # else anybody could have the fleet publish anywhere
@@ -104,7 +108,7 @@ class BatchListener:
             log.warning("mqtt: an answer was lost (%s)", error)
 
     async def _take_message(self, message: Any) -> tuple[int, dict[str, Any]]:
-        """Status and content as over HTTPS."""
+        """Takes a message's batch; returns status and content as over HTTPS, never raises."""
         told = dict(getattr(message.properties, "UserProperty", []))
         try:
             who = self.guard.principal(told.get("authorization"))
@@ -125,7 +129,7 @@ class BatchListener:
 
 
 def _read_properties(topic: str, told: dict[str, str]) -> MessageHead:
-    """What stands beside the body; Refused (422) when it is not what it must be."""
+    """Returns what stands beside a message's body; Refused (422) when it is not what it must be."""
     kind, key, drive = topic.rpartition("/")[2], told.get("key", ""), told.get("drive", "")
     if kind not in {k.value for k in Kind}:
         raise Refused(422, f"the topic must end with one of: {', '.join(k.value for k in Kind)}")

@@ -10,7 +10,7 @@ log = logging.getLogger(__name__)
 
 
 class Rounds:
-    """Does `work` every `pause_s` seconds or when woken; a round that fails is followed by the next."""
+    """Calls `work` every `pause_s` s or when woken, in a thread; after one that fails comes the next."""
 
     def __init__(self, name: str, work: Callable[[], None], pause_s: float) -> None:
         self.name, self.work, self.pause_s = name, work, pause_s
@@ -24,11 +24,11 @@ class Rounds:
         self._thread.start()
 
     def wake(self) -> None:
-        """Begins the next round at once."""
+        """Begins the next round at once, or as soon as the present one is done."""
         self._wake.set()
 
     def close(self) -> None:
-        """End the thread; safe to call twice."""
+        """Ends the thread after its present round; safe to call twice."""
         self.ended.set()
         self._wake.set()
         if self._thread is not None:

@@ -36,7 +36,10 @@ class Listen:
 
 
 def run(fleet: Fleet, listen: Listen, lines: MapLines, say: Callable[[str], None]) -> None:
-    """Serve until a signal ends it."""
+    """Serves pages and interface, with dispatcher and upkeep, until a signal ends it.
+
+    lines: roads of a map by its name. say: takes the address.
+    """
     one = bind_socket(listen.host, listen.port)
     port = int(one.getsockname()[1])
     sessions = Sessions(INVITED_S)

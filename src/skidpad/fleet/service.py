@@ -33,7 +33,7 @@ class _Bucket:
 
 
 class Rate:
-    """A bucket per credential: so many requests at once, refilled at a lasting rate."""
+    """Grants requests by a bucket per credential: `burst` at once, refilled at `per_s`."""
 
     def __init__(self, per_s: float, burst: int) -> None:
         self.per_s, self.burst = per_s, float(burst)
@@ -41,7 +41,7 @@ class Rate:
         self._lock = Lock()
 
     def take(self, who: str, now: float) -> float:
-        """0 when a request is granted, else the seconds until one will be."""
+        """Takes one request at `now` s; returns 0 when it is granted, else the s until one will be."""
         with self._lock:
             bucket = self._buckets.setdefault(who, _Bucket(self.burst, now))
             gained = max(0.0, now - bucket.at) * self.per_s
@@ -86,15 +86,15 @@ class Fleet:
     owners: dict[str, tuple[str, str]] = field(default_factory=dict)  # tenants of a vehicle: facts
 
     def repository(self, tenant: str) -> Repository:
-        """The updates of a maker."""
+        """Returns the repository of updates of a manufacturer."""
         return Repository(self.data / "updates" / tenant, self.online_key(tenant), self.clock)
 
     def online_key(self, tenant: str) -> Path:
-        """Where the key lies that signs when a maker's updates were current."""
+        """Returns the path of the key that signs when a manufacturer's updates were current."""
         return self.data / "keys" / f"updates-{tenant}.key"
 
     def close(self) -> None:
-        """Commit what was submitted and let go of everything."""
+        """Commits what was submitted and closes all threads and stores."""
         self.dispatcher.close()
         self.intake.close()
         self.warehouse.close()
@@ -109,7 +109,7 @@ def open_fleet(
     relays: Sequence[Relay] = (),
     locate: Locate | None = None,
 ) -> Fleet:
-    """Open the store at `places`, made or brought to this version where needed."""
+    """Opens the store at `places`, made or brought to this version where needed; nothing is served yet."""
     engine, limits = open_store(places), limits or Limits()
     blobs = Blobs(places.blobs or str(places.data.absolute() / "blobs"))
     hub = Hub()
@@ -131,13 +131,13 @@ def open_fleet(
 
 
 def _tell(hub: Hub, batch: Batch) -> None:
-    """Who owns the vehicle of a batch may want to look."""
+    """Counts a batch for the topics of operator and manufacturer, whose pages may want to look."""
     for tenant in {batch.operator, batch.manufacturer}:
         hub.tell(f"{CAME} {tenant}")
 
 
 def open_store(places: Places) -> Engine:
-    """The store alone, for commands that do not serve."""
+    """Opens the database alone, made or migrated where needed; OutputError for an unusable folder."""
     if places.data.exists() and not places.data.is_dir():
         raise OutputError(f"--data {places.data} is a file; the fleet's store is a folder")
     try:

@@ -45,7 +45,10 @@ class Spool:
             raise OutputError(f"{folder}: cannot be written ({error.strerror})") from error
 
     def add_batch(self, kind: Kind, content: bytes, drive: str = "") -> str:
-        """Keep a batch until it is acknowledged; the same batch twice is one. Returns its key."""
+        """Keeps a batch until it is acknowledged and returns its key; one kept or acknowledged before is one.
+
+        Raises OutputError when more than SPOOL_MAX bytes would wait.
+        """
         key = digest(b"\n".join((kind.value.encode(), drive.encode(), content)))[:48]
         if key in self.read_receipts():
             return key
@@ -57,7 +60,7 @@ class Spool:
         return key
 
     def batches(self) -> Iterator[Waiting]:
-        """What waits, oldest first; damaged files are set aside, not sent."""
+        """Yields what waits, oldest first; damaged files are renamed to .damaged and left out."""
         paths = [(p.stat().st_mtime_ns, p.name, p) for p in self.waiting.glob("*.batch")]
         for _, _, path in sorted(paths):
             try:
@@ -66,7 +69,7 @@ class Spool:
                 path.rename(path.with_suffix(".damaged"))
 
     def acknowledge(self, key: str, receipt: dict[str, Any]) -> None:
-        """Note the receipt durably, then let go of the batch."""
+        """Appends the receipt durably, then deletes the batch."""
         with (self.folder / "acknowledged.jsonl").open("ab") as file:
             file.write(json.dumps({"key": key, **receipt}).encode() + b"\n")
             file.flush()
@@ -74,12 +77,12 @@ class Spool:
         (self.waiting / f"{key}.batch").unlink(missing_ok=True)
 
     def refuse(self, key: str) -> None:
-        """Set a batch aside that the fleet will never take."""
+        """Renames a batch that the fleet will never take to .refused."""
         path = self.waiting / f"{key}.batch"
         path.rename(path.with_suffix(".refused"))
 
     def read_receipts(self) -> dict[str, dict[str, Any]]:
-        """Receipts by key; a line cut off by a kill is left out, its batch still waits."""
+        """Returns the receipts by key; a line cut off by a kill is left out, its batch still waits."""
         path = self.folder / "acknowledged.jsonl"
         found = {}
         for line in path.read_bytes().splitlines() if path.exists() else []:

@@ -12,7 +12,7 @@ FREE = 1024 * 1024  # bytes unpacked below which no ratio is asked for
 
 
 def unpack(body: bytes, limits: Limits) -> bytes:
-    """The content of one gzip member; Refused when it is none, cut, or beyond a limit.
+    """Returns the content of one gzip member; Refused (400, 413) when it is none, cut, or too large.
 
     At most the allowed size is ever produced, however much the body would unpack to.
     """

@@ -22,7 +22,7 @@ OWNERS = ((Role.OPERATOR, vehicles.c.operator), (Role.MANUFACTURER, vehicles.c.m
 
 
 class Upkeep:
-    """One thread; `work` is one round of it, and tests call it themselves."""
+    """Looks after releases, trends and analyses in one thread; `work` is one round of it."""
 
     def __init__(self, fleet: Fleet) -> None:
         self.fleet = fleet
@@ -33,11 +33,11 @@ class Upkeep:
         self._rounds.start()
 
     def close(self) -> None:
-        """End the thread; safe to call twice."""
+        """Ends the thread; safe to call twice."""
         self._rounds.close()
 
     def work(self) -> None:
-        """Sum up what came; look at releases; analyse whoever has hazards newer than the last analysis."""
+        """Does one round: sums indicators up, looks at releases, analyses tenants with newer hazards."""
         compact(self.fleet)
         self._look()
         for who in self._tenants():
@@ -45,7 +45,7 @@ class Upkeep:
                 analyse(self.fleet, who)
 
     def _look(self) -> None:
-        """A bad update is taken back without anybody asking."""
+        """Looks at every release under way, so that a bad update is taken back unasked."""
         with self.fleet.engine.connect() as connection:
             found = under_way(connection)
         for tenant, release in found:
@@ -54,7 +54,7 @@ class Upkeep:
                 look_at(self.fleet, who, release)
 
     def _tenants(self) -> list[Principal]:
-        """The service in the place of everyone who owns a vehicle."""
+        """Returns a principal of the service for each tenant and role that owns a vehicle."""
         with self.fleet.engine.connect() as connection:
             return [
                 Principal(SERVICE, str(tenant), role, SERVICE)

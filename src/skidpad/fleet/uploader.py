@@ -36,7 +36,7 @@ class Sent:
 
 
 def poster(client: httpx.Client, clock: Callable[[], float] = time.time) -> Post:
-    """Sends a batch through `client`, whose headers carry the credential."""
+    """Returns a function that sends a batch through `client`, whose headers carry the credential."""
 
     def post(batch: Waiting) -> httpx.Response:
         headers = {
@@ -54,7 +54,10 @@ def poster(client: httpx.Client, clock: Callable[[], float] = time.time) -> Post
 def mqtt_poster(
     broker: Broker, token: str, clock: Callable[[], float] = time.time, timeout_s: float = TIMEOUT_S
 ) -> Post:
-    """Sends a batch through a broker; the answer reads like the one over HTTPS."""
+    """Returns a function that sends a batch through a broker; its answer reads like one over HTTPS.
+
+    That raises httpx.TransportError when no answer comes within `timeout_s`.
+    """
     library()
 
     def post(batch: Waiting) -> httpx.Response:
@@ -89,7 +92,7 @@ async def _through(
 
 
 def send(spool: Spool, post: Post) -> Sent:
-    """Send what waits, once each; what cannot be sent now goes on waiting.
+    """Sends what waits, once each, until the fleet is busy or off line; returns the counts.
 
     BackendError when the credential is not accepted: waiting would not help.
     """
@@ -115,7 +118,10 @@ def send(spool: Spool, post: Post) -> Sent:
 def send_all(
     spool: Spool, post: Post, patience_s: float, sleep: Callable[[float], None] = time.sleep
 ) -> Sent:
-    """Send until nothing waits, pausing ever longer; gives up after `patience_s` of pauses."""
+    """Sends until nothing waits, pausing ever longer; gives up after `patience_s` of pauses.
+
+    Returns the sums of all rounds. BackendError as in `send`.
+    """
     pause, paused, acknowledged, refused = FIRST_PAUSE_S, 0.0, 0, 0
     while True:
         sent = send(spool, post)
@@ -134,7 +140,7 @@ def rounds(
     every_s: float,
     sleep: Callable[[float], None] = time.sleep,
 ) -> Iterator[Sent]:
-    """Look for what is new and send what waits, again and again; what became of it, each time."""
+    """Yields what became of the spool after each round: `look`, `send_now`, then `every_s` s of sleep."""
     while True:
         look()
         yield send_now()

@@ -74,7 +74,7 @@ class Moments(NamedTuple):
 
 
 class Warehouse:
-    """The file of one service; safe between threads, one at a time."""
+    """Holds sums of indicators in the file of one service; one thread at a time."""
 
     def __init__(self, path: Path) -> None:
         """The file is opened when first asked: only who serves asks, and only one process can."""
@@ -98,27 +98,30 @@ class Warehouse:
         return self._opened
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Closes the file if it was opened."""
         with self.lock:
             if self._opened is not None:
                 self._opened.close()
 
     def since(self) -> float:
-        """The time of receipt from which on batches may be unknown here, s; call under the lock."""
+        """Returns the time of receipt in s from which on batches may be unknown here; call under the lock.
+
+        Before `complete` that is 0.
+        """
         newest = self._database.execute("SELECT max(received) FROM taken").fetchone()
         if self._whole or newest is None or newest[0] is None:
             return 0.0
         return float(newest[0]) - LATE_S
 
     def unknown(self, ids: Sequence[str]) -> set[str]:
-        """Which of these batches were not taken yet; call under the lock."""
+        """Returns the ids that were not taken yet; call under the lock."""
         rows = self._database.execute(
             "SELECT id FROM taken WHERE id IN (SELECT unnest($ids))", {"ids": list(ids)}
         )
         return set(ids) - {str(row[0]) for row in rows.fetchall()}
 
     def take(self, batches: Sequence[tuple[str, float]], rows: pl.DataFrame) -> None:
-        """Add the rows of these batches (id, time), all or none; call under the lock."""
+        """Adds the rows of these batches (id, time in s), all or none; call under the lock."""
         with TemporaryDirectory() as folder:
             file = Path(folder) / "rows.parquet"
             rows.write_parquet(file)
@@ -135,11 +138,14 @@ class Warehouse:
                 raise
 
     def complete(self) -> None:
-        """Whether every batch has been taken; call under the lock."""
+        """Notes that every batch has been taken, so that `since` skips old ones; call under the lock."""
         self._whole = False
 
     def moments(self, column: str | None, tenant: str, days: int) -> list[Moments]:
-        """Lists sums over vehicles of counts and their products, per indicator and stretch of `days` days."""
+        """Returns sums over vehicles per indicator and stretch of `days` days.
+
+        column: of the owner ("operator" or "manufacturer") that must be `tenant`; None: all vehicles.
+        """
         told: dict[str, object] = {"days": days}
         right = "true"
         if column is not None:

@@ -81,7 +81,7 @@ class Principal:
     vehicle: str | None = None  # of the role vehicle: which one
 
     def may(self, action: Action) -> bool:
-        """Whether the role has the right; which rows it holds for is `store.rights`."""
+        """Returns True when the role has the right; which rows it holds for is `store.rights`."""
         return self.role in RIGHTS[action]
 
 

@@ -17,7 +17,7 @@ MONITORED = ".monitor"  # suffix of the folder beside a recording
 def open_listeners(
     links: Links, channels: Sequence[str], recording: Path
 ) -> Iterator[list[Listener]]:
-    """Opens the listeners of a drive that is recorded as `recording`."""
+    """Yields the started listeners of a drive that is recorded as `recording`; closes them at the end."""
     with ExitStack() as stack:
         listeners: list[Listener] = []
         if links.monitor:

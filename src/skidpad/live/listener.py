@@ -8,10 +8,10 @@ from skidpad.recording.channels.mcap_files import Item
 
 
 class Listener(Protocol):
-    """Told every item in the order of the recording, and when a cycle has been said in full."""
+    """Takes every item of a drive in the order of the recording, and the end of each cycle."""
 
     def hear(self, channel: int | None, item: Item) -> None:
-        """Takes in one item; `channel` is the index of the channel that said it."""
+        """Takes in one item; `channel`: index of the channel that said it, None for none."""
         ...
 
     def cycle_over(self, k: int, t: float) -> None:
@@ -19,5 +19,5 @@ class Listener(Protocol):
         ...
 
     def close(self) -> None:
-        """The drive is over; whatever runs beside it has ended on return."""
+        """Ends the listener after the drive; what runs beside it has ended on return."""
         ...

@@ -31,7 +31,7 @@ START_PATIENCE = 600.0  # s: kernels may have to be compiled first
 
 
 class MonitorLink:
-    """A `Listener` that passes everything on to `skidpad.live.child`."""
+    """Passes everything that it hears on to a process of `skidpad.live.child`."""
 
     def __init__(
         self, channels: Sequence[str], folder: Path, settings: MonitorLinkSettings
@@ -54,11 +54,11 @@ class MonitorLink:
             self._queue.start()
 
     def hear(self, channel: int | None, item: Item) -> None:
-        """Gather what is said in this cycle."""
+        """Gathers an item for the cycle that is under way."""
         self._cycle.append(pack_item(channel, item))
 
     def cycle_over(self, k: int, t: float) -> None:
-        """Send the cycle, or drop it whole."""
+        """Sends the gathered cycle; a live link drops it whole, and counts it, when the queue is full."""
         self._cycle.append(cycle_mark(k, t, time.monotonic_ns()))
         content = b"".join(self._cycle)
         self._cycle.clear()
@@ -69,7 +69,7 @@ class MonitorLink:
             self.missing.append(k)
 
     def close(self) -> None:
-        """End the monitor and write what became of the link."""
+        """Ends the monitor, waits for it, and writes what became of the link."""
         self._queue.close()
         self._push(end_mark())
         assert self.process.stdin is not None
@@ -82,7 +82,7 @@ class MonitorLink:
 
     @property
     def outcome(self) -> LinkOutcome:
-        """What became of it so far."""
+        """Returns what became of the link so far."""
         return LinkOutcome(
             flow=self.settings.flow,
             cycles=self.cycles,
@@ -97,7 +97,10 @@ class MonitorLink:
             self.missing.append(k)
 
     def _push(self, content: bytes) -> bool:
-        """Write everything into the pipe, waiting for room; False when the monitor is gone."""
+        """Writes everything into the pipe, waiting for room; False when the monitor is gone.
+
+        One that takes nothing for `patience` s is killed.
+        """
         view = memoryview(content)
         while view and not self.ended:
             _, writable, _ = select.select([], [self._pipe], [], self.settings.patience)
@@ -118,7 +121,7 @@ class MonitorLink:
         self.ended = self.ended or f"{why}, after {self.cycles} cycles"
 
     def _last_words(self) -> str:
-        """How the process ended, with the last line that it said."""
+        """Returns how the process ended, with the last line that it said; kills one that lives on."""
         try:
             code = self.process.wait(self.settings.patience)
         except subprocess.TimeoutExpired:  # it hears no more, and lives
@@ -168,7 +171,7 @@ class _Queue:
         self.thread.start()
 
     def offer(self, k: int, content: bytes) -> bool:
-        """False when there is no room."""
+        """Queues cycle k; returns False, and keeps nothing, when there is no room."""
         with self.changed:
             if len(self.waiting) >= self.capacity:
                 return False
@@ -185,7 +188,7 @@ class _Queue:
             self.thread.join()
 
     def _run(self) -> None:
-        """Delivers the waiting cycles in order until the queue is closing and empty; runs in a thread."""
+        """Delivers the waiting cycles in order until the queue is closing and empty; in a thread."""
         while True:
             with self.changed:
                 self.changed.wait_for(lambda: bool(self.waiting) or self.closing)
@@ -198,7 +201,7 @@ class _Queue:
 def _start(
     channels: Sequence[str], folder: Path, pin: int | None, errors: int
 ) -> subprocess.Popen[bytes]:
-    """The process; it finds the same Skidpad as this one."""
+    """Starts the monitor's process, which finds the same Skidpad as this one; errors: a descriptor."""
     root = str(Path(skidpad.__file__).parents[1])
     path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
     words = [str(folder), json.dumps(list(channels)), json.dumps(pin)]

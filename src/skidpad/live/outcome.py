@@ -25,18 +25,18 @@ class LinkOutcome(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def sentence(self) -> str:
-        """The outcome as one line of text."""
+        """Returns the outcome as one line of text."""
         lost = f", {len(self.missing)} of them missing" if self.missing else ""
         return f"{self.cycles} cycles{lost}; {self.ended}"
 
 
 def write_outcome(folder: Path, outcome: LinkOutcome) -> None:
-    """Write it into the monitor's folder."""
+    """Writes the outcome as link.json into the monitor's folder."""
     write_bytes(folder / LINK, msgspec.json.format(msgspec.json.encode(outcome), indent=1))
 
 
 def read_outcome(folder: Path) -> LinkOutcome:
-    """The outcome in a monitor's folder."""
+    """Returns the outcome in a monitor's folder; FileError where there is none."""
     path = folder / LINK
     outcome: LinkOutcome = decode_json(read_bytes(path, "outcome"), str(path), LinkOutcome)
     return outcome

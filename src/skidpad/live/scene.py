@@ -31,7 +31,10 @@ MONITORED = ".monitor"
 
 
 class ScenePublisher:
-    """A `Listener` with a WebSocket server on 127.0.0.1; a client that connects late sees the next cycle."""
+    """Publishes a Foxglove scene by a WebSocket server on 127.0.0.1.
+
+    A client that connects late sees the next cycle.
+    """
 
     def __init__(self, channels: Sequence[str], recording: Path, port: int) -> None:
         self.channels = tuple(channels)
@@ -61,7 +64,7 @@ class ScenePublisher:
             self.words[ARBITER].log(word | {"scores": scores}, log_time=round(item.t * NS))
 
     def cycle_over(self, k: int, t: float) -> None:
-        """Send the cycle, and alarms of the monitor beside this drive."""
+        """Sends the cycle's entities, and new alarms of the monitor beside this drive."""
         del k
         self.scene.log(fg.SceneUpdate(entities=self.entities), log_time=round(t * NS))
         self.entities = []
@@ -82,7 +85,10 @@ class ScenePublisher:
 
 
 def entity_of(name: str, number: int, frame: ChannelFrame) -> Any:
-    """One channel's world: ego and objects as boxes, plan and predictions as lines."""
+    """Returns one channel's world as a Foxglove entity: bodies as boxes, plan and predictions as lines.
+
+    number: of the channel, which chooses its colour.
+    """
     r, g, b = COLOURS[number % len(COLOURS)]
     dark, light = fg.Color(r=r, g=g, b=b, a=0.9), fg.Color(r=r, g=g, b=b, a=0.4)
     cubes, lines = [], []

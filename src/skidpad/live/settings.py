@@ -50,7 +50,7 @@ class Links(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def flow(self) -> Flow:
-        """Whether the drive waits for its listeners."""
+        """Returns the flow: live drives never wait for their listeners, others do."""
         return Flow.LIVE if self.live else Flow.LOSSLESS
 
 

@@ -37,7 +37,7 @@ Clock = Callable[[], int]  # ns
 
 
 class Timer:
-    """Time per part of a cycle (C-232)."""
+    """Takes the time per part of a cycle (C-232)."""
 
     def __init__(self, clock: Clock) -> None:
         self.clock = clock
@@ -50,16 +50,16 @@ class Timer:
         self.last = self.clock()
 
     def lap(self, name: str) -> None:
-        """The part `name` of the cycle is done."""
+        """Notes the ms since the last lap as those of the part `name`."""
         now = self.clock()
         self.rows[-1][name] = (now - self.last) / 1e6
         self.last = self.clock()
 
     def end(self) -> None:
-        """The cycle is judged and written."""
+        """Ends a cycle that is judged and written; does nothing here."""
 
     def table(self) -> pl.DataFrame:
-        """Milliseconds per part and cycle; total = all parts but the writing (DC-65)."""
+        """Returns the ms per part and cycle; total: all parts but the writing (DC-65)."""
         return pl.DataFrame(self.rows).with_columns(total=pl.sum_horizontal("prepare", *MODULES))
 
 
@@ -70,9 +70,10 @@ def watch(
     timer: Timer | None = None,
     alarms: Alarms | None = None,
 ) -> Watched:
-    """Monitor `source`; writes indicators, hazards, a summary, and times if given a timer.
+    """Monitors `source`; writes indicators, hazards, a summary, and times if given a timer.
 
-    With `alarms` each cycle is judged as it comes; else times are taken of warm code.
+    With `alarms` each cycle is judged as it comes; else times are taken of warm code. FileError for
+    a recording without a cycle.
     """
     monitor = Monitor(source.channels, settings)
     log = IndicatorLog(columns(monitor))
@@ -112,9 +113,10 @@ def watch_whole(
     recording: str = "",
     alarms: Alarms | None = None,
 ) -> Watched:
-    """The same of a recording with this hash, in `folder` when all is complete, or as it was.
+    """Monitors as `watch` does, in `folder` when all is complete; else the folder stays as it was.
 
-    OutputError when it holds a result of another kind or of another recording.
+    recording: hash of what is watched. OutputError when the folder holds a result of another kind or
+    of another recording.
     """
     require_kind(folder, ResultKind.MONITORED)
     earlier = read_summary(folder).get("recording", "") if (folder / SUMMARY).exists() else ""
@@ -130,7 +132,7 @@ def watch_whole(
 
 
 class Alarms:
-    """Tells each hazard when it begins, while the drive goes on: one line of JSON, flushed."""
+    """Writes each hazard to a stream when it begins, during the drive: one line of JSON, flushed."""
 
     def __init__(self, stream: TextIO) -> None:
         self.stream = stream
@@ -146,7 +148,7 @@ class Alarms:
 
 
 def _warmed_up(stream: Iterator[Cycle], like: Monitor) -> Iterator[Cycle]:
-    """The same cycles, after the first ones went through another monitor: times are of warm code."""
+    """Returns the same cycles, after the first WARM_CYCLES went through another monitor."""
     head = list(islice(stream, WARM_CYCLES))
     spare = Monitor(like.channels, like.settings)
     for cycle in head:
@@ -155,7 +157,7 @@ def _warmed_up(stream: Iterator[Cycle], like: Monitor) -> Iterator[Cycle]:
 
 
 class _ContextTap:
-    """Passes messages on; words about the drive go to the monitor, for its records only."""
+    """Passes messages on; context of the drive goes to the monitor too, for its records only."""
 
     def __init__(self, source: ChannelSource, monitor: Monitor) -> None:
         self.source, self.monitor = source, monitor
@@ -167,7 +169,7 @@ class _ContextTap:
         return self.source.losses
 
     def messages(self) -> Iterator[Message]:
-        """Yields the messages of the source; passes the entries of each context to the monitor as well."""
+        """Yields the messages of the source; passes the entries of each context to the monitor."""
         for message in self.source.messages():
             if isinstance(message.item, Context):
                 self.monitor.note(message.item.entries)

@@ -37,7 +37,7 @@ _READERS: dict[int, tuple[Any, Callable[[Any], Item]]] = {
 
 
 def pack_item(channel: int | None, item: Item) -> bytes:
-    """Returns an item as a record of bytes; the true world gives none (C-021)."""
+    """Returns an item as a record of bytes, b"" for the true world (C-021)."""
     if isinstance(item, TruthFrame):
         return b""
     kind, message_of = _KINDS[type(item)]
@@ -46,17 +46,17 @@ def pack_item(channel: int | None, item: Item) -> bytes:
 
 
 def cycle_mark(k: int, t: float, now_ns: int) -> bytes:
-    """The mark behind cycle k."""
+    """Returns the record that ends cycle k at `t` s; now_ns: clock of the sender."""
     return HEAD.pack(CYCLE_OVER, NOBODY, MARK.size) + MARK.pack(k, t, now_ns)
 
 
 def end_mark() -> bytes:
-    """The mark of a drive that ended; a stream that stops without it was cut."""
+    """Returns the record of a drive that ended; a stream that stops without it was cut."""
     return HEAD.pack(END, NOBODY, 0)
 
 
 class WireSource:
-    """A stream of records read as channels; `sent_ns` is the clock of the last mark."""
+    """Reads a stream of records as channels; `sent_ns` is the clock of the last mark."""
 
     def __init__(self, stream: BinaryIO, channels: tuple[str, ...]) -> None:
         self.stream, self.channels = stream, channels
@@ -64,7 +64,10 @@ class WireSource:
         self.sent_ns = 0
 
     def messages(self) -> Iterator[Message]:
-        """All messages until the end of the drive, and a `Due` behind each cycle."""
+        """Yields all messages until the end of the drive, and a `Due` behind each cycle.
+
+        A stream that was cut sets `losses.cut`.
+        """
         while True:
             head = self.stream.read(HEAD.size)
             if len(head) < HEAD.size:
@@ -86,7 +89,7 @@ class WireSource:
                 yield Message(None if channel == NOBODY else channel, item.t, item)
 
     def _item(self, kind: int, content: bytes) -> Item | None:
-        """Returns the item that a record's bytes hold; None, counted as a loss, when foreign or malformed."""
+        """Returns the item in a record; None, counted as a loss, for a foreign or malformed one."""
         if kind not in _READERS:
             self.losses.foreign += 1
             return None

@@ -52,13 +52,13 @@ class Door:
 
 
 class Guard:
-    """An ASGI application before another one."""
+    """Wraps an ASGI application: only requests of our pages with a session, or to free paths, reach it."""
 
     def __init__(self, app: App, door: Door) -> None:
         self.app, self.door = app, door
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Let a request through, or answer it."""
+        """Passes a request on with its session's owner in the scope, or answers 403, or 303 for a token."""
         if scope["type"] == "lifespan":
             await self.app(scope, receive, send)
             return
@@ -79,7 +79,7 @@ class Guard:
         await self.app(scope, receive, _with_headers(send))
 
     def _foreign(self, scope: Scope) -> str | None:
-        """Why this request does not come from a page of ours."""
+        """Returns why this request does not come from a page of ours; None: it does."""
         hosts, origins = _header(scope, b"host"), _header(scope, b"origin")
         if len(hosts) != 1 or hosts[0].lower() not in self.door.hosts:
             return "this server does not answer to that host name"
@@ -98,7 +98,10 @@ class Guard:
     async def _turn_away(
         self, scope: Scope, receive: Receive, send: Send, said: tuple[str, str]
     ) -> None:
-        """Refuse for want of a session, to a person's browser with the log-in page as the body."""
+        """Refuses for want of a session; a browser gets the log-in page, with `said[1]` on it, as the body.
+
+        said: sentence of the refusal, what was wrong with the last attempt.
+        """
         sentence, wrong = said
         reads = scope["type"] == "http" and scope["method"] == "GET"
         if self.door.log_in is None or not reads or not _wants_html(scope):
@@ -107,7 +110,10 @@ class Guard:
         await _forbid(send, b"text/html; charset=utf-8", self.door.log_in(wrong))
 
     async def _exchange(self, scope: Scope, receive: Receive, send: Send, token: str) -> None:
-        """The cookie for the token, and on to the address without it."""
+        """Answers a token with a session's cookie and a redirect to the address without it.
+
+        A void token is refused, unless the browser has a session.
+        """
         known = self.door.sessions.who(_cookie(scope, self.door.cookie)) is not None
         id = self.door.sessions.admit(token)
         if id is None and not known:
@@ -136,7 +142,7 @@ def _query(scope: Scope) -> list[tuple[str, str]]:
 
 
 def _token(scope: Scope) -> str | None:
-    """The invitation of an address that a person opens."""
+    """Returns the token in the address of a GET request; None without one."""
     if scope["type"] != "http" or scope["method"] != "GET":
         return None
     return dict(_query(scope)).get(TOKEN)
@@ -178,7 +184,7 @@ def _with_headers(send: Send) -> Send:
 
 
 async def _refuse(scope: Scope, receive: Receive, send: Send, sentence: str) -> None:
-    """403 with one sentence; a websocket is closed before it opens, which says 403 too."""
+    """Answers 403 with one sentence; a websocket is closed before it opens, which says 403 too."""
     if scope["type"] == "websocket":
         await receive()
         await send({"type": "websocket.close", "code": REFUSED, "reason": sentence})

@@ -72,13 +72,13 @@ class Server:
             self._server.run([self._socket])
 
     def address(self, who: str = OWNER, path: str = "/") -> str:
-        """An address that opens one session for `who`."""
+        """Returns an address that opens one session for `who`."""
         shown = f"[{self.host}]" if ":" in self.host else self.host
         query = urlencode({TOKEN: self.sessions.invite(who)})
         return f"http://{shown}:{self.port}{path}?{query}"
 
     def start(self) -> None:
-        """Begin; returns once it answers."""
+        """Starts serving and returns once it answers; SkidpadError if not within STARTS_WITHIN s."""
         self._thread.start()
         deadline = time.monotonic() + STARTS_WITHIN
         while not self._server.started:
@@ -88,7 +88,7 @@ class Server:
             time.sleep(POLL)
 
     def stop(self) -> None:
-        """End; safe to call twice."""
+        """Ends serving and closes the socket; safe to call twice."""
         self._server.should_exit = True
         if self._thread.is_alive():
             self._thread.join()
@@ -103,7 +103,7 @@ class Server:
 
 
 def bind_socket(host: str, port: int) -> socket.socket:
-    """A socket at this place; ConfigError in one sentence when it cannot be had."""
+    """Returns a listening socket at this place, port 0: any free one; ConfigError when it cannot be had."""
     if not 0 <= port <= 65535:
         raise ConfigError(f"port must be between 0 and 65535, got {port}")
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
@@ -123,7 +123,10 @@ def bind_socket(host: str, port: int) -> socket.socket:
 
 
 def host_headers(host: str, port: int, names: tuple[str, ...]) -> frozenset[str]:
-    """What the header Host of a request to this server says."""
+    """Returns the values of the header Host by which browsers name this server.
+
+    names: further ones, taken with and without the port, as behind a proxy.
+    """
     known = {host.lower()}
     if is_local(host) or host in ("0.0.0.0", "::"):
         known |= {LOOPBACK, "localhost", "::1"}
@@ -134,7 +137,7 @@ def host_headers(host: str, port: int, names: tuple[str, ...]) -> frozenset[str]
 
 
 def is_local(host: str) -> bool:
-    """Whether only this machine reaches a host."""
+    """Returns True when only this machine reaches a host: localhost or a loopback address."""
     if host == "localhost":
         return True
     try:

@@ -12,7 +12,7 @@ BYTES = 32  # of a token, 256 bits
 
 
 class Sessions:
-    """Invitations that were not used yet, and sessions that came of others. Safe between threads."""
+    """Keeps invitations that are unused, and the sessions that came of others. Safe between threads."""
 
     def __init__(self, valid_s: float = inf, clock: Callable[[], float] = time.monotonic) -> None:
         """valid_s: of an invitation that nobody used; a session ends by `end` alone."""
@@ -22,7 +22,7 @@ class Sessions:
         self._admitted: dict[str, str] = {}  # id of the session, kept in a cookie: who
 
     def invite(self, who: str) -> str:
-        """A token for `who`; it opens one session."""
+        """Returns a token for `who`, which opens one session."""
         token = secrets.token_urlsafe(BYTES)
         with self._lock:
             self._forget()
@@ -30,7 +30,7 @@ class Sessions:
         return token
 
     def admit(self, token: str) -> str | None:
-        """The id of a fresh session for a token, which is worth nothing from now on."""
+        """Returns the id of a fresh session for a token, which is void then; None for a void one."""
         with self._lock:
             self._forget()
             invited = self._invited.pop(token, None)
@@ -46,11 +46,11 @@ class Sessions:
         self._invited = {t: one for t, one in self._invited.items() if one[1] >= oldest}
 
     def __len__(self) -> int:
-        """Invitations that may still be used."""
+        """Returns the number of unused invitations, those that are out of date among them."""
         return len(self._invited)
 
     def who(self, id: str | None) -> str | None:
-        """Whose session this is; None: nobody's."""
+        """Returns the owner of a session's id; None where it is of no session."""
         with self._lock:
             return None if id is None else self._admitted.get(id)
 

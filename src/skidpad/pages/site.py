@@ -23,7 +23,7 @@ body { background: var(--ground); color: var(--ink); font: 14px/1.45 system-ui, 
 
 
 def nicegui() -> Any:
-    """The module; MissingExtra without it."""
+    """Returns the module nicegui; MissingExtra without it."""
     try:
         import nicegui
     except ImportError as error:
@@ -39,10 +39,10 @@ def site(
     style: str = "",
     kept: float = KEPT,
 ) -> FastAPI:
-    """An application with these pages by path.
+    """Returns an application with these pages by path; SkidpadError for a second one in a process.
 
     routes: adds routes that are no pages; they come first, as NiceGUI answers to any path.
-    style: CSS after the house's own.
+    style: CSS after that of all sites.
     kept: s for which the page of a tab that does not answer is kept; later it is loaded anew.
     """
     module = nicegui()

@@ -50,7 +50,7 @@ INTERVALS = (
 
 
 def write_risk_report(out: Path) -> str:
-    """Write the page; returns the text to print."""
+    """Writes the page of a risk question and returns the text to print."""
     asked, found = read_risk(out), read_risk_found(out)
     write_report_page(risk_page(asked, found, read_trials(out, RISK_RUNS)), out)
     lines = [answer(asked, found), *rate_lines(asked, found)]
@@ -93,7 +93,7 @@ def answer(asked: Risk, found: RiskFound) -> str:
 
 
 def _advice(asked: Risk, found: RiskFound) -> str:
-    """Return how many runs of a level would narrow subset simulation enough; "" where that is not it."""
+    """Returns a sentence on how many runs of a level would narrow subset simulation enough, or ""."""
     subset = next((e for e in found.probabilities if e.method == SUBSET and e.p > 0.0), None)
     if subset is None or subset.high is None or SUBSET not in found.why_not:
         return ""
@@ -118,7 +118,7 @@ def _rate_text(unit: str, rate: Rate, found: RiskFound) -> str:
 
 
 def _answers(asked: Risk, found: RiskFound, trials: Sequence[Trial]) -> Answers:
-    """Return the answers at the head of the risk page: probability, kinds of crash, cost in runs."""
+    """Returns the answers at the head of the page: probability, kinds of crash, cost in runs."""
     lines = rate_lines(asked, found)
     if asked.assumptions:
         lines += [f"Inputs without a source: {', '.join(asked.assumptions)}."]
@@ -138,7 +138,7 @@ def _answers(asked: Risk, found: RiskFound, trials: Sequence[Trial]) -> Answers:
 
 
 def brute_force_runs(found: RiskFound) -> float | None:
-    """Return how many independent draws would give as narrow an interval; None without an interval.
+    """Returns how many independent draws would give as narrow an interval; None without an interval.
 
     By the normal approximation of a share: n = (1 - p) / p (1.96 / w)^2 with the relative half-width w.
     """
@@ -149,7 +149,7 @@ def brute_force_runs(found: RiskFound) -> float | None:
 
 
 def _estimates(found: RiskFound) -> Figure | None:
-    """Return each method's probability with its interval on a logarithmic axis."""
+    """Returns the figure of each method's probability and interval, log axis; None without a crash."""
     ones = [e for e in found.probabilities if e.p > 0.0]
     if not ones:
         return None
@@ -205,7 +205,7 @@ def _method_row(e: Probability) -> list[Cell]:
 
 
 def _inputs(asked: Risk, found: RiskFound) -> Table:
-    """Return the table of inputs: distribution, source, and the factor on the probability per scaling."""
+    """Returns the table of inputs: distribution, source, factor on the probability per scaling."""
     columns = [
         ("input", ""),
         ("distribution", ""),

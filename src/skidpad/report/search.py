@@ -50,7 +50,7 @@ LISTED = 20  # failures in the table
 
 
 def write_search_report(out: Path) -> str:
-    """Write the page of a search; returns the text to print."""
+    """Writes the page of a search and returns the text to print."""
     search, trials, findings = read_search(out), read_trials(out), read_findings(out)
     write_report_page(search_page(out, search, trials, findings), out)
     hazard = read_hazard(out)
@@ -84,7 +84,7 @@ def search_page(out: Path, search: Search, trials: Sequence[Trial], findings: Fi
 
 
 def answer(search: Search, trials: Sequence[Trial], findings: Findings) -> str:
-    """Return the answer in one or two sentences."""
+    """Returns the answer in one or two sentences; trials: at least one."""
     failing = [t for t in trials if t.is_failure]
     driver, runs = driver_text(search.template.driver), count_text(len(trials), "run")
     if not failing:
@@ -109,7 +109,7 @@ def _value(value: float | str) -> str:
 
 
 def _answers(search: Search, trials: Sequence[Trial], findings: Findings) -> Answers:
-    """Return the answers at the head of the search page: where it fails, and what was not counted."""
+    """Returns the answers at the head of the page: where it fails, and what was not counted."""
     unavoidable = [t for t in distinct_failures(trials) if not t.is_avoidable]
     faults = [t for t in trials if t.fault]
     items = [
@@ -133,7 +133,7 @@ def _answers(search: Search, trials: Sequence[Trial], findings: Findings) -> Ans
 def _failures(
     out: Path, search: Search, trials: Sequence[Trial], findings: Findings
 ) -> list[Block]:
-    """Return the failures by group and those that are not avoidable; a sentence where there are none."""
+    """Returns the failures by group and those that are not avoidable; a sentence without any."""
     blocks: list[Block] = []
     for group in findings.groups:
         blocks += [Text(group_sentence(group), "lead")]
@@ -174,7 +174,7 @@ def _failure_table(out: Path, search: Search, failures: Sequence[Trial], caption
 
 
 def _failure_row(out: Path, trial: Trial, likelihood: float) -> list[Cell]:
-    """Return the cells of a failure's row; it links to the run's report where its folder is kept."""
+    """Returns the cells of a failure's row, with a link to its report where its folder is kept."""
     folder = failure_folder(out, trial.number)
     href = folder.relative_to(out).as_posix() + f"/{REPORT}" if folder.is_dir() else ""
     values = ", ".join(f"{name} {_value(v)}" for name, v in trial.values.items())
@@ -190,7 +190,7 @@ def _failure_row(out: Path, trial: Trial, likelihood: float) -> list[Cell]:
 
 
 def _reference_cell(reference: Trial | None) -> Cell:
-    """Return what the reference driver came to with the values of a failure."""
+    """Returns a cell on what the reference driver came to with a failure's values: event or gap in m."""
     if reference is None or reference.fault:
         return Cell("not driven", -2.0)
     if reference.departed_s is not None:
@@ -206,7 +206,7 @@ def _number(value: float | None, spec: str) -> Cell:
 
 
 def _progress(trials: Sequence[Trial]) -> Figure:
-    """Margin of every run in turn, failures marked."""
+    """Returns the figure of every run's margin in turn, failures marked."""
     margins = np.array([t.margin for t in trials])
     bad = np.array([t.is_failure for t in trials])
     with canvas(height=2.8) as (figure, (axes,)):
@@ -228,7 +228,7 @@ def _progress(trials: Sequence[Trial]) -> Figure:
 
 
 def influence(search: Search, trials: Sequence[Trial]) -> dict[str, float]:
-    """Return how far the coordinates of failures and of other runs differ, by variable: 0 to 1.
+    """Returns how far the coordinates of failures and of other runs differ, by variable: 0 to 1.
 
     It is the largest difference of the two distribution functions (Kolmogorov and Smirnov); 0 where
     there is no failure or nothing else.
@@ -284,7 +284,7 @@ def _variable(search: Search, name: str) -> Variable:
 
 
 def _place(search: Search, name: str, trial: Trial) -> float:
-    """Return a trial's value of a variable as a coordinate: the index of a word, else the number."""
+    """Returns a trial's value of a variable as a coordinate: the index of a word, else the number."""
     value, law = trial.values[name], _variable(search, name).law
     return float(law.words.index(str(value))) if isinstance(law, Choice) else float(value)
 

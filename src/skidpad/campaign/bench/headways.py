@@ -41,7 +41,10 @@ class Source:
     read: str  # what of it could be read
 
     def distribution(self) -> Normal:
-        """Return the log-normal of the source's mean and deviation, else through its two shares."""
+        """Returns the log-normal of the source's mean and deviation, else through its two shares.
+
+        Raises ValueError when it has neither.
+        """
         if self.mean is not None and self.deviation is not None:
             variance = log(1.0 + (self.deviation / self.mean) ** 2)
             return Normal(log(self.mean) - 0.5 * variance, sqrt(variance), is_log=True)
@@ -53,7 +56,7 @@ class Source:
 
 
 def field_sources() -> list[Source]:
-    """Every source, in the order of the table."""
+    """Returns every source of headways.csv, in its order."""
     text = resources.files(__package__).joinpath("headways.csv").read_text(encoding="utf-8")
     return [_source(row) for row in csv.DictReader(text.splitlines())]
 
@@ -80,7 +83,7 @@ def _number(cell: str) -> float | None:
 
 
 def headways_of(seconds: Sequence[float]) -> dict[str, Any]:
-    """Number, quantiles in s and the shares below 1 and 2 s of headways."""
+    """Returns number, QUANTILES in s and shares below 1 and 2 s of headways; without any the number alone."""
     if not seconds:
         return {"samples": 0}
     found = np.array(seconds)
@@ -93,7 +96,10 @@ def headways_of(seconds: Sequence[float]) -> dict[str, Any]:
 
 
 def judge(seconds: Sequence[float], source: Source) -> dict[str, Any]:
-    """Headways beside those of a source: relative differences of quantiles, and whether they hold."""
+    """Returns headways beside a source's: relative differences of quantiles, and whether they hold.
+
+    They hold within QUANTILE_TOLERANCE and SHARE_TOLERANCE; None without headways.
+    """
     ours, field = headways_of(seconds), source.distribution()
     result: dict[str, Any] = {
         "source": source.name,

@@ -30,7 +30,7 @@ def estimated_minutes(seconds: float = SECONDS) -> float:
 
 
 def driven_minutes() -> float:
-    """Wall time of all 30 runs by the campaign's own workers; results are thrown away."""
+    """Drives all 30 runs by the campaign's workers, throws the results away; returns the wall time, min."""
     cells = [
         bench_run(n, weather, SensorLevel.PIXELS)
         for weather in preset_groups()["matrix"]

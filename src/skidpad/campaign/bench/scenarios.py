@@ -66,12 +66,16 @@ class ScenarioCost:
 
     @property
     def is_met(self) -> bool:
-        """Whether the measured cost reaches its target."""
+        """Returns True when the value reaches its target: at most it if `most`, else at least it."""
         return self.value <= self.target if self.most else self.value >= self.target
 
 
 def measure(seconds: float = SECONDS, repeats: int = REPEATS) -> list[ScenarioCost]:
-    """Medians; kernels and maps are loaded before, files are written and compiled outside the clock."""
+    """Returns the median speed of playing and duration of checking, of `repeats` each.
+
+    seconds: simulated per play. Kernels and maps are loaded before; files are written and compiled
+    outside the clock.
+    """
     with TemporaryDirectory() as folder:
         small, large = Path(folder) / "two.xosc", Path(folder) / "large.xosc"
         small.write_text(two_cars(SLOWER, ASIDE, seconds=seconds), encoding="utf-8")
@@ -115,7 +119,7 @@ def _by_itself(file: Path, seconds: float) -> float:
 
 
 def _drive_spec(spec: RunSpec) -> float:
-    """Times a run from its first moment to its last, with the backend and the log in memory."""
+    """Returns how many times faster than real time a run drives, in CPU time; the log stays in memory."""
     clock = Spans(Meter(), 0)
     run(spec, stage=stage_of(spec), sinks=(clock,))
     return float(len(clock.spans) * DT / (clock.spans.sum() * NS))
@@ -130,14 +134,17 @@ def _checks(file: Path, count: int) -> float:
 
 
 def long_line(size: int = LARGE) -> str:
-    """An action along so many points that the file is at least this large, in bytes."""
+    """Returns the XML of an action along so many points that a file with it has at least `size` bytes."""
     count = size // (len(VERTEX.format(0.0, 0.0)) + 2) + 1
     times = (k * VERTEX_EVERY for k in range(count))
     return LINE.format("".join(VERTEX.format(t, 200.0 + V_LINE * t) for t in times))
 
 
 def two_cars(*actions: str, seconds: float) -> str:
-    """A file with two cars on the straight; the second one acts, one action every 5 s."""
+    """Returns an OpenSCENARIO text of two cars on the straight; the second acts, one action every 5 s.
+
+    seconds: of simulation after which it stops.
+    """
     objects = "".join(
         f'<ScenarioObject name="{n}">{CAR}</ScenarioObject>' for n in ("ego", "other")
     )

@@ -61,7 +61,7 @@ class Row:
 def bench_run(
     configuration: int, weather: str, level: SensorLevel, render: Render = Render.NEEDED
 ) -> RunSpec:
-    """A run of the matrix as users run it: figure8, 20 vehicles, recommended settings."""
+    """Returns a run of the matrix as users run it: figure8, 20 vehicles, recommended settings."""
     return RunSpec(
         driver=AdasDriver(label=str(configuration), functions=functions_of(configuration)),
         weather=find_weather(weather),
@@ -71,7 +71,7 @@ def bench_run(
 
 
 def tick_costs(seconds: float = SECONDS) -> Iterator[Row]:
-    """The whole table, line by line as it is measured; each drive is driven once before."""
+    """Yields the rows of the table as they are measured; each drive is driven once before the clock."""
     for level in (SensorLevel.PIXELS, SensorLevel.OBJECTS):
         for configuration in CONFIGURATIONS:
             for weather in WEATHERS:
@@ -85,7 +85,7 @@ def tick_costs(seconds: float = SECONDS) -> Iterator[Row]:
 
 
 def warm_cost(spec: RunSpec, seconds: float) -> TickCost:
-    """The cost of a drive whose kernels are compiled."""
+    """Returns the cost of a drive of `seconds` s, after COMPILE_SECONDS s that compile its kernels."""
     tick_cost(spec, seconds=COMPILE_SECONDS)
     return tick_cost(spec, seconds)
 
@@ -97,7 +97,7 @@ class Meter:
         self.total: dict[str, int] = {}
 
     def time_calls(self, name: str, function: F) -> F:
-        """`function`, its time added to `name`."""
+        """Returns `function` wrapped so that the CPU time of its calls is added to `name`."""
 
         @wraps(function)
         def wrapper(*args: Any, **kwargs: Any) -> Any:
@@ -111,14 +111,14 @@ class Meter:
 
 
 class Spans(Sink):
-    """CPU time from moment to moment; after `warm` of them the meter begins anew."""
+    """Takes the CPU time from tick to tick; after `warm` of them it clears the meter's sums."""
 
     def __init__(self, meter: Meter, warm: int) -> None:
         self.meter, self.warm = meter, warm
         self.stamps: list[int] = []
 
     def see(self, moment: Moment) -> None:
-        """Takes the time of one more tick."""
+        """Notes the CPU time at one more tick."""
         del moment
         if len(self.stamps) == self.warm:
             self.meter.total.clear()
@@ -126,12 +126,12 @@ class Spans(Sink):
 
     @property
     def spans(self) -> np.ndarray[Any, Any]:
-        """ns per tick after the warm-up."""
+        """Returns the CPU ns of each tick after the warm-up."""
         return np.diff(self.stamps[self.warm :])
 
 
 def tick_cost(spec: RunSpec, seconds: float = 60.0) -> TickCost:
-    """Drive `spec` for some simulated seconds on the embedded simulator and measure."""
+    """Drives `spec` for some simulated s on the embedded simulator; returns its CPU time per tick."""
     cv2.setNumThreads(1)  # as in the workers (decision X-10): helpers that wait would count, too
     meter = Meter()
     spec = structs.replace(spec, duration=WARM_UP + seconds)
@@ -155,7 +155,7 @@ def tick_cost(spec: RunSpec, seconds: float = 60.0) -> TickCost:
 
 
 def _instrument(backend: EmbeddedBackend, meter: Meter) -> None:
-    """Clocks around the world's step, the sensors, and images that the stack asks for."""
+    """Replaces the backend's step, sensing and rendering by ones that the meter times."""
     world: Any = backend.world
     world.step = meter.time_calls("world", world.step)
     sensing: Any = backend.sensing
@@ -166,7 +166,10 @@ def _instrument(backend: EmbeddedBackend, meter: Meter) -> None:
 
 
 def _summary(spans: np.ndarray[Any, Any], total: dict[str, int], lazy: bool) -> TickCost:
-    """lazy: images are rendered when the stack reads them, else when the sensors observe."""
+    """Returns the cost of ticks from ns; rendering's time is taken off the part that called it.
+
+    lazy: images are rendered when the stack reads them, else when the sensors observe.
+    """
     parts = {name: ns * MS / len(spans) for name, ns in total.items()}
     if lazy:
         parts["stack"] -= parts.get("rendering", 0.0)

@@ -48,12 +48,12 @@ class TrafficRow:
 
     @property
     def mean_speed_kmh(self) -> float:
-        """Returns the mean speed over vehicles and time; at a given density the flow is in proportion."""
+        """Returns the mean speed over vehicles and time; 0 before any."""
         return self.km / self.hours if self.hours else 0.0
 
 
 def measure(asked: TrafficBench, weather: str) -> TrafficRow:
-    """Drive seed after seed until the vehicles have covered the distance."""
+    """Drives seed after seed until the vehicles have covered `asked.km`; returns what was counted."""
     row, seed = TrafficRow(weather), FIRST_SEED
     while row.km < asked.km:
         world = background_world(asked, weather, seed)
@@ -63,14 +63,14 @@ def measure(asked: TrafficBench, weather: str) -> TrafficRow:
 
 
 def measure_drive(asked: TrafficBench, weather: str, seed: int, seconds: float) -> TrafficRow:
-    """Drive one seed for that long, however far the vehicles get."""
+    """Drives one seed for `seconds` s, whatever the distance; returns what was counted."""
     row, world = TrafficRow(weather), background_world(asked, weather, seed)
     _drive(row, world, seconds, np.inf, Watch(world, row.seen, weather, seed))
     return row
 
 
 def background_world(asked: TrafficBench, weather: str, seed: int) -> World:
-    """A world as runs have it, in whose ego's car a driver of the background sits."""
+    """Returns a world as runs have it, with a background driver in the ego's car."""
     roads = Roads(map=asked.map, traffic=TrafficStart.RANDOM, vehicles=asked.vehicles - 1)
     settings = load_profile(
         "recommended", {"drivers": not asked.careless, "headways": asked.headways}

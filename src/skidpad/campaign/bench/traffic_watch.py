@@ -86,7 +86,7 @@ class TrafficCounts:
         }
 
     def beside_field(self) -> list[dict[str, Any]]:
-        """Followers beside each source that gives a distribution of them."""
+        """Returns the judged headways of followers beside each source that gives a distribution of them."""
         result = []
         for source in field_sources():
             if source.kind != "followers":
@@ -112,7 +112,7 @@ class Watch:
         self._times = np.full(n, np.inf)  # s to neighbours before the tick in which some are moved
 
     def look(self) -> None:
-        """Note what the last step brought."""
+        """Counts overlaps, moves, stands and headways of the last step; to be called after each."""
         w = self.world
         pairs = overlaps(w)
         self.seen.overlaps += len(pairs - self._touching)
@@ -124,7 +124,7 @@ class Watch:
         self._before = w.states.copy()
 
     def end(self) -> None:
-        """The drive is over: a vehicle that still stands is listed as well."""
+        """Ends the watch of a drive: a vehicle that still stands is listed as well if it stood LONG."""
         for i in range(len(self._stood)):
             self._close_stand(i)
 
@@ -196,7 +196,10 @@ class Watch:
                     self._note_follower(i, j, headway, bool(fast))
 
     def _is_follower(self, i: int, j: int) -> bool:
-        """Whether vehicle i, in steady following, is held up by j and no longer closes in."""
+        """Returns True when vehicle i, in steady following of j, wants to go HELD_UP times faster than j.
+
+        It has followed for HELD_FOR s and its speed is within NOT_CLOSING m/s of j's.
+        """
         w, v = self.world, self.world.placed["speed"]
         assert w.traffic is not None
         wanted = w.traffic.drivers.state["v_desired"][i]
@@ -240,7 +243,10 @@ def leaders(world: World) -> tuple[NDArray[np.int64], Floats]:
 
 
 def overlaps(world: World) -> set[tuple[int, int]]:
-    """Pairs of vehicles whose rectangles overlap in the plane: the separating axis theorem."""
+    """Returns the pairs of vehicles (i < j) whose rectangles overlap in the plane.
+
+    Heights differ by less than STOREY m. Method: separating axis theorem.
+    """
     s, table = world.states, world.table
     there = np.flatnonzero(s.present)
     x, y, z = s.x[there], s.y[there], s.z[there]
@@ -273,7 +279,7 @@ def _apart(boxes: list[tuple[float, float, float]], sizes: list[tuple[float, flo
 
 
 def times_to_neighbours(world: World) -> Floats:
-    """(n,) s between each vehicle and the next ahead or behind on its way; inf: none."""
+    """Returns (n,) the least s between each vehicle and the next ahead or behind on its lane; inf: none."""
     leader, gap = leaders(world)
     time: Floats = np.maximum(gap, 0.0) / np.maximum(world.placed["speed"], 0.1)
     behind = np.full(len(time), np.inf)

@@ -33,7 +33,7 @@ class Cross:
 
 
 def template(configuration: int = 2, **changes: Any) -> RunSpec:
-    """A run of the catalogue on objects, by our stack; `changes` are fields of it."""
+    """Returns a run of the catalogue on objects, by our stack; `changes` are fields of it."""
     base = RunSpec(
         driver=find_driver(configuration, label=STACK),
         course=Scenario(file=CUT_IN),
@@ -46,7 +46,7 @@ def template(configuration: int = 2, **changes: Any) -> RunSpec:
 
 @cache
 def drawn_course(scenario: str, seed: int, cutin: CutIn) -> Scenario:
-    """The scenario with what a seed varies; the same for every weather and friction (X-8)."""
+    """Returns the scenario with what a seed varies, the same for every weather and friction (X-8)."""
     return Scenario(
         file=scenario,
         parameters=dict(drawn_parameters(scenario, seed, cutin)),
@@ -57,7 +57,10 @@ def drawn_course(scenario: str, seed: int, cutin: CutIn) -> Scenario:
 
 
 def cross(template: RunSpec, varied: Cross, seeds: range) -> list[RunSpec]:
-    """Every combination; the rest as in `template`. Seeds vary slowest: pairs come early."""
+    """Returns a run for every combination, the rest as in `template`; seeds vary slowest.
+
+    Pairs that are compared so come early.
+    """
     return [
         structs.replace(
             template,
@@ -77,12 +80,12 @@ def cross(template: RunSpec, varied: Cross, seeds: range) -> list[RunSpec]:
 
 
 def scenario_of(cell: RunSpec) -> Scenario:
-    """The scenario that a run of this campaign plays."""
+    """Returns the scenario that a run plays; ConfigError when it plays none."""
     if not isinstance(cell.course, Scenario):
         raise ConfigError(f"{cell.name} plays no scenario")
     return cell.course
 
 
 def seeds(first: int, n: int) -> range:
-    """n reported seeds beginning with the first-th, from 0."""
+    """Returns n seeds from FIRST_SEED + `first` on, as reports use them."""
     return range(FIRST_SEED + first, FIRST_SEED + first + n)

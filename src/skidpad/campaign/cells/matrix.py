@@ -27,7 +27,7 @@ TUNING_SEEDS = range(900_000, 1_000_000)  # seeds for choosing parameters, never
 
 
 def published_drivers(numbers: str) -> list[AdasDriver]:
-    """`0,1,4` to drivers; "all" is all five."""
+    """Returns drivers of numbers like "0,1,4", "all" for all five; ConfigError for an unknown one."""
     if numbers == "all":
         return [AdasDriver(label=str(n), functions=f) for n, f in CONFIGURATIONS.items()]
     drivers = []
@@ -42,7 +42,7 @@ def published_drivers(numbers: str) -> list[AdasDriver]:
 
 
 def matrix_drivers(text: str) -> list[DriverSpec]:
-    """`0,4,reference` to drivers; "all" is the five configurations and the reference driver."""
+    """Returns drivers of text like "0,4,reference"; "all" is the five configurations and the reference."""
     if text == "all":
         return [*published_drivers(text), ReferenceDriver()]
     words = [word.strip() for word in text.split(",")]
@@ -53,7 +53,7 @@ def matrix_drivers(text: str) -> list[DriverSpec]:
 
 
 def drivers_with(functions: Iterable[str]) -> list[AdasDriver]:
-    """`aeb` and `acc,lca` to a driver each, named after its functions."""
+    """Returns a driver for each set of functions, such as "aeb" or "acc,lca", named after them."""
     chosen = [parse_functions(names) for names in functions]
     return [
         AdasDriver(label=join_functions(own, added) or "none", functions=own, added=added)
@@ -62,12 +62,15 @@ def drivers_with(functions: Iterable[str]) -> list[AdasDriver]:
 
 
 def join_functions(functions: Functions, added: Iterable[str] = ()) -> str:
-    """A set of functions as one word."""
+    """Returns a set of functions as one word with "+", sorted, then the added ones; "" for none."""
     return "+".join([*sorted(f.value for f in functions), *added])
 
 
 def cruising(drivers: Sequence[AdasDriver], text: str) -> list[AdasDriver]:
-    """Each driver with each cruise target: `110`, or `60:150:10`, ends included, in km/h."""
+    """Returns each driver with each cruise target in km/h: "110", or "60:150:10", ends included.
+
+    Raises ConfigError for a target out of CRUISE_RANGE or another form.
+    """
     span = text if ":" in text else f"{text}:{text}:1"
     targets = _steps("--cruise", span)
     for target in targets:
@@ -80,7 +83,10 @@ def cruising(drivers: Sequence[AdasDriver], text: str) -> list[AdasDriver]:
 
 
 def sweep(weather: Sequence[Weather], text: str) -> list[Weather]:
-    """`wetness=0:100:20` to a copy of each weather for each value, ends included."""
+    """Returns a copy of each weather for each value of a field, as "wetness=0:100:20", ends included.
+
+    Raises ConfigError for an unknown field, another form, or values out of range.
+    """
     name, equals, span = text.partition("=")
     if not equals or name not in RANGES:
         raise ConfigError(
@@ -103,7 +109,7 @@ def sweep(weather: Sequence[Weather], text: str) -> list[Weather]:
 
 
 def _steps(option: str, span: str) -> list[float]:
-    """FROM:TO:STEP to its values, ends included."""
+    """Returns the values of FROM:TO:STEP, ends included; ConfigError for another form or over SWEEP_MAX."""
     try:
         start, stop, step = (float(part) for part in span.split(":"))
     except ValueError:
@@ -120,7 +126,10 @@ def _steps(option: str, span: str) -> list[float]:
 
 
 def seeds(n: int, first: int = FIRST_SEED) -> range:
-    """n reported seeds from `first` on; common to all drivers and weathers: comparisons are paired."""
+    """Returns n seeds from `first` on, as reports use them; ConfigError where they reach tuning seeds.
+
+    Common to all drivers and weathers, so comparisons are paired.
+    """
     require_range("--seeds", n, 1, 100_000)
     require_range("--first-seed", first, 1, TUNING_SEEDS.start - n)
     return range(first, first + n)
@@ -134,7 +143,10 @@ def describe_run(driver: DriverSpec, weather: Weather, seed: int, template: RunS
 def cross(
     drivers: Sequence[DriverSpec], weather: Sequence[Weather], n: int, template: RunSpec
 ) -> list[RunSpec]:
-    """Every driver in every weather with n seeds from the template's on, the rest as there."""
+    """Returns every driver in every weather with n seeds from the template's on, the rest as there.
+
+    Raises ConfigError when two runs would have the same name.
+    """
     cells = [
         describe_run(d, w, s, template)
         for s in seeds(n, template.seed)

@@ -70,13 +70,13 @@ class Levels:
 
 
 def default_shares() -> list[float]:
-    """Levels that the weathers of the study leave, and some between; dry first."""
+    """Returns shares of dry friction, dry first: those that PRESETS leave, and BETWEEN."""
     known = [_ratio(name) for name in PRESETS]
     return sorted({*known, *BETWEEN}, reverse=True)
 
 
 def preset_of(share: float) -> str:
-    """The weather of the study that leaves this share of dry friction; empty: none does."""
+    """Returns the weather of PRESETS that leaves exactly this share of dry friction; "": none does."""
     return next((name for name in PRESETS if _ratio(name) == share), "")
 
 
@@ -86,7 +86,10 @@ def _ratio(name: str) -> float:
 
 
 def start_of_text(text: str) -> Start:
-    """`0.6` is a headway in s at the file's speed; `25m` is the public challenge's start."""
+    """Returns a start of text: "0.6" is a headway in s at the file's speed, "25m" the challenge's start.
+
+    Raises ConfigError for another text or out of HEADWAY_RANGE.
+    """
     if text == CHALLENGE:
         return Start(CHALLENGE, CHALLENGE_V, CHALLENGE_S - HALVES)
     headway = number("--headways", text, HEADWAY_RANGE, f" or {CHALLENGE}")
@@ -95,7 +98,10 @@ def start_of_text(text: str) -> Start:
 
 
 def number(option: str, text: str, allowed: tuple[float, float], otherwise: str = "") -> float:
-    """A number of an option that lists several."""
+    """Returns the finite number in a text; ConfigError, naming `option`, for another or not in `allowed`.
+
+    otherwise: what else the option takes, for the sentence of the error.
+    """
     low, high = allowed
     try:
         value = float(text)
@@ -110,7 +116,7 @@ def number(option: str, text: str, allowed: tuple[float, float], otherwise: str 
 
 
 def driver_named(name: str) -> DriverSpec:
-    """A driver of the map."""
+    """Returns the driver of this name in DRIVERS; ConfigError for an unknown one."""
     return DRIVERS[require_choice("--drivers", name, list(DRIVERS))]
 
 
@@ -130,7 +136,7 @@ class Task:
 
     @property
     def deadline_s(self) -> float:
-        """Wall time after which the run counts as hanging."""
+        """Returns the wall time in s after which the run counts as hanging."""
         return self.run.deadline_s
 
     @property
@@ -139,12 +145,12 @@ class Task:
         return scenario_of(self.run).actors
 
     def to_identity(self) -> dict[str, Any]:
-        """Everything that decides the run."""
+        """Returns everything that decides the run, as plain data."""
         return self.run.to_identity()
 
 
 def tasks(template: RunSpec, levels: Levels, seeds: range) -> list[Task]:
-    """Every combination; the rest as in `template`. Seeds vary slowest."""
+    """Returns a task for every combination, the rest as in `template`; seeds vary slowest."""
     return [
         Task(
             _run(_driven_by(template, driver, seed), mode, start, braking, share),

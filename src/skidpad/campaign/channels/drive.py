@@ -59,7 +59,7 @@ LABEL_OF = np.array([LABEL_OF_KIND[kind] for kind in ActorKind], dtype=np.int64)
 
 
 class Crew:
-    """Channels with their arbiter: a driver that thinks every other tick."""
+    """Drives by channels and their arbiter, which compute in every PERIOD-th tick."""
 
     report = NO_REPORT
 
@@ -92,11 +92,14 @@ class Crew:
 
     @property
     def mode(self) -> str:
-        """The driving channel; empty in a minimal-risk stop."""
+        """Returns the name of the driving channel; "" in a minimal-risk stop."""
         return self.decision.driving
 
     def act(self, frame: SensorFrame) -> VehicleCommand:
-        """The driving channel's command; in a minimal-risk stop brake along the first channel's path."""
+        """Returns the driving channel's command; in a minimal-risk stop it brakes on the first one's path.
+
+        To be called every tick, which it counts.
+        """
         self.ticks += 1
         if self.cycle is not None:
             self._think(self.cycle * CYCLE, frame)
@@ -105,7 +108,7 @@ class Crew:
         return VehicleCommand(brake=MINIMAL_RISK_BRAKE, steer=self.channels[0].command.steer)
 
     def _think(self, t: float, frame: SensorFrame) -> None:
-        """Computes what every channel reports at time t, and which one drives."""
+        """Updates every channel and chooses which one drives at t (s); sets `frames` and `decision`."""
         v_max = inf
         if self.guide is not None and (v_max := self.guide(t)):
             for channel in self.channels:
@@ -129,7 +132,7 @@ class Crew:
 
 
 class ChannelRecorder(Sink):
-    """Writes every cycle after the warm-up and tells listeners; it knows when the segment is over."""
+    """Writes every cycle after the warm-up to the recording and to listeners; `ended` once it is over."""
 
     def __init__(
         self, crew: Crew, writer: ChannelWriter, listeners: Sequence[Listener] = ()
@@ -142,12 +145,12 @@ class ChannelRecorder(Sink):
         self._t: float | None = None  # of the cycle under way, once cycles are written
 
     def begin(self, table: ActorTable) -> None:
-        """Writes what is recorded, before the first message."""
+        """Writes the context of the segment, before the first message."""
         about = _about(self.crew.spec, self.crew.segment)
         self._say(Context(0.0, about | weights_of(self.crew.spec, table)))
 
     def see(self, moment: Moment) -> None:
-        """The contacts of the step that led here; at the begin of a cycle what is said and true."""
+        """Notes the step's contacts; at the begin of a cycle writes what channels say and what is true."""
         crew, truth = self.crew, moment.truth
         if self._t is not None:
             self.referee.note_contacts(self._t, truth)
@@ -185,7 +188,7 @@ class Street:
         return self.recording.ended
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
-        """Words to people at the begin of each cycle."""
+        """Returns the commands to walkers and cyclists at the begin of each cycle, else none."""
         if self.crew.cycle is None:
             return ()
         return self.crew.segment.crowd.commands(self.crew.cycle * CYCLE, truth)
@@ -198,9 +201,10 @@ def drive_segment(
     guide: Guide | None = None,
     aboard: Sequence[Listener] = (),
 ) -> DriveOutcome:
-    """Drive a segment and write its recording to `path`, which appears only when complete.
+    """Drives a segment and writes its recording to `path`, which appears only when complete.
 
-    aboard: who listens besides `links`; the caller closes them.
+    aboard: listeners besides those of `links`; the caller closes them. Returns the outcome; an error of
+    the run is raised.
     """
     links = links or Links()
     segment = segment_of(spec)
@@ -230,7 +234,7 @@ def drive_segment(
 
 
 def truth_frame(t: float, truth: WorldTruth) -> TruthFrame:
-    """The true world around the ego, for evaluation only."""
+    """Returns ego and actors within TRUTH_REACH m at `t` s as they truly are, for evaluation only."""
     s, table = truth.states, truth.table
     near = s.present & (np.hypot(s.x - s.x[0], s.y - s.y[0]) < TRUTH_REACH)
     near[0] = False
@@ -253,12 +257,15 @@ def truth_frame(t: float, truth: WorldTruth) -> TruthFrame:
 
 
 def jumps_of(spec: RunSpec) -> float:
-    """How many times as often as it occurs a channel's position jumps."""
+    """Returns the factor on how often a channel's position jumps: RISKY_JUMPS for risky drivers, else 1."""
     return RISKY_JUMPS if route_of(spec).stratum is Stratum.RISKY else 1.0
 
 
 def weights_of(spec: RunSpec, table: ActorTable) -> dict[str, str]:
-    """Returns how much each risky driver counts, by his row in the true world, and each jump."""
+    """Returns as words the weights of each risky driver, by row in the true world, and of each jump.
+
+    Empty among natural drivers.
+    """
     if route_of(spec).stratum is not Stratum.RISKY:
         return {}
     drivers = [i for i, name in enumerate(table.names) if name.startswith(TRAFFIC)]
@@ -289,7 +296,7 @@ def _about(spec: RunSpec, segment: Segment) -> dict[str, str]:
 
 
 def _variant(spec: RunSpec) -> dict[str, str]:
-    """Returns in what a run differs from the route as published."""
+    """Returns the words in which a run differs from the published route; empty where it does not."""
     course = route_of(spec)
     if not course.base:
         return {}

@@ -25,7 +25,7 @@ AGAIN = 3.0  # s within which a contact with the same actor is the same collisio
 
 
 class Referee:
-    """Watches the true world and reports at the end alone."""
+    """Counts distance, contacts, red lights and stalls in the true world; `over` ends the drive early."""
 
     def __init__(self, route: RoutePath, car: CarModel, dt: float) -> None:
         self.route, self.car, self.dt = route, car, dt
@@ -42,7 +42,7 @@ class Referee:
         self._front = 0.0
 
     def observe(self, truth: WorldTruth, decision: Decision) -> None:
-        """Takes in one cycle of the true world."""
+        """Takes in one cycle of the true world; sets `over` when the ego stalled or left its route."""
         s = truth.states
         x, y, v = float(s.x[0]), float(s.y[0]), hypot(float(s.vx[0]), float(s.vy[0]))
         if self._place is not None:
@@ -64,7 +64,7 @@ class Referee:
             self.over, self.ended = True, Ending.OFF_ROUTE
 
     def note_contacts(self, t: float, truth: WorldTruth) -> None:
-        """Notes the contacts of one tick."""
+        """Counts the contacts of one tick at `t` s; those with the same body within AGAIN s are one."""
         s = truth.states
         for contact in truth.contacts:
             key = (contact.actor, contact.static)
@@ -76,7 +76,7 @@ class Referee:
             self._last[key] = t
 
     def _lines(self, truth: WorldTruth) -> None:
-        """Count a red light when the front passes its line."""
+        """Counts each red light whose line the ego's front has passed since the last call."""
         front = self.at * STEP + 0.5 * self.car.length
         for line in self.route.lines:
             if line.kind is not SignalKind.LIGHT or not self._front < line.s <= front:
@@ -86,7 +86,10 @@ class Referee:
         self._front = max(front, self._front)
 
     def _standing(self, v: float, truth: WorldTruth) -> None:
-        """Adds up the ego's standing; ends the drive as stalled where nothing explains it for so long."""
+        """Adds the ego's standing up; ends the drive after STALL_TIME s, STUCK_TIME where it is explained.
+
+        A red light or a standing vehicle ahead explains it.
+        """
         if v >= V_STANDING:
             self.stood = 0.0
             return
@@ -128,7 +131,7 @@ class Referee:
 
 
 def _queues(truth: WorldTruth) -> bool:
-    """Whether an actor stands right in front of the ego."""
+    """Returns True when an actor stands within QUEUE_REACH m right in front of the ego."""
     s = truth.states
     dx, dy = s.x[1:] - s.x[0], s.y[1:] - s.y[0]
     c, sn = cos(float(s.yaw[0])), sin(float(s.yaw[0]))

@@ -58,7 +58,7 @@ class _Row(Struct, frozen=True, forbid_unknown_fields=True):
     cyclists: int
 
     def run(self, name: str) -> RunSpec:
-        """A segment of the route."""
+        """Returns a run of this route with the name given."""
         plain = structs.asdict(self)
         weather = replace(plain.pop("weather"), name=name)
         return RunSpec(
@@ -71,7 +71,7 @@ class _Row(Struct, frozen=True, forbid_unknown_fields=True):
 
 @lru_cache(maxsize=1)
 def driven_routes() -> dict[str, RunSpec]:
-    """The shipped routes by name: where, in which weather and among whom."""
+    """Returns a run of each shipped route by name."""
     text = resources.files("skidpad.campaign.channels").joinpath("routes.yaml").read_bytes()
     rows = yaml.decode(text, type=dict[str, _Row])
     return {name: row.run(name) for name, row in rows.items()}
@@ -84,7 +84,10 @@ def chosen_routes(
     strata: Iterable[Stratum] = (Stratum.NATURAL,),
     drivers_mind_weather: bool = True,
 ) -> list[RunSpec]:
-    """The route with this name, or `all`, in each condition and stratum; on another map if given."""
+    """Returns the route of this name, or `all`, in each condition and stratum; on `map` if given.
+
+    Raises ConfigError for an unknown name.
+    """
     routes = driven_routes()
     require_choice("route", name, ["all", *routes])
     chosen = list(routes.values()) if name == "all" else [routes[name]]
@@ -99,7 +102,7 @@ def chosen_routes(
 def _variant(
     run: RunSpec, condition: Condition, stratum: Stratum, map: str | Path | None, minds: bool
 ) -> RunSpec:
-    """The run under other circumstances, with a name of its own where they differ."""
+    """Returns the run in a condition and stratum, whose name tells them unless they are its own."""
     course = run.course
     assert isinstance(course, Route)
     words = [condition.value] * (condition is not Condition.OWN)

@@ -44,21 +44,21 @@ class Segment:
 
 
 def route_of(spec: RunSpec) -> Route:
-    """The route of a segment."""
+    """Returns the route of a segment; ConfigError when it drives none."""
     if not isinstance(spec.course, Route):
         raise ConfigError(f"{spec.name} drives no route")
     return spec.course
 
 
 def crew_of(spec: RunSpec) -> ChannelCrew:
-    """Returns the channels of a segment."""
+    """Returns the channels that drive a segment; ConfigError when none do."""
     if not isinstance(spec.driver, ChannelCrew):
         raise ConfigError(f"{spec.name} is driven by no channels")
     return spec.driver
 
 
 def segment_of(spec: RunSpec) -> Segment:
-    """The world of a route; the duration decides how long the way is."""
+    """Returns the world of a route, drawn by the run's seed; the duration decides how long the way is."""
     route, seed = route_of(spec), spec.seed
     map = load_map(route.map)
     rng = stream(seed, "channels", "route")
@@ -101,7 +101,10 @@ def segment_of(spec: RunSpec) -> Segment:
 
 
 def _first_lane(map: RoadMap, rng: np.random.Generator) -> int:
-    """A lane to start on: any long one outside junctions, of town streets where there are any."""
+    """Returns a drawn lane to start on: a long one outside junctions, of town streets if there are any.
+
+    Raises ConfigError when the map has none.
+    """
     fits = np.flatnonzero(
         (map.lanes.kind == LaneKind.DRIVING)
         & (map.lanes.junction < 0)
@@ -117,7 +120,7 @@ def _first_lane(map: RoadMap, rng: np.random.Generator) -> int:
 
 
 def _places(map: RoadMap, count: int, ego: Pose, rng: np.random.Generator) -> list[Pose]:
-    """Places of background vehicles, clear of the ego and each other; fewer if the map is full."""
+    """Returns drawn places, CLEARANCE m from the ego and each other; fewer if the map is full."""
     first, size = map.lanes.first[map.samples.lane], map.lanes.size[map.samples.lane]
     at = np.arange(len(map.samples.x))
     fits = np.flatnonzero(

@@ -32,7 +32,7 @@ def keep_server(choice: BackendChoice) -> None:
 
 
 def carla_options(choice: BackendChoice, watchdog: float | None = None) -> CarlaOptions:
-    """The adapter's options; ConfigError for an unknown optimisation."""
+    """Returns the adapter's options; ConfigError for an unknown optimisation. watchdog: s, None: none."""
     from skidpad.simulation.carla.options import CarlaOptions, Optimisation
 
     names = [o.value for o in Optimisation]

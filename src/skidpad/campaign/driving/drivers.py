@@ -56,7 +56,7 @@ def describe_driver(
 def find_driver(
     stack: str | int, options: Mapping[str, object] | None = None, label: str = ""
 ) -> DriverSpec:
-    """As `describe_driver`, and the class is there: a wrong name is wrong input, no run's outcome.
+    """Returns the driver as `describe_driver` does, once a user's class was found and loaded.
 
     Raises:
         ConfigError: also when there is no such class, or it is no stack.
@@ -73,7 +73,10 @@ def find_driver(
 
 
 def _describe_ours(name: str, label: str) -> DriverSpec | None:
-    """The driver of this name that is no user's class; None for a class."""
+    """Returns the driver of this name that is no user's class; None where it is written as a class.
+
+    Raises ConfigError for a name without ":" that is unknown.
+    """
     if name in NUMBERS:
         return structs.replace(numbered_driver(NUMBERS[name]), label=label or name)
     if name == REFERENCE:

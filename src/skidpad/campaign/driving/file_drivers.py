@@ -35,7 +35,7 @@ class FollowingDriver:
         self.road = RoadLook(look)
 
     def update(self, scene: Scene, name: str) -> float:
-        """Returns the acceleration, m/s^2, behind the actor ahead in the lane."""
+        """Returns the acceleration, m/s^2, of actor `name` behind the one ahead in its lane."""
         actor = scene.actors[name]
         base, v = actor.guide.base, max(actor.guide.v, 0.0)
         m = manner(self.person, self.road, v)

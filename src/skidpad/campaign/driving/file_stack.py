@@ -93,7 +93,7 @@ class StackPilot:
         self._environments = 0  # of the file's events that it has seen
 
     def drive(self, scene: Scene, name: str) -> VehicleCommand:
-        """Returns what the stack does with what the actor's sensors see."""
+        """Returns the stack's command for what actor `name` senses; a neutral one before there is a world."""
         truth, actor = scene.truth, scene.actors[name]
         if truth is None:
             return VehicleCommand()

@@ -16,7 +16,7 @@ FIXED_KMH = 80.0
 
 
 def apply_envelope(stack: type[Stack], spec: RunSpec, setup: Setup) -> type[Stack]:
-    """Returns the stack's class with what the run puts around it."""
+    """Returns the stack's class wrapped in the run's speed envelope; the class itself without one."""
     found = choose_envelope(spec, setup)
     return stack if found is None else govern(stack, found)
 

@@ -31,16 +31,16 @@ class Driver(Protocol):
 
     @property
     def report(self) -> StackReport:
-        """What it says about its last tick."""
+        """Returns what it reports of its last tick."""
         ...
 
     @property
     def mode(self) -> str:
-        """The mode of its last tick in its own words; empty when it has none."""
+        """Returns the mode of its last tick in its own words; "" when it has none."""
         ...
 
     def begin(self, table: ActorTable) -> None:
-        """The run begins, with these actors."""
+        """Takes the actors of a run that begins."""
         ...
 
     def act(self, frame: SensorFrame) -> VehicleCommand:
@@ -49,27 +49,27 @@ class Driver(Protocol):
 
 
 class Supervising(Protocol):
-    """What stands between driver and world."""
+    """Stands between driver and world: sees the truth and may replace commands."""
 
     def observe(self, truth: WorldTruth) -> Supervision:
-        """The phase of the tick that `truth` begins."""
+        """Returns the phase of supervision in the tick that `truth` begins."""
         ...
 
     def act(self, command: VehicleCommand, report: StackReport | None = None) -> Action:
-        """What is applied in this tick."""
+        """Returns the action of this tick: the driver's command or another, and perhaps a relocation."""
         ...
 
 
 class Script(Protocol):
-    """What moves other actors and says when it is over."""
+    """Moves other actors and says when the run is over."""
 
     @property
     def ended(self) -> bool:
-        """The moment of the last step was the last one."""
+        """Returns True when the moment of the last step was the last one."""
         ...
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
-        """Words to actors for the coming step."""
+        """Returns the commands to actors for the coming step."""
         ...
 
 
@@ -90,10 +90,13 @@ class Sink:
     """Looks on and keeps what it wants; it changes nothing."""
 
     def begin(self, table: ActorTable) -> None:
-        """The run begins, with these actors."""
+        """Takes the actors of a run that begins; does nothing unless overridden."""
 
     def follow_readings(self, latest: Callable[[], list[tuple[str, str]]]) -> None:
-        """Further sensors or functions are recorded; `latest` says what they said last, in words."""
+        """Takes a function that gives the latest readings of further sensors and functions, in words.
+
+        It is called before `begin`, and only in runs that have any; does nothing unless overridden.
+        """
 
     def see(self, moment: Moment) -> None:
         """Takes in what happened in one tick."""
@@ -109,7 +112,7 @@ class Unsupervised:
         return Supervision.NONE
 
     def act(self, command: VehicleCommand, report: StackReport | None = None) -> Action:
-        """The command as it is."""
+        """Returns an action that is the command unchanged."""
         del report
         return Action(command)
 
@@ -122,7 +125,7 @@ class Timer:
 
     @property
     def ended(self) -> bool:
-        """The time is over, or the script has ended before."""
+        """Returns True when the ticks are over, or the script has ended before."""
         return self.left <= 0 or (self.script is not None and self.script.ended)
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
@@ -139,9 +142,9 @@ def loop(
     script: Script,
     sinks: Sequence[Sink],
 ) -> StackError | None:
-    """The loop itself, from the frame of the backend's reset until the script ends.
+    """Drives from the frame of the backend's reset until the script ends or the driver fails.
 
-    Returns None, or how the driver failed, which ends the run before the sinks see that moment.
+    Returns None, or how the driver failed; the sinks do not see that moment.
     """
     stepper = Stepper(backend, frame, driver, supervisor, script, sinks)
     while stepper.step() is not None:
@@ -197,7 +200,7 @@ class Stepper:
         return True
 
     def answer(self) -> Moment | None:
-        """Lets driver and script answer the frame of this tick; None when the driver fails."""
+        """Lets driver, supervisor, sinks and script answer this tick; None when the driver fails."""
         try:
             command = self.driver.act(self.frame)
             report = self.driver.report

@@ -36,7 +36,7 @@ WATER = {  # wetness and standing water in percent by the words of the standard;
 
 
 class ChangedBackend:
-    """A backend that is told what `news` says before each step; None: nothing has changed.
+    """Wraps a backend and changes its surroundings before each step by what `news` returns (None: no change).
 
     hands: what becomes of the driver's command on its way.
     """
@@ -50,26 +50,26 @@ class ChangedBackend:
         self.inner, self.news, self.hands = inner, news, hands
 
     def reset(self, setup: Setup, seed: int) -> Frame:
-        """Begins a run on the backend inside."""
+        """Begins a run on the wrapped backend and returns its first frame."""
         return self.inner.reset(setup, seed)
 
     def step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand] = ()) -> Frame:
-        """Apply the commands for one step."""
+        """Changes the surroundings if there is news, then steps by the commands; returns the frame."""
         outside = self.news()
         if outside is not None:
             self.inner.change(outside)
         return self.inner.step(self.hands(command), actor_commands)
 
     def truth(self) -> WorldTruth:
-        """Ground truth of the moment."""
+        """Returns the ground truth of the moment."""
         return self.inner.truth()
 
     def relocate(self, pose: Pose, v: float) -> None:
-        """Put the ego somewhere else."""
+        """Puts the ego at another pose with speed v, m/s."""
         self.inner.relocate(pose, v)
 
     def change(self, outside: Outside) -> None:
-        """The surroundings are others from the next step on."""
+        """Sets other surroundings from the next step on."""
         self.inner.change(outside)
 
     def branch(self, name: str) -> None:
@@ -92,7 +92,7 @@ def branch_backend(backend: Backend, name: str) -> None:
 
 
 class FileChanges:
-    """What the actions of a file that is played make of weather, road and traffic lights."""
+    """Turns actions of a played file into surroundings: weather, road, lights, lamps, hidden actors."""
 
     def __init__(self, player: Player, spec: RunSpec) -> None:
         self.player, self.done, self.noticed = player, 0, 0
@@ -107,11 +107,11 @@ class FileChanges:
 
     @property
     def weather(self) -> Weather:
-        """The weather of the present moment."""
+        """Returns the weather of the present moment."""
         return self.outside.weather
 
     def news(self) -> Outside | None:
-        """What has changed since it was asked last."""
+        """Returns the surroundings if they have changed since the last call, else None."""
         scene = self.player.scene
         unseen = frozenset([actor.name for actor in scene.actors.values() if not actor.visible])
         lights, before = held_lights(scene) if scene.signals else (), self.outside
@@ -134,19 +134,19 @@ class FileChanges:
         return None if now == before else now
 
     def new_notices(self) -> list[str]:
-        """Returns what the scenario could not do since it was asked last."""
+        """Returns what the scenario could not do since the last call, empty mostly."""
         new = self.player.scene.notices[self.noticed :]
         self.noticed += len(new)
         return new
 
     def hands(self, command: VehicleCommand) -> VehicleCommand:
-        """What the file makes of the driver's command."""
+        """Returns the driver's command with what the file's controllers override of it."""
         ego = self.player.actors.get(self.player.scenario.ego)
         return command if ego is None else ego.overridden(command)
 
 
 def in_weather_of_file(run: RunSpec, environment: Environment | None) -> RunSpec:
-    """The run in the weather that its file describes; what it leaves open is as the run has it."""
+    """Returns the run in the weather that its file describes; what the file leaves open is the run's."""
     assert isinstance(run.course, Scenario)
     course = structs.replace(run.course, weather_of_file=True)
     weather = run.weather if environment is None else weather_of(environment, run.weather, NAME)
@@ -154,7 +154,10 @@ def in_weather_of_file(run: RunSpec, environment: Environment | None) -> RunSpec
 
 
 def weather_of(environment: Environment, base: Weather, name: str) -> Weather:
-    """`base` with what an environment says; `base` itself where it says nothing of the weather."""
+    """Returns `base` with what an environment says, cut to RANGES; `base` itself if it says nothing.
+
+    name: of the weather that is returned.
+    """
     if not environment.says_weather:
         return base
     found = {**_sky(environment), **_water(environment), **_air(environment)}
@@ -174,7 +177,10 @@ def _sky(e: Environment) -> dict[str, float]:
 
 
 def sun_at(time: str) -> tuple[float, float]:
-    """Elevation and azimuth (from north, clockwise) in degrees at an ISO 8601 time."""
+    """Returns elevation and azimuth (from north, clockwise) of the sun in deg at an ISO 8601 time.
+
+    At an equinox and 45 deg north, whatever the date; FileError for no such time.
+    """
     try:
         hour, minute = (int(part) for part in time.partition("T")[2].split(":")[:2])
     except ValueError:
@@ -186,7 +192,10 @@ def sun_at(time: str) -> tuple[float, float]:
 
 
 def _water(e: Environment) -> dict[str, float]:
-    """Falling snow is not modelled: it counts by the sight that the file gives for it."""
+    """Returns the weather fields of rain and water on the road in % that an environment changes.
+
+    Falling snow is not modelled: it counts by the sight that the file gives for it.
+    """
     found = {}
     if e.fall is Fall.RAIN:
         found["precipitation"] = 100.0 * e.fall_mm_h / RAIN_FULL
@@ -212,7 +221,7 @@ def _air(e: Environment) -> dict[str, float]:
 
 
 def environment_of(weather: Weather) -> Environment:
-    """What a file can say of a weather: `weather_of` makes it of that again, as near as words are.
+    """Returns the environment of a file that is nearest to a weather; `weather_of` is its inverse.
 
     The friction scale is 1: grip follows from the weather, and a scale would count twice.
     """

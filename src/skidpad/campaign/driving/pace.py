@@ -12,7 +12,7 @@ SLOW = 0.9  # real-time factor below which a tick counts as slow (A-246)
 
 
 class Pace(Sink):
-    """Wall time of every tick."""
+    """Counts the ticks of a run, and those whose wall time was slow."""
 
     def __init__(self, dt: float) -> None:
         self.dt = dt
@@ -20,7 +20,7 @@ class Pace(Sink):
         self.last = perf_counter()
 
     def see(self, moment: Moment) -> None:
-        """Waits until the wall clock has caught up with the tick that is over."""
+        """Counts a tick, and as slow one whose real-time factor is below SLOW."""
         del moment
         now = perf_counter()
         self.slow += self.dt < SLOW * (now - self.last)
@@ -29,7 +29,7 @@ class Pace(Sink):
 
     @property
     def slow_pct(self) -> float:
-        """Percentage of ticks with a real-time factor below 0.9."""
+        """Returns the percentage of ticks with a real-time factor below SLOW; 0 before any."""
         return 100.0 * self.slow / max(self.ticks, 1)
 
 
@@ -52,11 +52,11 @@ class RealTime(Sink):
         self.dt, self.pacer = dt, Pacer(own_gc=False)
 
     def begin(self, table: ActorTable) -> None:
-        """The first tick begins now."""
+        """Starts the clock of the first tick."""
         del table
         self.pacer.begin()
 
     def see(self, moment: Moment) -> None:
-        """Wait for the end of the tick."""
+        """Waits until the tick's time is over."""
         del moment
         self.pacer.tick(self.dt)

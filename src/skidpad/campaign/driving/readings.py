@@ -40,7 +40,7 @@ class ReadingsRecorder(Sink):
 
     @property
     def is_needed(self) -> bool:
-        """Tells whether any sensor or function of the run is recorded."""
+        """Returns True when any sensor or function of the run is recorded, so that it has rows to keep."""
         return bool(self._kinds) or self._added is not None or self._governed is not None
 
     def see(self, moment: Moment) -> None:
@@ -61,7 +61,7 @@ class ReadingsRecorder(Sink):
 
     @property
     def latest(self) -> list[tuple[str, str]]:
-        """What the newest tick says, as words and a number for people."""
+        """Returns names and numbers of the newest tick as text for people; empty before the first."""
         return describe_row(self._sensors, self._rows[-1]) if self._rows else []
 
     def _describe_sensors(self) -> dict[str, RecordedSensor]:

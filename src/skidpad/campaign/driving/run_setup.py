@@ -69,7 +69,7 @@ class StackAtWheel:
 
     @property
     def report(self) -> StackReport:
-        """What the stack says about its last tick."""
+        """Returns what the stack reports of its last tick."""
         return self.stack.report
 
     @property
@@ -78,7 +78,7 @@ class StackAtWheel:
         return self.stack.mode
 
     def begin(self, table: ActorTable) -> None:
-        """Does nothing: a stack does not know the cast."""
+        """Does nothing: a stack does not know the other actors."""
 
     def act(self, frame: SensorFrame) -> VehicleCommand:
         """Returns the stack's answer to the frame."""
@@ -102,7 +102,7 @@ class Seated:
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """The world of a run, and the actors in it besides the driver."""
+    """Holds the world of a run, its supervisor, and the script that moves other actors."""
 
     map: RoadMap
     setup: Setup
@@ -112,7 +112,10 @@ class Stage:
 
     @property
     def cruise_kmh(self) -> float | None:
-        """The ego's cruise target where a scenario says it, else its first speed there (G-1)."""
+        """Returns the ego's cruise target of a scenario, else its first speed there, at least 1 km/h (G-1).
+
+        None without a scenario.
+        """
         if self.player is None:
             return None
         played = self.player.scenario
@@ -122,26 +125,26 @@ class Stage:
 
     @property
     def has_triggered_all(self) -> bool:
-        """Every event of the scenario has begun; always so without one."""
+        """Returns True when every event of the scenario has begun; always without a scenario."""
         return self.player is None or self.player.has_triggered_all
 
     @property
     def route_length(self) -> float | None:
-        """m, of the ego's route where the scenario names one."""
+        """Returns the length in m of the ego's route where the scenario names one, else None."""
         if self.player is None:
             return None
         return _number_of(self.player.scenario, ROUTE_LENGTH)
 
     @property
     def outcome(self) -> Outcome:
-        """How a drive ended in which nothing failed (decisions G-2, L-7)."""
+        """Returns how a drive without a failure ended: collision, completed, or not triggered (G-2, L-7)."""
         if self.player is not None and self.player.hit:
             return Outcome.COLLISION
         return Outcome.COMPLETED if self.has_triggered_all else Outcome.NOT_TRIGGERED
 
 
 def _number_of(played: scenarios.Scenario, name: str) -> float | None:
-    """A property of the ego that is a number; None where it has none of this name."""
+    """Returns a property of the ego that is a number; None without it, FileError for another value."""
     text = played.ego_entity.properties.get(name)
     if text is None:
         return None
@@ -157,7 +160,10 @@ def _number_of(played: scenarios.Scenario, name: str) -> float | None:
 
 
 def stage_of(spec: RunSpec) -> Stage:
-    """The stage of a run with roads or a scenario; FileError for a file that cannot be played."""
+    """Returns the world and script of a run on roads or in a scenario, built but not begun.
+
+    Raises FileError for a file that cannot be played, ConfigError for a route of channels.
+    """
     if isinstance(spec.course, Scenario):
         return _scenario(spec, spec.course)
     if not isinstance(spec.course, Roads):
@@ -226,7 +232,7 @@ def _pilot_conditions(spec: RunSpec) -> PilotConditions:
 def load_scenario(
     course: Scenario, conditions: PilotConditions = NO_CONDITIONS
 ) -> scenarios.Scenario:
-    """The file of a course, compiled; ScenarioError lists all that keeps it from being played.
+    """Returns the compiled file of a course; ScenarioError lists all that keeps it from being played.
 
     conditions: in what stacks of other actors drive.
     """
@@ -237,7 +243,7 @@ def load_scenario(
 def check_scenario(
     course: Scenario, conditions: PilotConditions = NO_CONDITIONS
 ) -> scenarios.Compiled:
-    """The same, with everything that was found."""
+    """Returns the check of a course's file, with everything that was found, playable or not."""
     own = {**FILE_DRIVERS, STACK_NAME: PilotMaker(conditions)}
     file = scenario_file(course.file) if course.file in NAMES else Path(course.file)
     return scenarios.check(
@@ -252,7 +258,7 @@ def check_scenario(
 
 
 def _load_registered(texts: Sequence[str]) -> dict[str, type[Any]]:
-    """The classes that a user gives names: NAME=module:Class."""
+    """Returns the classes that a user gives names, of texts NAME=module:Class; ConfigError otherwise."""
     found = {}
     for text in texts:
         name, equals, where = text.partition("=")
@@ -265,7 +271,7 @@ def _load_registered(texts: Sequence[str]) -> dict[str, type[Any]]:
 
 
 def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
-    """What every set-up says: the weather, what it touches, and what is sensed of it."""
+    """Returns the set-up that the run's settings and weather ask for, without actors and traffic."""
     world, sensors = spec.settings.world, spec.settings.sensors
     return Setup(
         map=map,
@@ -316,20 +322,20 @@ def wind_of(spec: RunSpec, said: tuple[float, float] | None = None) -> Wind | No
 
 
 def _foreign_on_carla(spec: RunSpec) -> bool:
-    """Tells whether a foreign stack drives on CARLA: which images it reads is unknown before."""
+    """Returns True when a user's stack drives on CARLA: which images it reads is unknown before."""
     foreign = isinstance(spec.driver, (StackDriver, AgentDriver))
     return foreign and spec.backend.backend == BackendKind.CARLA
 
 
 def recovery_settings(s: TrafficSettings) -> RecoverySettings:
-    """The supervisor's part of the settings (D-076, D-077, D-080)."""
+    """Returns the supervisor's part of the traffic settings (D-076, D-077, D-080)."""
     if s.relocation is Relocation.STANDING:
         return RecoverySettings(warm_up=1.5, release_speed=0.0, clearance=s.clearance)
     return RecoverySettings(clearance=s.clearance)
 
 
 def driver_of(spec: RunSpec, stage: Stage, kind: type[Stack] | None = None) -> StackAtWheel:
-    """The stack that drives, built; StackError when it cannot be. kind: its class, if loaded."""
+    """Returns the driver of a run, built; StackError when it cannot be. kind: its class, if loaded."""
     found, settings = _class_of(spec, stage, kind)
     # our own stack gives the map's arrays to kernels, which know one type of array
     chosen = kind or found
@@ -343,7 +349,10 @@ def driver_of(spec: RunSpec, stage: Stage, kind: type[Stack] | None = None) -> S
 def _class_of(
     spec: RunSpec, stage: Stage, kind: type[Stack] | None
 ) -> tuple[type[Stack], Mapping[str, object]]:
-    """The driver's class and its settings. kind: the class, if loaded: a user's file runs once."""
+    """Returns the driver's class and its settings; ConfigError for channels, which need a route.
+
+    kind: the class, if loaded, as a user's file runs once.
+    """
     driver = spec.driver
     cruise = {} if stage.cruise_kmh is None else {"cruise_kmh": stage.cruise_kmh}
     match driver:
@@ -375,7 +384,7 @@ def _class_of(
 
 
 def ego_model() -> CarModel:
-    """What a driver knows about the ego."""
+    """Returns what a driver knows of the ego's car."""
     t = vehicle_type(EGO_TYPE)
     return CarModel(
         length=t.length,
@@ -388,7 +397,7 @@ def ego_model() -> CarModel:
 
 
 def with_sensors(setup: Setup, stack: GuardedStack) -> Setup:
-    """The set-up with the further sensors that the stack asks for (L-3).
+    """Returns the set-up with the further sensors that the stack asks for (L-3).
 
     A sensor that is there already as another stack asked for it is shared; StackError for a name
     that stands for another one.

@@ -33,14 +33,14 @@ class Snapshots(Sink):
         self.paths: list[Path] = []
 
     def see(self, moment: Moment) -> None:
-        """Take a picture when the ego touches something, or has left its way."""
+        """Takes a picture when the ego touches something, or was moved for a reason in FATAL."""
         relocate = moment.action.relocate
         moved = None if relocate is None else relocate.moved
         if moment.truth.contacts or (moved is not None and moved.reason in FATAL):
             self.take(moment.frame)
 
     def take(self, frame: SensorFrame) -> None:
-        """A picture of this moment, if there are cameras."""
+        """Writes the front picture of this moment with the top view inset; nothing without images."""
         if self.folder is None or FRONT not in frame.images:
             return
         front = frame.images[FRONT].rgb
@@ -60,7 +60,7 @@ def _save(picture: Image.Image, path: Path) -> None:
 
 
 def _inset(picture: np.ndarray, small: np.ndarray) -> None:
-    """Put `small` into the upper right corner of `picture`, in place."""
+    """Copies `small` into the upper right corner of `picture`, in place; nothing if it does not fit."""
     h, w = small.shape[:2]
     if h + MARGIN <= picture.shape[0] and w + MARGIN <= picture.shape[1]:
         picture[MARGIN : MARGIN + h, -MARGIN - w : -MARGIN] = small

@@ -16,7 +16,7 @@ FIRST_S = 20.0  # m from the beginning of its lane
 
 
 def start_of(map: RoadMap) -> LanePosition:
-    """The map's own place, else the published one (A-004), else on the longest lane."""
+    """Returns where the ego starts: the map's own place, the published one (A-004), or the longest lane."""
     if map.ego_start is not None:
         return map.ego_start
     point = _published_start(map) or _longest(map)
@@ -37,7 +37,10 @@ def _published_start(map: RoadMap) -> LanePoint | None:
 
 
 def _longest(map: RoadMap) -> LanePoint:
-    """Near the beginning of the longest driving lane from which the road goes on for long."""
+    """Returns a place near the begin of the longest driving lane from which the road goes on for WAY m.
+
+    Raises NoLaneError without a driving lane.
+    """
     lanes = np.flatnonzero((map.arrays.drivable == 1) & (map.lanes.junction < 0))
     if not len(lanes):
         lanes = np.flatnonzero(map.arrays.drivable == 1)

@@ -42,10 +42,10 @@ SEEDS_EACH = 100_000  # seeds are seed * this + number of the segment; hours all
 
 
 def segments(routes: Sequence[RunSpec], hours: float, template: RunSpec) -> list[RunSpec]:
-    """Segments of ten minutes, the hours split equally among routes; the last one is the rest.
+    """Returns segments of SEGMENT s, the hours split equally among routes; the last one is the rest.
 
-    Each has a seed of its own (C-12), also where only the weather differs: whoever pools segments
-    counts no error of a sensor twice. template: what routes do not say; its seed gives the first one.
+    Each has a seed of its own (C-12), also where only the weather differs, so that no error of a
+    sensor counts twice in pooled segments. template: what routes do not say; its seed is the base.
     """
     require_range("hours", hours, 1.0 / 3600.0, 10_000.0)
     seconds = hours * 3600.0 / len(routes)
@@ -65,7 +65,7 @@ def segments(routes: Sequence[RunSpec], hours: float, template: RunSpec) -> list
 def drive_one(
     out: Path, spec: RunSpec, links: Links | None = None
 ) -> Driven[DriveKey, DriveMetrics]:
-    """Drives one segment in a worker and writes both files."""
+    """Drives one segment, writes recording and record into the folder of its cell; returns its row."""
     watch = Stopwatch()
     folder = out / spec.cell
     folder.mkdir(parents=True, exist_ok=True)
@@ -79,7 +79,7 @@ def drive_one(
 
 
 def drive_key(spec: RunSpec, outcome: Outcome, log_hash: str | None = None) -> DriveKey:
-    """The identifying columns of a segment's row."""
+    """Returns the identifying columns of a segment's row; log_hash None: it left no recording."""
     return DriveKey(
         route=route_of(spec).name,
         seed=spec.seed,
@@ -91,7 +91,7 @@ def drive_key(spec: RunSpec, outcome: Outcome, log_hash: str | None = None) -> D
 
 
 def warm_up() -> None:
-    """Compile every kernel that a segment needs, by driving a moment."""
+    """Compiles every kernel that a segment needs, by driving a moment."""
     with TemporaryDirectory() as folder:
         spec = structs.replace(driven_routes()["route-4"], duration=1.0)
         drive_segment(spec, Path(folder) / "warm.mcap")
@@ -110,5 +110,5 @@ RECIPE = Recipe(
 
 
 def recipe_with_links(links: Links) -> Recipe[RunSpec, DriveKey, DriveMetrics]:
-    """The recipe with these listeners at every drive."""
+    """Returns the recipe of channels whose every drive has these listeners."""
     return replace(RECIPE, drive=partial(drive_one, links=links))

@@ -27,7 +27,7 @@ RECIPE = replace(recipe(keep_all=True), command="play", finish=nothing_else)
 
 
 def scenario_files(folder: Path) -> list[Path]:
-    """The .xosc files of a folder, at any depth, in order, without catalogs: others refer to those."""
+    """Returns the sorted .xosc files of a folder at any depth, without catalogs; FileError for none."""
     found = sorted(folder.rglob("*.xosc"))
     if not found:
         raise FileError(f"{folder} holds no .xosc file")
@@ -35,7 +35,7 @@ def scenario_files(folder: Path) -> list[Path]:
 
 
 def courses_of(course: Scenario, file: Path, name: str = "") -> list[Scenario]:
-    """What a file asks to play: itself, or the choices of parameters that it makes for another.
+    """Returns the courses of a file: itself, or one per choice of parameters of a distribution.
 
     name: what results call it, where the name of the file is not enough.
     """
@@ -53,7 +53,7 @@ def courses_of(course: Scenario, file: Path, name: str = "") -> list[Scenario]:
 
 
 def names_of(files: Sequence[Path], below: Path | None) -> dict[Path, str]:
-    """Return names by their path below a folder for files whose own name is not theirs alone."""
+    """Returns for each file its path in the folder `below` where two files share a name, else ""."""
     if below is None:
         return dict.fromkeys(files, "")
     shared = {stem for stem, n in Counter(file.stem for file in files).items() if n > 1}
@@ -71,7 +71,7 @@ def runs_of(
     seeds: Iterable[int],
     below: Path | None = None,
 ) -> list[RunSpec]:
-    """Every combination; the rest as in `template`, whose course is a scenario.
+    """Returns a run for every combination, the rest as in `template`, whose course is a scenario.
 
     below: the folder by which files are named where two have the same name.
     A weather None is that of the file, and of the template what the file leaves open.

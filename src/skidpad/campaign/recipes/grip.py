@@ -52,7 +52,7 @@ from skidpad.recording.files import write_parquet
 
 
 def warm_up() -> None:
-    """Compile every kernel that a run may need."""
+    """Compiles every kernel that a run may need, by driving two whole runs."""
     from skidpad.campaign.runs.run import run
     from skidpad.physics.presets import preset
 
@@ -72,7 +72,10 @@ class GripDrive:
 
 
 def drive_and_judge(out: Path, cell: RunSpec, keep: bool = False) -> GripDrive:
-    """Drives a run of the catalogue in a worker; with `keep`, or when it failed, into its folder."""
+    """Drives a run of the catalogue and measures it; with `keep`, or when it failed, writes its folder.
+
+    Of an earlier attempt it removes the folder first.
+    """
     from skidpad.campaign.driving.backends import WATCHDOG, keep_server, make_backend
     from skidpad.campaign.runs.run import run
     from skidpad.evidence.grip.scores import grip_metrics
@@ -99,7 +102,7 @@ def drive_and_judge(out: Path, cell: RunSpec, keep: bool = False) -> GripDrive:
 
 
 def drive_one(out: Path, cell: RunSpec, *, keep: bool = False) -> Driven[GripKey, GripMetrics]:
-    """Drives a cell in a worker and writes its series, with `keep` its log too."""
+    """Drives a run and writes its series, with `keep` its log too; returns its row."""
     from skidpad.evidence.grip.scores import grip_series
 
     found = drive_and_judge(out, cell, keep)
@@ -131,7 +134,10 @@ def grip_key(cell: RunSpec, outcome: Outcome, log_hash: str | None = None) -> Gr
 
 
 def finish(cells: Sequence[RunSpec], out: Path, runner: Runner) -> None:
-    """Keep the logs of what the report shows (a drive is the same whenever it is driven)."""
+    """Drives the runs that the report shows again with their logs, and writes the stopping distances.
+
+    A drive is the same whenever it is driven.
+    """
     wanted = set(select_shown_runs(read_results(out)).select(*CELL, "seed").iter_rows())
     work = partial(drive_one, out, keep=True)
     jobs = [
@@ -150,7 +156,7 @@ def finish(cells: Sequence[RunSpec], out: Path, runner: Runner) -> None:
 
 
 def recipe(keep_all: bool = False) -> Recipe[RunSpec, GripKey, GripMetrics]:
-    """keep_all: the whole log of every run."""
+    """Returns what a grip campaign is made of; keep_all: every run leaves its whole log."""
     return Recipe(
         command="grip",
         columns=GRIP,
@@ -169,7 +175,7 @@ CELL = ("scenario", "cutin", "overlay", "weather", "friction")
 
 
 def select_shown_runs(results: pl.DataFrame) -> pl.DataFrame:
-    """Of each cell the run with the median and with the least distance; columns CELL, seed, role."""
+    """Returns of each cell the run with the median and the least distance; columns CELL, seed, role."""
     finished = results.drop_nulls("min_cvip_m")
     order = finished.sort("completion", "min_cvip_m", "seed").group_by(CELL, maintain_order=True)
     middle = order.agg(pl.col("seed").get(pl.len() // 2)).with_columns(role=pl.lit("median"))
@@ -178,7 +184,7 @@ def select_shown_runs(results: pl.DataFrame) -> pl.DataFrame:
 
 
 def write_stopping(out: Path, weathers: Sequence[Weather], mu_ref: float) -> None:
-    """Ratio, friction and stopping distances of each weather under both models (decision G-5)."""
+    """Writes ratio, friction and stopping distances of each weather under both models (G-5)."""
     models = [GripModel.STATISTICAL, GripModel.PHYSICAL]
     rows = []
     for row in grip_rows(weathers, models, mu_ref):

@@ -27,7 +27,7 @@ TIMES_OF_DAY = ("sunrise", "noon", "night")
 
 
 def warm_up() -> None:
-    """Compile every kernel that a run may need, by driving a moment of each kind."""
+    """Compiles every kernel that a run may need, by driving a moment of each kind."""
     from skidpad.campaign.runs.run import drive
     from skidpad.evidence.drive.metrics import run_metrics
     from skidpad.roads.bundled import load_map
@@ -39,7 +39,7 @@ def warm_up() -> None:
 
 
 def see_all() -> None:
-    """Draw every image once and look for lamps: a moment's drive meets no light."""
+    """Draws every image once and looks for lamps, to compile: a moment's drive meets no light."""
     from skidpad.physics.presets import preset
     from skidpad.roads.bundled import load_map
     from skidpad.sensors.bench import convoy
@@ -54,7 +54,7 @@ def see_all() -> None:
 
 
 def drive_one(out: Path, cell: RunSpec) -> Driven[RunKey, Metrics]:
-    """Drives a cell in a worker and writes its folder."""
+    """Drives a run, writes its folder (one that is there is replaced) and returns its row."""
     # numba and friends are imported only where they are needed, not in the parent.
     from skidpad.campaign.driving.backends import WATCHDOG, keep_server, make_backend
     from skidpad.campaign.runs.run import run
@@ -101,7 +101,7 @@ def missing_vehicles(course: Roads, actors: int) -> int:
 
 
 def metric_settings(cell: RunSpec) -> MetricSettings:
-    """The definitions that the cell's profile asks for (D-102, D-103)."""
+    """Returns the definitions of metrics that the run's profile asks for (D-102, D-103)."""
     same_road = cell.settings.metrics.lane_truth is LaneTruth.SAME_ROAD
     return MetricSettings(
         lead=LeadDefinition.SAME_ROAD_AND_LANE if same_road else LeadDefinition.AHEAD_ON_LANE
@@ -115,7 +115,7 @@ def run_key(
     motion_hash: str | None = None,
     vehicles_missing: int | None = None,
 ) -> RunKey:
-    """The identifying columns of a cell's row."""
+    """Returns the identifying columns of a run's row; hashes are None where it left no log."""
     settings, driver = cell.settings, cell.driver
     ours = driver if isinstance(driver, AdasDriver) else None
     return RunKey(
@@ -141,30 +141,30 @@ def run_key(
 
 
 def cruise_target(driver: AdasDriver) -> float:
-    """km/h at which it cruises where nothing slows it."""
+    """Returns the km/h at which a driver cruises where nothing slows it, its limiter considered."""
     limit = V_LIMITER_KMH if Function.LIMITER in driver.functions else inf
     return min(V_CRUISE_KMH if driver.cruise_kmh is None else driver.cruise_kmh, limit)
 
 
 def roads_of(cell: RunSpec) -> Roads:
-    """The roads that a run of the matrix is driven on."""
+    """Returns the roads that a run of the matrix is driven on; ConfigError for another course."""
     if not isinstance(cell.course, Roads):
         raise ConfigError(f"{cell.name} is no run of the matrix")
     return cell.course
 
 
 def time_of_day(weather: Weather) -> str:
-    """Which of the published times a preset's name ends in, "" for others."""
+    """Returns which of TIMES_OF_DAY a preset's name ends in, "" for others."""
     return next((t for t in TIMES_OF_DAY if weather.name.endswith(t)), "")
 
 
 def is_unharmed(metrics: Metrics) -> bool | None:
-    """Whether no collision was fatal; None where that was not judged."""
+    """Returns True when no collision was fatal; None where that was not judged."""
     return None if metrics.fatal_collisions is None else metrics.fatal_collisions == 0
 
 
 def drive_of(key: RunKey) -> tuple[str, str] | None:
-    """What drove and how it moved (decision T-3); None for a run that did not end."""
+    """Returns what drove and the hash of how it moved (T-3); None for a run that did not end."""
     return None if key.motion_hash is None else (key.config, key.motion_hash)
 
 

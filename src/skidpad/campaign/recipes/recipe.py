@@ -19,16 +19,16 @@ class Task(Protocol):
 
     @property
     def name(self) -> str:
-        """Name of the run, unlike that of any other in the campaign."""
+        """Returns the run's name, CELL-NUMBER, of which the campaign has no other."""
         ...
 
     @property
     def deadline_s(self) -> float:
-        """Wall time after which the run counts as hanging."""
+        """Returns the wall time in s after which the run counts as hanging."""
         ...
 
     def to_identity(self) -> dict[str, Any]:
-        """Everything that decides the run, as plain data."""
+        """Returns everything that decides the run, as plain data."""
         ...
 
 
@@ -53,7 +53,7 @@ def nothing_else(tasks: Sequence[Any], out: Path, runner: Runner) -> None:
 
 
 def no_drive(key: Any) -> None:
-    """A recipe for runs that are never compared in how they moved."""
+    """Returns None: the `drive_of` of recipes whose runs are never compared in how they moved."""
     del key
 
 
@@ -74,5 +74,5 @@ class Recipe(Generic[T, K, M]):
 
 
 def cell_of(run: str) -> str:
-    """The cell that a run belongs to, by the run's name."""
+    """Returns the cell of a run: its name without the last hyphen and number."""
     return run.rpartition("-")[0]

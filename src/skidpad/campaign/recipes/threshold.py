@@ -38,7 +38,7 @@ SITUATION = ("driver", "actors", "start", "deceleration")
 
 
 def warm_up() -> None:
-    """Compile every kernel that a run may need."""
+    """Compiles every kernel that a run may need, by driving one run per mode of actors."""
     from skidpad.campaign.runs.run import run
 
     levels = Levels(
@@ -53,7 +53,7 @@ def warm_up() -> None:
 
 
 def drive_one(out: Path, task: Task, *, keep: bool = False) -> Driven[ThresholdKey, GripMetrics]:
-    """Drives a run in a worker, with `keep` into a folder of its own."""
+    """Drives a run and returns its row; with `keep` it leaves its folder."""
     found = drive_and_judge(out, task.run, keep)
     return Driven(
         key=threshold_key(task, found.driven.outcome, found.log_hash),
@@ -64,7 +64,7 @@ def drive_one(out: Path, task: Task, *, keep: bool = False) -> Driven[ThresholdK
 
 
 def threshold_key(task: Task, outcome: Outcome, log_hash: str | None = None) -> ThresholdKey:
-    """The identifying columns of a run's row."""
+    """Returns the identifying columns of a run's row; log_hash None: it left no log."""
     return ThresholdKey(
         driver=task.run.driver.label,
         actors=task.mode.value,
@@ -82,7 +82,7 @@ def threshold_key(task: Task, outcome: Outcome, log_hash: str | None = None) -> 
 
 
 def finish(driven: Sequence[Task], out: Path, runner: Runner) -> None:
-    """Keep the log of the first accident of each situation, coming from dry road."""
+    """Drives the first accident of each situation, coming from dry road, again and keeps its log."""
     crashed = read_results(out).filter(~pl.col("completion"))
     first = crashed.sort("road_mu", "seed", descending=[True, False]).unique(
         SITUATION, keep="first", maintain_order=True

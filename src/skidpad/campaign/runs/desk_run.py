@@ -18,7 +18,10 @@ from skidpad.recording.run.inputs import INPUTS, encode_inputs, inputs_hash
 
 
 def drive_at_desk(spec: RunSpec, desk: Desk, folder: Path, sinks: Sequence[Sink] = ()) -> Run:
-    """Drive until the run or the person ends it, and write the folder, however it ended."""
+    """Drives until the run or the person ends it, writes the folder, however it ended; returns the run.
+
+    Raises OutputError when the folder is taken.
+    """
     require_free(folder)
     keep_server(spec.backend)
     driven = run(spec, backend=make_backend(spec.backend), folder=folder, sinks=sinks, desk=desk)

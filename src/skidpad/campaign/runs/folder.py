@@ -27,20 +27,20 @@ CONFIG, ERROR, PAIRS = "config.yaml", "error.txt", "pairs.csv"
 
 
 class Stopwatch:
-    """Wall and processor time since it was made; outside every hash."""
+    """Measures wall and processor time from its making on; they are outside every hash."""
 
     def __init__(self) -> None:
         self.wall, self.cpu = time.perf_counter(), time.process_time()
 
     def timing(self, simulated_s: float | None = None, slow_pct: float | None = None) -> Timing:
-        """What a run took so far, and its real-time factor."""
+        """Returns the times so far and, with `simulated_s`, the real-time factor."""
         wall, cpu = time.perf_counter() - self.wall, time.process_time() - self.cpu
         rtf = None if simulated_s is None else simulated_s / wall
         return Timing(wall_s=wall, cpu_s=cpu, rtf=rtf, rtf_below_0_9_pct=slow_pct)
 
 
 def fresh_folder(out: Path, run: str) -> Path:
-    """Where a run of this name goes, without what a killed attempt left; it does not exist yet.
+    """Removes what an earlier attempt of the run left and returns its folder, which is not made yet.
 
     Nothing outside OUT/runs is ever removed: ConfigError for a name that leads out of it.
     """
@@ -56,12 +56,12 @@ def fresh_folder(out: Path, run: str) -> Path:
 
 
 def write_config(folder: Path, config: dict[str, Any]) -> None:
-    """Write the resolved set-up of a run."""
+    """Writes the resolved set-up of a run as config.yaml."""
     write_bytes(folder / CONFIG, yaml.safe_dump(config, sort_keys=False).encode())
 
 
 def write_run(folder: Path, driven: Run) -> str:
-    """Write log, events, sensor readings and the stack's error; returns the log's content hash."""
+    """Writes log, events, sensor readings and the stack's error; returns the log's content hash."""
     digest = write_log(folder, driven.log)
     if driven.readings is not None:
         write_readings(folder, driven.readings)
@@ -71,7 +71,10 @@ def write_run(folder: Path, driven: Run) -> str:
 
 
 def write_played(folder: Path, driven: Run) -> None:
-    """What a scenario leaves besides: trajectories, its story, how critical any two became."""
+    """Writes what a scenario leaves besides: trajectories, story, and pairs.csv with how close any two came.
+
+    Nothing for a run without a scenario.
+    """
     if driven.played is None:
         return
     write_results(folder, driven.log, driven.played)
@@ -85,5 +88,5 @@ def write_played(folder: Path, driven: Run) -> None:
 
 
 def last_line(error: str) -> str:
-    """What a traceback comes down to."""
+    """Returns the last line of a traceback, "" of an empty one."""
     return error.strip().rpartition("\n")[2]

@@ -27,9 +27,10 @@ class Task:
 
 
 def run_to(spec: RunSpec, out: Path) -> Run:
-    """Drive it and write description, log, events and error into a folder.
+    """Drives a run and writes its whole folder; returns the run. OutputError when the folder is taken.
 
-    On a CARLA server a process of its own drives: the wheel's threads can end theirs.
+    On a CARLA server a process of its own drives: the wheel's threads can end theirs. BackendError
+    when that process fails.
     """
     task = Task(spec, require_free(out))
     if spec.backend.backend != BackendKind.CARLA:
@@ -44,7 +45,7 @@ def run_to(spec: RunSpec, out: Path) -> Run:
 
 
 def run_task(task: Task) -> Run:
-    """Drives a task in this process."""
+    """Drives a task in this process, writes its folder and returns the run."""
     keep_server(task.run.backend)
     backend = make_backend(task.run.backend, WATCHDOG)
     driven = run(task.run, backend=backend, folder=task.out)

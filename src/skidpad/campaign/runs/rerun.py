@@ -51,7 +51,11 @@ class Rerun:
 
 
 def rerun(run: Path, begin_s: float, end_s: float, out: Path, film: Path | None = None) -> Rerun:
-    """Drive the run in folder `run` again up to `end_s`, keeping what happens from `begin_s` on."""
+    """Drives the run in folder `run` again up to `end_s`, keeping what happens from `begin_s` on.
+
+    Pictures go to `out`, or a film to `film`. FileError for an empty run, ConfigError for a stretch
+    outside of it.
+    """
     stored = read_log(run)
     spec = with_kept_map(read_run(run), run.resolve().parents[1])
     if not len(stored):
@@ -77,14 +81,14 @@ def rerun(run: Path, begin_s: float, end_s: float, out: Path, film: Path | None 
 
 
 def desk_of(run: Path, spec: RunSpec) -> Desk | None:
-    """Returns the desk of a stored run, at which every input is repeated; None: no person took part."""
+    """Returns the desk at which a stored run's inputs are repeated; None: no person took part."""
     if not spec.inputs:
         return None
     return Desk(Recorded(read_inputs(run, spec.inputs)), spec)
 
 
 def same_segment(recording: Path) -> bool:
-    """Whether driving a recorded segment of channels again gives the same contents."""
+    """Drives a recorded segment of channels again; returns True when it gives the same contents."""
     spec = with_kept_map(read_segment(recording), recording.resolve().parents[1])
     with TemporaryDirectory() as folder:
         again = Path(folder) / "again.mcap"
@@ -93,7 +97,7 @@ def same_segment(recording: Path) -> bool:
 
 
 def first_ticks(log: RunLog, n: int) -> RunLog:
-    """The first n ticks of a log."""
+    """Returns the log cut to its first n ticks, n >= 1."""
 
     def cut_series(series: Any) -> Any:
         return type(series)._make(a[:n] for a in series)
@@ -128,7 +132,7 @@ class Closely(Sink):
         self._film = None if film is None else Film(film)
 
     def see(self, moment: Moment) -> None:
-        """Keep this moment if it lies in the stretch."""
+        """Keeps the trace and a picture of a moment from `begin_s` on."""
         t = moment.frame.tick * DT
         if t < self.begin_s - 1e-9:
             return
@@ -152,12 +156,12 @@ class Closely(Sink):
         self.trace.append(f"{t:7.2f} s  {mode or tier:<36} {status}{distance}")
 
     def finish(self) -> None:
-        """The stretch is over: put the film in place."""
+        """Puts the film in place, if there is one."""
         if self._film is not None:
             self._film.finish()
 
     def close(self) -> None:
-        """Leave nothing of a film that was not finished."""
+        """Removes a film that was not finished."""
         if self._film is not None:
             self._film.close()
 
@@ -183,7 +187,7 @@ class Film:
         self._writer.write(picture)
 
     def finish(self) -> None:
-        """Puts the finished film in its place."""
+        """Closes the film and moves it to its path, over a file there; OutputError when that cannot be."""
         self._writer.release()
         try:
             os.replace(self.part, self.path)
@@ -191,7 +195,7 @@ class Film:
             raise output_error(self.path, error) from error
 
     def close(self) -> None:
-        """Remove what is not in place."""
+        """Removes the unfinished film; harmless after `finish`."""
         self._writer.release()
         with suppress(OSError):
             self.part.unlink(missing_ok=True)

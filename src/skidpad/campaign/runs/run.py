@@ -174,7 +174,7 @@ class Log(Sink):
         self.log = TickLog(table, self.header, self.weather, self.ticks)
 
     def see(self, moment: Moment) -> None:
-        """Write down the moment, and what supervisor and world did besides driving (A-194)."""
+        """Appends the moment and the notices, relocation and weather that came with it (A-194)."""
         frame, truth, action = moment.frame, moment.truth, moment.action
         if self.changes is not None and self.changes.done:
             self.log.set_weather(self.changes.weather.name)
@@ -214,10 +214,10 @@ def run(
     sinks: Sequence[Sink] = (),
     desk: Desk | None = None,
 ) -> Run:
-    """Drive a run on roads or in a scenario; a stack that fails is an outcome.
+    """Drives a run on roads or in a scenario and returns what it leaves; a failing stack is an outcome.
 
     kind: the stack's class, if it is loaded. stage: the run's own by default. backend: by default a
-    fresh one of the run's choice. folder: where snapshots of collisions go. sinks: who else looks on.
+    fresh one of the run's choice. folder: where snapshots of collisions go. sinks: further observers.
     desk: where a person sits, or sat.
     """
     opened = OpenRun(
@@ -273,7 +273,7 @@ class OpenRun:
         self.over = False
 
     def step(self) -> Moment | None:
-        """Go on by one tick; None when the run is over; a stack that fails ends it with a notice."""
+        """Drives one tick and returns its moment; None when the run is over, also by a stack that fails."""
         return self.answer() if self.sense() else None
 
     def sense(self) -> bool:
@@ -372,7 +372,7 @@ class OpenRun:
 
 
 def log_of(spec: RunSpec, stage: Stage, desk: Desk | None = None) -> Log:
-    """An empty log with what holds for the whole run."""
+    """Returns an empty log with what holds for the whole run."""
     about = {
         "config": spec.driver.label,
         "weather": spec.weather.name,
@@ -397,14 +397,14 @@ def outcome_of(stage: Stage, log: RunLog) -> Outcome:
 
 
 def off_road(log: RunLog, map: RoadMap) -> NDArray[np.bool_]:
-    """(T,) whether the ego has all wheels off every lane (decision R-6)."""
+    """Returns (T,) True in ticks in which the ego has all wheels off every lane (decision R-6)."""
     a, table = log.actors, log.table
     size = float(table.length[0]), float(table.width[0])
     return map.edge.off(a.x[:, 0], a.y[:, 0], a.z[:, 0], a.yaw[:, 0], *size)
 
 
 def story(error: StackError) -> str:
-    """The traceback of a stack that failed."""
+    """Returns the traceback of a stack that failed, cut to LONGEST_STORY characters, and the error."""
     cause = error.__cause__ or error
     told = clean("".join(traceback.format_exception(cause)), LONGEST_STORY)
     return f"{told}\n{error}"

@@ -37,7 +37,7 @@ class Shadow(Sink):
         self.rows: list[tuple[float, float, float, float]] = []  # throttle, brake: driver, shadow
 
     def see(self, moment: Moment) -> None:
-        """Ask the shadow; while the supervisor drives, neither counts."""
+        """Asks the shadow and keeps pedals of both; nan in ticks in which the supervisor drives."""
         asked = self.driver.act(moment.frame)
         given = moment.command
         row = (given.throttle, given.brake, asked.throttle, asked.brake)
@@ -56,7 +56,7 @@ class Shadowed:
 
 
 def ride_along(folder: Path, shadow: DriverSpec) -> Shadowed:
-    """Drive the run in a folder again with `shadow` riding along.
+    """Drives the run in a folder again with `shadow` riding along; returns how the two compare.
 
     ConfigError for channels, passengers, and a shadow that asks for sensors of the driver's names.
     """

@@ -14,7 +14,7 @@ from skidpad.recording.channels.drives import read_record
 
 
 def read_run(folder: Path) -> RunSpec:
-    """The run that a folder's config.yaml describes; FileError when it cannot be told."""
+    """Returns the run that a folder's config.yaml describes; FileError when it cannot be told."""
     path = folder / CONFIG
     plain = decode_yaml(read_bytes(path, "run"), str(path))
     if not isinstance(plain, dict):
@@ -23,7 +23,7 @@ def read_run(folder: Path) -> RunSpec:
 
 
 def read_segment(recording: Path) -> RunSpec:
-    """The run that the file beside a recording of channels describes."""
+    """Returns the run that the .json beside a recording of channels describes; FileError otherwise."""
     path = recording.with_suffix(".json")
     record = read_record(path)
     if record is None:

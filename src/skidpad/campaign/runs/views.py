@@ -38,7 +38,7 @@ INK, DIM, ACCENT = (235, 235, 235), (150, 160, 170), (255, 133, 82)
 
 
 def twelve_views(moment: Moment, dt: float) -> Picture:
-    """(720, 1600, 3) RGB: nine cameras, radar from above, contacts and markings, the tier trace."""
+    """Returns a (720, 1600, 3) RGB picture: nine cameras, radar from above, commands, report and events."""
     frame = moment.frame
     picture = np.zeros((*SIZE, 3), dtype=np.uint8)
     for id, (left, top, width, height) in LAYOUT.items():
@@ -54,7 +54,7 @@ def twelve_views(moment: Moment, dt: float) -> Picture:
 
 
 def colours(image: CameraImage) -> Picture:
-    """A camera's picture for people: colours as they are, classes in their colours, depth in grey."""
+    """Returns a camera's picture in RGB: colours as they are, classes in theirs, depth white to black."""
     if image.rgb is not None:
         return np.ascontiguousarray(image.rgb)
     if image.labels is not None:

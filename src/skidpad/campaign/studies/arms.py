@@ -42,7 +42,7 @@ class Study:
 def base_run(
     configuration: int, weather: str = "clear-noon", settings: Mapping[str, Any] | None = None
 ) -> RunSpec:
-    """An object-level run of the profile `recommended`."""
+    """Returns an object-level run of the profile `recommended`, with these settings over it."""
     return RunSpec(
         driver=AdasDriver(label=str(configuration), functions=functions_of(configuration)),
         weather=find_weather(weather),
@@ -52,7 +52,10 @@ def base_run(
 
 
 def make_changed_run(stack: str, seed: int, configuration: int, **change: Any) -> RunSpec:
-    """The same with a changed stack of `stacks.py`; cruise_kmh is an option of the stack."""
+    """Returns a base run driven by a changed stack of `stacks.py`; change: what its class is given.
+
+    cruise_kmh, if in it, is an option of the stack.
+    """
     base = base_run(configuration)
     options = {"configuration": configuration, "profile": base.settings.profile}
     options |= {k: change.pop(k) for k in ("cruise_kmh",) if k in change}
@@ -62,7 +65,7 @@ def make_changed_run(stack: str, seed: int, configuration: int, **change: Any) -
 
 
 def by_settings(arms: Mapping[str, Mapping[str, Any]], configuration: int = 2) -> Any:
-    """Arms that differ in settings alone."""
+    """Returns a function of seeds that makes arms which differ in settings alone, named as `arms`."""
 
     def make(seeds: Sequence[int]) -> list[Variant]:
         return [
@@ -93,7 +96,7 @@ def speed_and_dropout(seeds: Sequence[int]) -> list[Variant]:
 def by_stacks(
     arms: Mapping[str, str], configuration: int = 2
 ) -> Callable[[Sequence[int]], list[Variant]]:
-    """Arms that differ in the stack of `stacks.py` that drives."""
+    """Returns a function of seeds that makes arms which differ in the stack of `stacks.py`."""
 
     def make(seeds: Sequence[int]) -> list[Variant]:
         return [
@@ -106,7 +109,7 @@ def by_stacks(
 
 
 def preliminary(seeds: Sequence[int]) -> list[Variant]:
-    """A-278: the preliminary profile, against the recommended one with the same grip and sight."""
+    """Returns arms for A-278: preliminary and recommended profile, with the same grip and sight."""
     same = {"grip": "none", "range": "none", "mu_ref": 1.5, "camera": False}
     return [
         Variant(
@@ -123,7 +126,7 @@ def preliminary(seeds: Sequence[int]) -> list[Variant]:
 
 
 def pace(seeds: Sequence[int]) -> list[Variant]:
-    """F-25: the same runs, each tick 1 ms slower."""
+    """Returns arms for F-25: the same runs, and each tick 1 ms slower."""
     base = structs.replace(base_run(4, "rain-night"), duration=100.0)
     return [
         Variant(structs.replace(base, seed=seed), {"variant": name}, slow_s=slow)
@@ -133,7 +136,7 @@ def pace(seeds: Sequence[int]) -> list[Variant]:
 
 
 def recovery(seeds: Sequence[int]) -> list[Variant]:
-    """F-30: configuration 0 in rain, which is put back often, without one safeguard each."""
+    """Returns arms for F-30: configuration 0 in rain, whole and without one safeguard each."""
     arms: dict[str, dict[str, Any]] = {
         "whole": {},
         "no_clearance": {"clearance": Clearance.NONE},
@@ -152,7 +155,7 @@ def recovery(seeds: Sequence[int]) -> list[Variant]:
 
 
 def noise(seeds: Sequence[int]) -> list[Variant]:
-    """Perception noise of cited sizes, all else a clear noon (A-230)."""
+    """Returns arms with perception noise of cited sizes, all else a clear noon (A-230)."""
     return [
         Variant(make_changed_run("Noisy", seed, 2, noise=asdict(strength)), {"variant": name})
         for seed in seeds

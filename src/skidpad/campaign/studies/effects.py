@@ -88,7 +88,7 @@ class Result:
 
     @property
     def note(self) -> str:
-        """What is printed where no drive changed; empty where one did."""
+        """Returns why no drive changed: the stack does not read the sensor, or nothing did; "" if one did."""
         if self.changed:
             return ""
         sensor = EFFECTS[self.effect].sensor if self.effect in EFFECTS else ""
@@ -97,7 +97,7 @@ class Result:
 
 
 def settings_of_arm(arm: str) -> dict[str, Any]:
-    """Returns the settings of an arm: none, one effect, or all of them."""
+    """Returns the settings of an arm: "none", one effect by name, or "all"."""
     values = dict(OFF)
     for name, effect in EFFECTS.items():
         if arm in (name, ALL):
@@ -152,7 +152,10 @@ def drive_effects(
     effects: Sequence[str] = tuple(EFFECTS),
     on_run: Callable[[int, int], None] = lambda *_: None,
 ) -> pl.DataFrame:
-    """Drives none, each effect alone and all together with the same seeds; one row a run."""
+    """Drives none, each effect alone and all together with the same seeds; returns a row per run.
+
+    on_run: called with the runs done and the runs in all. Raises SkidpadError when a run fails.
+    """
     arms = (NONE, *effects, ALL)
     jobs = [
         Job(f"{arm}-{seed}", drive_arm, spec, spec.deadline_s)
@@ -172,7 +175,7 @@ def drive_effects(
 
 
 def compare_effects(rows: pl.DataFrame) -> list[Result]:
-    """Compares every arm with none, pair by pair of equal seeds; rows: of one stack and weather."""
+    """Returns each arm compared with none, pair by pair of equal seeds; rows: of one stack and weather."""
     order = rows["arm"].unique(maintain_order=True).to_list()
     base = rows.filter(pl.col("arm") == NONE).sort("seed")
     found = []

@@ -25,7 +25,7 @@ HELD_IN = (Tier.HARD_STOP, Tier.STOPPED_TOO_CLOSE, Tier.EMERGENCY)
 
 
 class Changed:
-    """Our stack, which a subclass is given to change."""
+    """Wraps our stack, for subclasses that change what it sees or does."""
 
     report: StackReport
 
@@ -45,7 +45,7 @@ class Changed:
 
 
 class Coastless(Changed):
-    """It pulls away as soon as its lead is lost (F-18)."""
+    """Changes our stack so that it pulls away as soon as its lead is lost (F-18)."""
 
     def __init__(
         self, specs: Sequence[SensorSpec], map: RoadMap, settings: Mapping[str, Any]
@@ -55,7 +55,7 @@ class Coastless(Changed):
 
 
 class Handbraked(Changed):
-    """It pulls the handbrake in tiers 1 to 3, at any speed (F-29)."""
+    """Changes our stack so that it pulls the handbrake in tiers 1 to 3, at any speed (F-29)."""
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
         """Drives, and pulls the handbrake in some tiers."""
@@ -64,7 +64,7 @@ class Handbraked(Changed):
 
 
 class Blinking(Changed):
-    """It receives empty sensor frames for stretches of a second (F-08)."""
+    """Changes our stack so that it gets empty sensor frames for stretches of a second (F-08)."""
 
     def __init__(
         self, specs: Sequence[SensorSpec], map: RoadMap, settings: Mapping[str, Any]
@@ -106,7 +106,10 @@ SIGMA_PER_MEAN = sqrt(pi / 2.0)  # of a normal deviate: standard deviation over 
 
 
 class Noisy(Changed):
-    """Our stack with camera errors as measured at night or in rain; object level only (A-230, F-12, F-13)."""
+    """Changes our stack so that cameras err as measured at night or in rain; objects only.
+
+    For A-230, F-12 and F-13.
+    """
 
     def __init__(
         self, specs: Sequence[SensorSpec], map: RoadMap, settings: Mapping[str, Any]
@@ -124,12 +127,12 @@ class Noisy(Changed):
             self.draws[spec.id] = stream(self.seed, "study", spec.id, "depth")
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
-        """Drive by what is left."""
+        """Drives by the segments that the noise leaves, with a depth error."""
         seen = {id: self._disturb_segments(id, s, frame.tick) for id, s in frame.segments.items()}
         return super().tick(replace(frame, segments=seen))
 
     def _disturb_segments(self, id: str, segments: Segments, tick: int) -> Segments:
-        """Returns the segments with a depth error; without those out of range, and none in a missed tick."""
+        """Returns the segments with a depth error, without far ones; none in a missed tick."""
         factor = self._factor(id)
         keep = segments.depth <= self.noise.range_share * DEPTH_READ
         if self.noise.range_share >= 1.0:
@@ -141,7 +144,7 @@ class Noisy(Changed):
         return kept._replace(depth=(kept.depth * np.float32(factor)).astype(np.float32))
 
     def _factor(self, id: str) -> float:
-        """Drifting factor on depth, one for all that a camera sees (Gauss-Markov)."""
+        """Draws and returns the drifting factor on depth of a camera, at least 0.05 (Gauss-Markov)."""
         drawn = float(self.draws[id].standard_normal())
         before = self.errors.get(id)
         fresh = drawn if before is None else self.keep * before + sqrt(1 - self.keep**2) * drawn
@@ -152,7 +155,7 @@ class Noisy(Changed):
 def stretches(
     seed: int, name: str, share: float, length: float
 ) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """(LONGEST,) ticks within stretches of `length` ticks that fill about `share` of time."""
+    """Returns (LONGEST,) True in stretches of `length` ticks that fill about `share` of time."""
     n = max(1, round(length))
     begins = stream(seed, "study", name).random(LONGEST) < share / n
     reach = np.convolve(begins, np.ones(n))[:LONGEST]

@@ -39,7 +39,7 @@ BY_ID = {f.id: f for f in (*FINDINGS, *ACCEPTANCE)}
 
 
 def stage_for(variant: Variant) -> Stage:
-    """The stage of its run, with the supervisor that it asks for."""
+    """Returns the world and script of a variant's run, with the supervisor that it asks for."""
     stage = stage_of(variant.run)
     if not variant.recovery:
         return stage
@@ -79,7 +79,14 @@ def run_study(
     workers: int,
     on_run: Callable[[int, int], None] = lambda *_: None,
 ) -> tuple[list[Judgement], pl.DataFrame]:
-    """Drive a study with these seeds and judge its claims, corrected for all of them."""
+    """Drives a study with these seeds; returns its claims, judged and corrected for all, and its runs.
+
+    on_run: called with the runs done and the runs in all.
+
+    Raises:
+        ConfigError: no study has this id.
+        SkidpadError: a run crashed, timed out or failed, which ends the study.
+    """
     require_choice("study", id, tuple(STUDIES))
     study = STUDIES[id]
     variants = study.arms(seeds)

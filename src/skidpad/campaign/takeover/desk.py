@@ -57,16 +57,16 @@ class InputSource(Protocol):
 
     @property
     def ended(self) -> bool:
-        """The person has ended the drive."""
+        """Returns True when the person has ended the drive."""
         ...
 
     def at(self, tick: int) -> Sequence[Input]:
-        """The inputs of this tick; asked once per tick, in order."""
+        """Returns the inputs of this tick; to be called once per tick, in order."""
         ...
 
 
 class Recorded:
-    """Inputs that were given before."""
+    """Repeats inputs that were given in a drive before."""
 
     def __init__(self, inputs: Iterable[Timed]) -> None:
         self._by_tick: dict[int, list[Input]] = {}
@@ -75,7 +75,7 @@ class Recorded:
 
     @property
     def ended(self) -> bool:
-        """Never: whoever drives again says how far."""
+        """Returns False always: the length of the run ends it."""
         return False
 
     def at(self, tick: int) -> Sequence[Input]:
@@ -84,7 +84,10 @@ class Recorded:
 
 
 def beam_of(switch: LampSwitch, weather: Weather) -> Beam:
-    """What the headlights do: automatic is low beam by night and in low visibility (A-218, A-219)."""
+    """Returns the beam of a switch: automatic is low beam at night or below LOW_VISIBILITY, else off.
+
+    See A-218 and A-219.
+    """
     if switch is not LampSwitch.AUTO:
         return Beam[switch.name]
     dim = weather.is_night or visibility(weather) < LOW_VISIBILITY
@@ -92,7 +95,7 @@ def beam_of(switch: LampSwitch, weather: Weather) -> Beam:
 
 
 class Desk:
-    """State: the driver in charge, what is switched on, what is outside, and all inputs so far."""
+    """Holds what a person has set in a drive: driver in charge, functions, surroundings, all inputs."""
 
     def __init__(self, source: InputSource, spec: RunSpec, dt: float = DT) -> None:
         self.source, self.hands, self.course = source, Hands(dt), spec.course
@@ -108,7 +111,7 @@ class Desk:
         self._tick = -1
 
     def turn(self, tick: int) -> None:
-        """Take the inputs of a tick, once."""
+        """Takes the inputs of a tick, once; sets `handed_back`, `switched` and `changed` for this tick."""
         if tick == self._tick:
             return
         self._tick = tick
@@ -118,7 +121,7 @@ class Desk:
             self._take(one)
 
     def _take(self, one: Input) -> None:
-        """Takes over one input of the person; raises ConfigError for one that the course cannot follow."""
+        """Takes over one input; ConfigError for one that the course cannot follow."""
         match one:
             case Wheel():
                 self.handed_back = self.manual and not one.manual
@@ -147,20 +150,20 @@ class Desk:
 
 
 class DeskDriver:
-    """The stack and the person: the stack always sees and says what it would do."""
+    """Drives by the person or the stack; the stack always sees and reports what it would do."""
 
     def __init__(self, inner: StackAtWheel, desk: Desk) -> None:
         self.inner, self.desk = inner, desk
 
     @property
     def report(self) -> StackReport:
-        """What the stack says; no tier acts while a person drives."""
+        """Returns the stack's report, without a tier while a person drives."""
         report = self.inner.report
         return replace(report, tier=None) if self.desk.manual else report
 
     @property
     def mode(self) -> str:
-        """The stack's mode, or that a person drives, and by what (A-274)."""
+        """Returns the stack's mode, or "MANUAL [method]" while a person drives (A-274)."""
         if self.desk.manual:
             return f"MANUAL [{self.desk.pedals.method.value}]"
         return self.inner.mode
@@ -170,7 +173,7 @@ class DeskDriver:
         self.inner.begin(table)
 
     def act(self, frame: SensorFrame) -> VehicleCommand:
-        """The person's command, or the stack's."""
+        """Takes the tick's inputs and returns the person's command while one drives, else the stack's."""
         desk = self.desk
         desk.turn(frame.tick)
         if desk.switched or desk.handed_back:
@@ -179,7 +182,7 @@ class DeskDriver:
         return desk.hands.update(desk.pedals, frame.ego.speed) if desk.manual else command
 
     def _switch(self) -> None:
-        """Our stack's controllers start afresh with these functions; a foreign stack has none."""
+        """Restarts our stack's controllers with the desk's functions; does nothing to another stack."""
         stack = self.inner.stack.stack
         switch = getattr(stack, "switch", None)
         if callable(switch):
@@ -194,37 +197,37 @@ class DeskSupervisor:
         self.inner, self.desk = inner, desk
 
     def observe(self, truth: WorldTruth) -> Supervision:
-        """The phase of the tick that `truth` begins."""
+        """Takes the tick's inputs and returns its phase: none while a person drives."""
         self.desk.turn(truth.tick)
         if self.desk.handed_back and isinstance(self.inner, Supervisor):
             self.inner.reset()
         return Supervision.NONE if self.desk.manual else self.inner.observe(truth)
 
     def act(self, command: VehicleCommand, report: StackReport | None = None) -> Action:
-        """What is applied in this tick."""
+        """Returns the person's command as it is, else what the supervisor makes of the stack's."""
         return Action(command) if self.desk.manual else self.inner.act(command, report)
 
 
 class DeskBackend(ChangedBackend):
-    """The backend, which is told of the person's changes."""
+    """Wraps a backend and changes its surroundings as the person does at the desk."""
 
     def __init__(self, inner: Backend, desk: Desk) -> None:
         super().__init__(inner, lambda: desk.outside if desk.changed else None)
 
 
 class DeskScript:
-    """A script that also ends when the person ends the drive, and thins out the traffic."""
+    """Wraps a script so that the person may end the drive and change the number of vehicles."""
 
     def __init__(self, inner: Script, desk: Desk) -> None:
         self.inner, self.desk = inner, desk
 
     @property
     def ended(self) -> bool:
-        """Whether the person or the script has ended the drive."""
+        """Returns True when the person or the script has ended the drive."""
         return self.desk.source.ended or self.inner.ended
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
-        """Words to actors for the coming step."""
+        """Returns the script's commands to actors and those that change the number of vehicles."""
         return [*self.inner.step(truth), *self.desk.density.words(truth)]
 
 
@@ -236,7 +239,7 @@ class DeskScript:
 
 
 class Density:
-    """State: how many vehicles are wanted (None: as the run has them), which were sent away or called."""
+    """Sends background vehicles away or calls them, as many as `wanted` (None: as the run has them)."""
 
     def __init__(self, vehicles: int = 0) -> None:
         """vehicles: that the run begins with."""
@@ -246,20 +249,23 @@ class Density:
         self.called = 0  # of the reserve
 
     def words(self, truth: WorldTruth) -> list[ActorCommand]:
-        """What actors are told in this tick: the farthest leave first, the nearest come first."""
+        """Returns the commands of this tick: the farthest leave first, the nearest come first."""
         if self.wanted is None:
             return []
         return [*self._call(truth), *self._leave_or_come(truth, self.wanted)]
 
     def _call(self, truth: WorldTruth) -> list[ActorCommand]:
-        """Calls vehicles of the reserve that are wanted for the first time; all they need is room."""
+        """Returns commands that call vehicles of the reserve which are wanted for the first time."""
         assert self.wanted is not None
         reserve = [name for name in truth.table.names if name.startswith(RESERVE_NAME)]
         first, self.called = self.called, max(self.called, self.wanted - self.vehicles)
         return [ActorCommand(name, present=True) for name in reserve[first : self.called]]
 
     def _leave_or_come(self, truth: WorldTruth, wanted: int) -> list[ActorCommand]:
-        """Sends vehicles away, or calls back those that were there."""
+        """Returns commands that send vehicles away, or call back those with room and far from the ego.
+
+        ROOM m to all others and FROM_EGO m to the ego.
+        """
         states, names = truth.states, truth.table.names
         here = [i for i in np.flatnonzero(states.present).tolist() if i > 0]
         from_ego = np.hypot(states.x - states.x[0], states.y - states.y[0])
@@ -284,20 +290,20 @@ class Density:
 
 
 class Hands:
-    """One person's hands and feet; `reset` when the person takes over."""
+    """Turns a person's pedals into commands; `reset` when the person takes over."""
 
     def __init__(self, dt: float) -> None:
         self.dt = dt
         self.reset()
 
     def reset(self, steer: float = 0.0) -> None:
-        """Begin, with the wheel turned to `steer`."""
+        """Starts forward, with the wheel turned to `steer`, -1 to 1."""
         self.reverse = False
         self.pressed = 0.0  # s for which the brake has been held at standstill
         self.steer = steer
 
     def update(self, pedals: Pedals, v: float) -> VehicleCommand:
-        """The command of this tick. v: m/s along the body, negative in reverse."""
+        """Returns the command of this tick. v: m/s along the body, negative in reverse."""
         self._select_gear(pedals, v)
         self._turn(pedals, v)
         throttle, brake = pedals.throttle, pedals.brake
@@ -306,7 +312,7 @@ class Hands:
         return VehicleCommand(throttle, brake, self.steer, pedals.handbrake, self.reverse)
 
     def _select_gear(self, pedals: Pedals, v: float) -> None:
-        """Reverse by holding the brake at standstill; forward again by the throttle."""
+        """Selects reverse after HOLD_TO_REVERSE s of brake at standstill, forward by the throttle."""
         standing = abs(v) < STANDSTILL
         if self.reverse:
             if standing and pedals.throttle >= PRESSED > pedals.brake:

@@ -53,7 +53,7 @@ def work(job: Job, warm_up: Callable[[], None] | None) -> Finished:
 
 
 def _warm_once(warm_up: Callable[[], None]) -> None:
-    """Compile before the first job of this process, so that no deadline pays for it."""
+    """Compiles before the first job of this process, so that no deadline pays for it."""
     with _warming:
         if warm_up not in _warmed:
             warm(warm_up)
@@ -62,9 +62,10 @@ def _warm_once(warm_up: Callable[[], None]) -> None:
 
 @contextmanager
 def runner_of(address: str, warm_up: Callable[[], None] | None = None) -> Iterator[Runner]:
-    """A runner on a cluster: `local:N` starts one here, else the scheduler at the address.
+    """Yields a runner on a cluster: `local:N` starts one here, else the scheduler at the address.
 
     warm_up: compiles every kernel that a job may need, on each of the cluster's processes.
+    ConfigError for another N, BackendError without a scheduler.
     """
     try:
         dask: Any = import_module("distributed")
@@ -93,7 +94,7 @@ def runner_of(address: str, warm_up: Callable[[], None] | None = None) -> Iterat
 def run_on(
     client: Any, jobs: Iterable[Job], warm_up: Callable[[], None] | None = None
 ) -> Iterator[Finished]:
-    """Run all jobs on the cluster; yield each as it ends."""
+    """Runs all jobs on the cluster and yields each as it ends; a failed one is tried ATTEMPTS times."""
     dask: Any = import_module("distributed")
     waiting = list(jobs)[::-1]
     if not waiting:

@@ -42,13 +42,13 @@ class _Queue:
     attempts: dict[str, int] = field(default_factory=dict)
 
     def next(self) -> Job:
-        """The next job to try."""
+        """Takes the next job off the queue and counts the try."""
         job = self.waiting.popleft()
         self.attempts[job.key] = self.attempts.get(job.key, 0) + 1
         return job
 
     def again(self, job: Job) -> bool:
-        """Put a job whose worker died back, if it has tries left."""
+        """Puts a failed job back; returns False where it has no try left."""
         if self.attempts[job.key] >= ATTEMPTS:
             return False
         self.waiting.append(job)
@@ -56,14 +56,14 @@ class _Queue:
 
 
 def run_jobs(jobs: Iterable[Job], workers: int) -> Iterator[Finished]:
-    """Run all jobs on `workers` processes; yield each as it ends, in order of ending."""
+    """Runs all jobs on `workers` processes; yields each as it ends, failures as outcomes."""
     waiting = list(jobs)
     with keep_workers(min(workers, len(waiting))) as run:
         yield from run(waiting)
 
 
 def _supervise(crew: list[Worker | None], queue: _Queue) -> Iterator[Finished]:
-    """Gives waiting jobs to idle workers, and yields each as it finishes; failed ones may be tried again.
+    """Gives waiting jobs to idle workers and yields each as it ends; failed ones are tried again.
 
     crew: the workers by place; None where there is none yet, or no more.
     """
@@ -93,7 +93,7 @@ def _supervise(crew: list[Worker | None], queue: _Queue) -> Iterator[Finished]:
 
 @contextmanager
 def keep_workers(workers: int) -> Iterator[Runner]:
-    """Keep worker processes from one batch of jobs to the next, for many small batches."""
+    """Yields a runner whose worker processes stay from one batch of jobs to the next."""
     crew: list[Worker | None] = [None] * max(workers, 1)
     with single_threaded():
         try:
@@ -105,7 +105,7 @@ def keep_workers(workers: int) -> Iterator[Runner]:
 
 
 def warm(compile_all: Callable[[], None]) -> None:
-    """Compile in a process of its own, so that it is done once and not by each worker (X-10)."""
+    """Compiles in a process of its own, so that it is done once and not by each worker (X-10)."""
     with single_threaded():
         process = CONTEXT.Process(target=_warm, args=(compile_all,))
         process.start()
@@ -113,7 +113,7 @@ def warm(compile_all: Callable[[], None]) -> None:
 
 
 def local(workers: int, warm_up: Callable[[], None] | None = None) -> Runner:
-    """The pool of this machine; kernels are compiled before its first job."""
+    """Returns a runner on this machine; `warm_up` is called once, before its first job."""
 
     def run(jobs: Iterable[Job]) -> Iterator[Finished]:
         nonlocal warm_up
@@ -135,7 +135,7 @@ def _warm(compile_all: Callable[[], None]) -> None:
 
 @contextmanager
 def single_threaded() -> Iterator[None]:
-    """Children inherit one thread for each library; the parent's own settings come back after."""
+    """Sets one thread for each library in the environment of children; restores it at the end."""
     before = {name: os.environ.get(name) for name in SINGLE_THREADED}
     os.environ.update(dict.fromkeys(SINGLE_THREADED, "1"))
     try:

@@ -61,7 +61,7 @@ class _Answer:
 
 
 class Worker:
-    """A process that does one job at a time and can be killed at any moment, with its children."""
+    """Runs one job at a time in a process that can be killed at any moment, with its children."""
 
     def __init__(self) -> None:
         self.pipe, there = CONTEXT.Pipe()
@@ -73,17 +73,20 @@ class Worker:
         self.started = 0.0
 
     def give(self, job: Job) -> None:
-        """Begin a job; OSError when the process died idle."""
+        """Begins a job; OSError when the process died idle."""
         self.pipe.send(job)
         self.job, self.started = job, time.monotonic()
 
     def patience(self) -> float:
-        """Seconds until the job's deadline."""
+        """Returns the s until the job's deadline, 0 at least, and SPARE more."""
         assert self.job is not None
         return max(self.started + self.job.deadline_s - time.monotonic(), 0.0) + SPARE
 
     def collect(self) -> Finished | None:
-        """What became of the job, None while it runs."""
+        """Returns how the job ended, None while it runs; past its deadline a timeout, and it still runs.
+
+        A dead process is a crash. The caller dismisses a worker whose job failed.
+        """
         job = self.job
         assert job is not None
         wall = time.monotonic() - self.started
@@ -109,7 +112,7 @@ class Worker:
         return None
 
     def _answer(self, job: Job) -> _Answer | None:
-        """What our process says of this job; words of others, such as its children, are no answer."""
+        """Returns what our process says of this job, None without; words of its children do not count."""
         while self.pipe.poll():  # also at its end
             answer = self.pipe.recv()
             if (
@@ -122,11 +125,11 @@ class Worker:
 
     @property
     def signs(self) -> tuple[Any, ...]:
-        """What becomes ready when there is something to collect: its pipe, and its end."""
+        """Returns what becomes ready when there is something to collect: its pipe, and its end."""
         return self.pipe, self._end
 
     def dismiss(self) -> None:
-        """Kill it and what it started, whatever they do."""
+        """Kills the process and what it started."""
         self.pipe.close()
         _kill_group(self.process.pid)
         self.process.kill()
@@ -137,7 +140,7 @@ class Worker:
 
 
 def give_job(worker: Worker | None, job: Job) -> Worker:
-    """A worker that has begun the job: this one, or a new one when it died idle, no fault of the job."""
+    """Returns a worker that has begun the job: this one, or a new one when it is None or died idle."""
     if worker is not None:
         try:
             worker.give(job)
@@ -151,7 +154,7 @@ def give_job(worker: Worker | None, job: Job) -> Worker:
 
 
 def _end_of(process: SpawnProcess) -> int:
-    """A descriptor that is ready when the process has ended, even if a child of it lives on."""
+    """Returns a descriptor that is ready when the process has ended, even if a child of it lives on."""
     assert process.pid is not None
     if hasattr(os, "pidfd_open"):
         with suppress(OSError):
@@ -160,7 +163,7 @@ def _end_of(process: SpawnProcess) -> int:
 
 
 def _kill_group(leader: int | None) -> None:
-    """Kill all processes of a worker's group, if it has come to lead one."""
+    """Kills all processes of a worker's group, if the worker leads one; nothing for None."""
     if leader is None or not hasattr(os, "killpg"):
         return
     try:
@@ -175,7 +178,7 @@ def _kill_group(leader: int | None) -> None:
 
 
 def _work(pipe: Connection) -> None:
-    """The worker process: jobs in, values out, until the parent is gone."""
+    """Runs jobs from the pipe in the worker process and sends their values, until the parent is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
     if hasattr(os, "setpgid"):
         os.setpgid(0, 0)  # so that what a stack starts can be ended with it
@@ -194,7 +197,7 @@ def _work(pipe: Connection) -> None:
 
 
 def _run_job(job: Job) -> tuple[Any, str]:
-    """The value of a job, or what it failed of; no foreign code ends the worker by an exception."""
+    """Returns the value of a job and "", or None and what it failed of; it never raises."""
     try:
         return job.work(job.argument), ""
     except SkidpadError as error:  # one sentence for a person; where it arose says no more
@@ -204,7 +207,7 @@ def _run_job(job: Job) -> tuple[Any, str]:
 
 
 def _send(pipe: Connection, answer: _Answer) -> None:
-    """Answer; a value that cannot be sent is the job's failure."""
+    """Sends the answer; of a value that cannot be sent, a failure. Exits where the parent is gone."""
     try:
         pipe.send(answer)
     except (EOFError, OSError):  # the parent is gone
@@ -216,7 +219,10 @@ def _send(pipe: Connection, answer: _Answer) -> None:
 
 
 def die_with_parent() -> None:
-    """Leave at once when the parent vanishes: an orphan would write beside a resumed campaign."""
+    """Starts a thread that kills this process and its children when the parent vanishes.
+
+    An orphan would write beside a resumed campaign.
+    """
     parent = multiprocessing.parent_process()
     assert parent is not None
 

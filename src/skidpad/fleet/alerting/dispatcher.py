@@ -24,7 +24,7 @@ SERVICE = "dispatcher"
 
 
 class Dispatcher:
-    """`work` is one round of all threads, and tests call it themselves."""
+    """Escalates and relays the alerts of the last DAY s in threads of its own."""
 
     def __init__(
         self, engine: Engine, hub: Hub, clock: Callable[[], float], relays: Sequence[Relay] = ()
@@ -33,26 +33,26 @@ class Dispatcher:
         self._rounds: list[Rounds] = []
 
     def start(self) -> None:
-        """Begin to look after alerts."""
+        """Starts a thread that escalates and one per relay, each looking every LOOK_S s or when woken."""
         self._rounds = [Rounds("escalation", self.escalate, LOOK_S)]
         self._rounds += [Rounds(r.name, partial(self.relay, r), LOOK_S) for r in self.relays]
         for one in self._rounds:
             one.start()
 
     def wake(self) -> None:
-        """Wakes all relays, as there is something new."""
+        """Wakes all threads, as there is something new."""
         for one in self._rounds:
             one.wake()
 
     def close(self) -> None:
-        """End the thread; safe to call twice."""
+        """Ends all threads and waits for them; safe to call twice."""
         for one in self._rounds:
             one.ended.set()
         for one in self._rounds:
             one.close()
 
     def work(self) -> None:
-        """Escalate, then relay to each."""
+        """Does one round of all threads in the caller's: escalates overdue alerts, then sends what is due."""
         self.escalate()
         for relay in self.relays:
             self.relay(relay)
@@ -72,7 +72,7 @@ class Dispatcher:
             self.wake()
 
     def relay(self, relay: Relay) -> None:
-        """Send what `relay` was not sent at its level."""
+        """Sends by `relay` each alert that it wants and that is due there at the alert's present level."""
         now = self.clock()
         with self.engine.connect() as connection:
             known = alerts_since(connection, now - DAY)
@@ -96,7 +96,10 @@ class Dispatcher:
 
 
 def _is_due(alert: Alert, relay: str, now: float) -> bool:
-    """Not relayed at this level, and not tried a moment ago: 1, 2, 4, ... s between tries."""
+    """Returns True when an open alert was not relayed at this level and a try is due, of TRIES at most.
+
+    A try is due at once, then 1, 2, 4, ... s after the one before.
+    """
     mine = [
         e
         for e in alert.events

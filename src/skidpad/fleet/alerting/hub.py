@@ -22,11 +22,11 @@ class Hub:
             self._counts[topic] += 1
 
     def count(self, topic: str) -> int:
-        """How often something happened so far."""
+        """Returns how many events of a topic were told so far, 0 for an unknown one."""
         return self._counts[topic]
 
     async def wait_for_change(self, topic: str, seen: int, wait_s: float) -> int:
-        """The count once it is no longer `seen`, or after `wait_s`."""
+        """Returns the topic's count as soon as it differs from `seen`, or unchanged after `wait_s` s."""
         for _ in range(round(wait_s / STEP_S)):
             if self.count(topic) != seen:
                 break

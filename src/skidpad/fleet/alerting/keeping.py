@@ -80,7 +80,7 @@ class Alert:
 
     @property
     def acknowledged_by(self) -> str | None:
-        """Who took it up; None: nobody yet."""
+        """Returns the id of the principal that first acknowledged the alert; None without one."""
         return next((e.actor for e in self.events if e.what == What.ACKNOWLEDGED.value), None)
 
     @property
@@ -90,7 +90,7 @@ class Alert:
 
     @property
     def level(self) -> int:
-        """How often it was escalated."""
+        """Returns how many times the alert was escalated."""
         return sum(e.what == What.ESCALATED.value for e in self.events)
 
     def plain(self) -> dict[str, Any]:
@@ -109,7 +109,7 @@ class Alert:
 
 
 def parse_alert(body: bytes) -> AlertText:
-    """An alert of a request's body; Refused when it is none."""
+    """Returns the alert in a request's body; Refused (413, 422) when it is too long or none."""
     if len(body) > 65536:
         raise Refused(413, "an alert may have 65536 bytes")
     try:
@@ -125,7 +125,10 @@ def keep_alert(
     alert: AlertText,
     times: tuple[float, float | None],
 ) -> tuple[str, bool]:
-    """Keep an alert; its id, and whether it is new. times: of the server, of the vehicle (s)."""  # fmt: skip
+    """Inserts an alert; returns its id and True, or False where the vehicle's key has kept it already.
+
+    times: s, of the server and of the vehicle. Refused (409) when the key had another content.
+    """  # fmt: skip
     content = msgspec.json.encode(alert)
     known = connection.execute(
         select(alerts.c.id, alerts.c.digest).where(
@@ -178,7 +181,10 @@ def _with_events(connection: Connection, rows: Any) -> list[Alert]:
 
 
 def answer(connection: Connection, alert: Alert, what: What, by: Principal, at: float) -> None:
-    """Acknowledge, escalate or close; Refused (409) when that was done already."""
+    """Adds an event that acknowledges, escalates or closes an alert at `at` s.
+
+    Refused (409) when it is closed or acknowledged already, or was escalated LEVELS times.
+    """
     if alert.is_closed:
         raise Refused(409, "this alert is closed")
     if what is What.ACKNOWLEDGED and alert.acknowledged_by is not None:
@@ -189,7 +195,10 @@ def answer(connection: Connection, alert: Alert, what: What, by: Principal, at: 
 
 
 def overdue(alert: Alert, now: float) -> bool:
-    """Whether nobody took it up for so long that it goes one level up."""
+    """Returns True when an open alert without an acknowledgement is to go one level up.
+
+    That is ESCALATE_AFTER_S s after its beginning per level, up to LEVELS.
+    """
     if alert.is_closed or alert.acknowledged_by is not None or alert.level >= LEVELS:
         return False
     at: float = alert.row.at

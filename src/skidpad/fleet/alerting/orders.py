@@ -44,7 +44,7 @@ class Signer:
     """The fleet's key for orders, in its data folder; vehicles know the public half."""
 
     def __init__(self, folder: Path) -> None:
-        """Reads the key, or makes one; FileError when it cannot be used."""
+        """Reads orders.key in the folder, or makes one, and writes orders.pub; FileError for no such key."""
         path = folder / "orders.key"
         if not path.exists():
             folder.mkdir(parents=True, exist_ok=True)
@@ -60,7 +60,7 @@ class Signer:
         write_bytes(folder / "orders.pub", self.public.hex().encode() + b"\n")
 
     def sign(self, order: dict[str, Any]) -> dict[str, str]:
-        """The order as it is sent: its text and the signature of exactly that text."""
+        """Returns the order as it is sent: its JSON text and the signature of exactly that text, in hex."""
         text = json.dumps(order, sort_keys=True, separators=(",", ":"))
         return {"order": text, "signature": self._key.sign(text.encode()).hex()}
 
@@ -88,10 +88,11 @@ class Ordered:
 def give_order(
     connection: Connection, who: Principal, alert: str, asked: tuple[Order, str], at: float
 ) -> Ordered:
-    """Order something of the vehicle of an alert; Refused (404) when `who` may not see the alert.
+    """Keeps an order for the vehicle of an alert, which may fetch it for VALID_S s, and returns it.
 
     asked: the order and the key of the request. The same request again gives the order that it gave,
-    with its time: nothing is ordered anew.
+    with its time: nothing is ordered anew. Refused (404) for an alert out of sight, (409) for a key
+    that was used for another order.
     """
     what, key = asked
     row = alert_of(connection, who, alert).row
@@ -118,7 +119,7 @@ def give_order(
 def hand_out(
     connection: Connection, signer: Signer, vehicle: str, challenge: str, at: float
 ) -> list[dict[str, str]]:
-    """The orders that wait for `vehicle`, each handed out once, signed with its challenge."""
+    """Returns the unexpired orders that wait for `vehicle`, signed with its challenge; each only once."""
     rows = connection.execute(
         select(orders)
         .outerjoin(deliveries, deliveries.c.order == orders.c.id)
@@ -146,7 +147,10 @@ def hand_out(
 
 
 def note_answer(connection: Connection, who: Principal, order: str, what: str, at: float) -> str:
-    """Keep what the vehicle did with its order, once; the id of the alert that led to it."""
+    """Keeps what the vehicle did with its order and returns the id of the alert that led to it.
+
+    Refused (404) for an order out of sight, (409) when this was told before.
+    """
     row = connection.execute(
         select(orders).where(orders.c.id == order, visible(who, orders))
     ).first()

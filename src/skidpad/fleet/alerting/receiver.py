@@ -38,7 +38,7 @@ class Receiver:
         self.v_max = inf  # m/s; 0: it is in a minimal-risk stop
 
     def challenge(self) -> str:
-        """A fresh question; of old ones the last few stay open."""
+        """Returns a fresh random challenge and opens it; of all open ones the newest OPEN_MAX stay."""
         while len(self._asked) >= OPEN_MAX:
             del self._asked[next(iter(self._asked))]
         name = secrets.token_hex(16)
@@ -46,7 +46,10 @@ class Receiver:
         return name
 
     def receive(self, text: str, signature: str) -> Verdict:
-        """Judge an order; `v_max` is then what it says. A good order to stop stops for good."""
+        """Returns the verdict on an order; when obeyed, sets `v_max`. A stop stands against later orders.
+
+        Its challenge is then used up. signature: hexadecimal.
+        """
         try:
             self._key.verify(bytes.fromhex(signature), text.encode())
         except (InvalidSignature, ValueError):

@@ -45,7 +45,7 @@ class RelayType:
 
 
 def make_webhook(setting: str, host: RelayHost) -> Relay:
-    """Returns the webhook of a setting TENANT=URL."""
+    """Returns the webhook of a setting TENANT=URL; ConfigError for another form, tenant or host."""
     tenant, equals, url = setting.partition("=")
     if not equals:
         raise ConfigError(f"--webhook must read TENANT=URL, got {setting!r}")
@@ -53,7 +53,7 @@ def make_webhook(setting: str, host: RelayHost) -> Relay:
 
 
 def make_mqtt(setting: str, host: RelayHost) -> Relay:
-    """Returns the relay to the broker of the service."""
+    """Returns the relay to the broker of the service; ConfigError without one. The setting is not read."""
     del setting
     if host.broker is None:
         raise ConfigError("the relay mqtt needs a broker: give --mqtt HOST[:PORT]")

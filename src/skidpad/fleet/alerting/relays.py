@@ -24,7 +24,7 @@ class Relay(Protocol):
     name: str
 
     def wants(self, operator: str) -> bool:
-        """Whether it takes alerts of that operator."""
+        """Returns True when it takes alerts of that operator."""
 
     def send(self, alert: dict[str, Any]) -> None:
         """Relay one alert; BackendError when it was not taken."""
@@ -53,7 +53,7 @@ class Webhook:
         return operator == self.operator
 
     def send(self, alert: dict[str, Any]) -> None:
-        """Posts an alert as JSON; an answer that comes drop by drop is given up like none."""
+        """Posts an alert as JSON; BackendError when none or no 2xx status comes within `timeout_s`."""
         try:
             status = asyncio.run(asyncio.wait_for(self._post(alert), self.timeout_s))
         except (httpx.HTTPError, asyncio.TimeoutError) as error:
@@ -62,7 +62,7 @@ class Webhook:
             raise BackendError(f"{self.name}: answered {status}")
 
     async def _post(self, alert: dict[str, Any]) -> int:
-        """The status of the answer; nothing else of it is read."""
+        """Posts the alert and returns the status of the answer, whose body is not read."""
         async with (
             httpx.AsyncClient(
                 timeout=self.timeout_s, follow_redirects=False, trust_env=False
@@ -81,11 +81,11 @@ class Mqtt:
         self.name = "mqtt"
 
     def wants(self, operator: str) -> bool:
-        """Whether an operator's alerts go this way: each has a topic."""
+        """Returns True for any operator with an id, as each has a topic."""
         return bool(operator)
 
     def send(self, alert: dict[str, Any]) -> None:
-        """Connect, publish, and wait for the broker's word."""
+        """Connects, publishes, and waits for the broker's word; BackendError when it does not come."""
         try:
             asyncio.run(self._publish(alert))
         except (self._library.MqttError, OSError, TimeoutError) as error:

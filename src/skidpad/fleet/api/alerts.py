@@ -34,7 +34,7 @@ router = APIRouter(prefix="/api/v1/alerts", tags=["alerts"])
 async def raise_alert(
     request: Request, who: Reporter, key: Key, vehicle_time: VehicleTime = None
 ) -> dict[str, Any]:
-    """Keep an alert and relay it at once."""
+    """Keeps a vehicle's alert and has it relayed; answers its id and whether it was known."""
     fleet = fleet_of(request)
     alert = parse_alert(await read_body(request, fleet.limits))
     return await run_in_threadpool(_keep, fleet, who, key, alert, vehicle_time)
@@ -43,7 +43,7 @@ async def raise_alert(
 def _keep(
     fleet: Fleet, who: Principal, key: str, alert: AlertText, vehicle_time: float | None
 ) -> dict[str, Any]:
-    """Keeps a vehicle's alert and has it pushed on; returns its id and whether it was known."""
+    """Keeps a vehicle's alert and wakes pages and relays if it is new; returns its id and if it was known."""
     vehicle = str(who.vehicle)
     operator, manufacturer = owners_of(fleet, vehicle)
     owned = {"vehicle": vehicle, "operator": operator, "manufacturer": manufacturer}
@@ -59,7 +59,7 @@ def _keep(
 async def list_alerts(
     request: Request, who: Reader, seen: int = -1, wait: Wait = 0.0
 ) -> dict[str, Any]:
-    """The newest alerts; with `seen` of the last answer it waits until there is something new."""
+    """Answers with the newest alerts and a count; with that as `seen`, waits `wait` s for a change."""
     fleet = fleet_of(request)
     count = await fleet.hub.wait_for_change(f"alerts {who.tenant}", seen, wait)
 
@@ -78,7 +78,7 @@ def acknowledge(request: Request, who: Answerer, alert: str) -> dict[str, Any]:
 
 @router.post("/{alert}/escalate")
 def escalate(request: Request, who: Answerer, alert: str) -> dict[str, Any]:
-    """Hand it one level up; it is relayed again."""
+    """Raises an alert one level, which relays it again; returns the alert."""
     return keep_answer(fleet_of(request), who, alert, What.ESCALATED)
 
 
@@ -108,7 +108,7 @@ def order(request: Request, who: Teleoperator, alert: str, to: Order, key: Key) 
 def keep_order(
     fleet: Fleet, who: Principal, alert: str, asked: tuple[Order, str]
 ) -> dict[str, Any]:
-    """Give an order (what, and the request's key) and tell the vehicle that waits."""
+    """Keeps an order (what, and the request's key) and wakes its vehicle; returns id and expiry (s)."""
     with fleet.engine.begin() as connection:
         order = give_order(connection, who, alert, asked, fleet.clock())
     fleet.hub.tell(f"orders {order.vehicle}")

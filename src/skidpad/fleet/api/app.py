@@ -67,18 +67,18 @@ async def _answer_refusal(request: Request, error: Exception) -> JSONResponse:
 
 
 async def _answer_failure(request: Request, error: Exception) -> JSONResponse:
-    """What was kept cannot be used: one sentence, without a place on disk."""
+    """Returns status 422 with the one sentence of an error of ours."""
     del request
     return JSONResponse({"detail": str(error)}, 422)
 
 
 async def _unkept(request: Request, error: Exception) -> JSONResponse:
-    """A word that the database does not take, such as a NUL in PostgreSQL."""
+    """Returns status 422 for text that the database does not take, such as a NUL in PostgreSQL."""
     del request, error
     return JSONResponse({"detail": UNKEPT}, 422)
 
 
 async def _meanwhile(request: Request, error: Exception) -> JSONResponse:
-    """Two requests kept the same at one moment, and this one came second."""
+    """Returns status 409 to the later of two requests that kept the same at one moment."""
     del request, error
     return JSONResponse({"detail": MEANWHILE}, 409)

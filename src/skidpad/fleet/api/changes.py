@@ -69,7 +69,7 @@ def _parse_body(body: bytes, type: Any) -> Any:
 
 @router.post("/changes")
 async def new_change(request: Request, who: Changer) -> dict[str, str]:
-    """Propose a change with the hazards that led to it; the payload is checked by its reader."""
+    """Keeps a proposed change with the hazards that led to it, checks its payload; answers its id."""
     fleet = fleet_of(request)
     text = _parse_body(await read_body(request, fleet.limits), ProposalText)
     proposal = Proposal(
@@ -84,21 +84,21 @@ async def new_change(request: Request, who: Changer) -> dict[str, str]:
 
 @router.get("/changes/{change}")
 def trace_change(request: Request, who: Reader, change: str) -> dict[str, Any]:
-    """One record: hazards, analysis, change, releases, looks, re-evaluation."""
+    """Answers with the record of a change: hazards, analysis, releases, looks and re-evaluation."""
     with fleet_of(request).engine.connect() as connection:
         return trace(connection, who, change)
 
 
 @router.get("/changes/{change}/payload", response_class=Response)
 def payload(request: Request, who: Changer, change: str) -> Response:
-    """The payload, to be signed off line."""
+    """Answers with the bytes of a change's payload, to be signed off line."""
     content = payload_of(fleet_of(request), who, change)[2]
     return Response(content, media_type="application/octet-stream")
 
 
 @router.post("/changes/{change}/evaluate")
 async def evaluate(request: Request, who: Changer, change: str) -> list[dict[str, Any]]:
-    """Judge again the very scenes that led to the change, under what was and under the change."""
+    """Judges the scenes that led to the change again, under the payload sent (before) and the change."""
     fleet = fleet_of(request)
     with fleet.engine.connect() as connection:
         trace(connection, who, change)
@@ -116,7 +116,7 @@ def update_list(request: Request, who: Changer) -> Response:
 
 @router.post("/releases")
 async def new_release(request: Request, who: Changer) -> dict[str, str]:
-    """Publish a signed change and begin its first stage; the plan is fixed with it."""
+    """Publishes a change that was signed off line and starts stage one of its plan; answers the id."""
     fleet = fleet_of(request)
     text = _parse_body(await read_body(request, fleet.limits), ReleaseText)
     targets = _bytes(text.targets)
@@ -133,7 +133,7 @@ def list_releases(request: Request, who: Reader) -> list[dict[str, Any]]:
 
 @router.post("/releases/{release}/look")
 def look(request: Request, who: Changer, release: str) -> dict[str, Any]:
-    """Look at a release: it advances, is reverted, or waits for more drives."""
+    """Looks at a release, which may advance or revert it; answers with finding (or null) and state."""
     fleet = fleet_of(request)
     finding = look_at(fleet, who, release)
     with fleet.engine.connect() as connection:

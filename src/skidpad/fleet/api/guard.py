@@ -23,7 +23,7 @@ class Guard:
         self._known: dict[str, tuple[float, Principal]] = {}
 
     def principal(self, authorization: str | None) -> Principal:
-        """Whose credential the header carries; Refused (401, 429) otherwise."""
+        """Returns the principal of a header `Bearer TOKEN`; Refused: 401 for no valid one, 429 too often."""
         scheme, _, token = (authorization or "").partition(" ")
         if scheme.lower() != "bearer" or not token:
             raise Refused(401, "a credential is needed: Authorization: Bearer TOKEN")
@@ -57,7 +57,7 @@ class Needs:
     action: Action
 
     async def __call__(self, request: Request) -> Principal:
-        """Refused (401, 403, 429) unless granted."""
+        """Returns the principal of the request; Refused: 401 or 429 by the guard, 403 without the right."""
         guard: Guard = request.app.state.guard
         who = guard.principal(request.headers.get("authorization"))
         if not who.may(self.action):

@@ -40,14 +40,14 @@ def list_hazards(
 
 @router.get("/{hazard}")
 def one_hazard(request: Request, who: Reader, hazard: str) -> dict[str, Any]:
-    """One hazard with the head of its record."""
+    """Answers with one hazard and the head of its record; 404 for one out of sight."""
     with fleet_of(request).engine.connect() as connection:
         return hazard_row(connection, who, hazard)
 
 
 @router.get("/{hazard}/record", response_class=PlainTextResponse)
 def record(request: Request, who: Reader, hazard: str) -> str:
-    """The record as the vehicle sent it."""
+    """Answers with the hazard's record as text, just as the vehicle sent it."""
     fleet = fleet_of(request)
     with fleet.engine.connect() as connection:
         hazard_row(connection, who, hazard)
@@ -63,7 +63,10 @@ def scenario(request: Request, who: Exporting, hazard: str) -> Response:
 
 
 def export_scenario(fleet: Fleet, who: Principal, hazard: str) -> bytes:
-    """Return a .zip of OpenSCENARIO and OpenDRIVE; that it was asked for is kept as an event."""
+    """Returns a .zip of a hazard's OpenSCENARIO and OpenDRIVE, and keeps the export as an event.
+
+    Refused: 501 without an exporter, 404 for a hazard out of sight.
+    """
     if fleet.exporter is None:
         raise Refused(501, "this fleet was started without an exporter of scenarios")
     with fleet.engine.connect() as connection:

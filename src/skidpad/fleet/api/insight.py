@@ -36,7 +36,7 @@ def read_trends(request: Request, who: Analyst, days: Days = 1) -> dict[str, Any
 
 @router.get("/places")
 def read_places(request: Request, who: PlaceReader) -> list[dict[str, Any]]:
-    """Places x hazard x weather."""
+    """Answers with the counts of hazards by place, hazard and weather."""
     with fleet_of(request).engine.connect() as connection:
         return [asdict(row) for row in by_place.places(connection, who)]
 
@@ -71,7 +71,7 @@ def case(request: Request, who: CaseReader) -> list[dict[str, Any]]:
 
 @router.post("/session")
 def session(request: Request, who: Visitor) -> dict[str, str]:
-    """An address that opens the pages once, as this person."""
+    """Answers with the path of the role's first page, whose token opens the pages once; 404 without pages."""
     sessions = getattr(request.app.state, "sessions", None)
     if sessions is None:
         raise Refused(404, "this fleet serves no pages")

@@ -21,7 +21,10 @@ router = APIRouter(prefix="/api/v1/orders", tags=["orders"])
 async def fetch(
     request: Request, who: Receiving, challenge: Challenge, wait: Wait = 0.0
 ) -> list[dict[str, str]]:
-    """The orders that wait; with `wait` the answer comes when there is one, or after that time."""
+    """Answers with the vehicle's waiting orders, signed with its challenge and then handed out.
+
+    Without one it waits up to `wait` s, and answers with an empty list.
+    """
     fleet, vehicle = fleet_of(request), str(who.vehicle)
     topic = f"orders {vehicle}"
 
@@ -40,7 +43,7 @@ async def fetch(
 def report(
     request: Request, who: Receiving, order: str, what: Literal["obeyed", "standing", "refused"]
 ) -> dict[str, Any]:
-    """What the vehicle did with its order."""
+    """Keeps what the vehicle did with its order, which can be told once."""
     fleet = fleet_of(request)
     with fleet.engine.begin() as connection:
         note_answer(connection, who, order, what, fleet.clock())

@@ -17,7 +17,7 @@ router = APIRouter(prefix="/api/v1", tags=["patterns"])
 
 @router.post("/analyses")
 def start_analysis(request: Request, who: Analyst) -> dict[str, Any]:
-    """Look for recurring hazards among those of own vehicles."""
+    """Clusters the hazards of the principal's vehicles anew; answers its id and counts."""
     done = analyse(fleet_of(request), who)
     return {
         "analysis": done.id,

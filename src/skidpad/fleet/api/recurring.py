@@ -81,7 +81,7 @@ def list_work(
 
 @router.post("/{subject}/state")
 async def set_state(request: Request, who: Triager, subject: str) -> dict[str, Any]:
-    """Say what became of a recurring hazard; the change is kept as an event."""
+    """Sets the state of a recurring hazard and keeps the change as an event; 404, 422 when refused."""
     fleet = fleet_of(request)
     await run_in_threadpool(require_subject, fleet, who, subject)
     try:
@@ -93,7 +93,7 @@ async def set_state(request: Request, who: Triager, subject: str) -> dict[str, A
 
 @router.get("/{subject}/events")
 def list_events(request: Request, who: Reader, subject: str) -> list[dict[str, Any]]:
-    """Every change of a recurring hazard, in order."""
+    """Answers with every change of a recurring hazard, oldest first; 404 for one out of sight."""
     fleet = fleet_of(request)
     require_subject(fleet, who, subject)
     with fleet.engine.connect() as connection:

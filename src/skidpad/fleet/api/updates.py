@@ -24,7 +24,7 @@ def _repository(request: Request, who: Principal) -> Repository:
 
 @router.get("/assignment")
 def what_to_run(request: Request, who: Receiving) -> dict[str, str]:
-    """The release and payload that this vehicle is to run, and what stands otherwise."""
+    """Answers with the release and payload that this vehicle is to run, "" for its standing one."""
     fleet, vehicle = fleet_of(request), str(who.vehicle)
     with fleet.engine.connect() as connection:
         return assignment(connection, owners_of(fleet, vehicle)[1], vehicle)
@@ -32,12 +32,12 @@ def what_to_run(request: Request, who: Receiving) -> dict[str, str]:
 
 @router.get("/metadata/{name}", response_class=Response)
 def metadata(request: Request, who: Receiving, name: str) -> Response:
-    """A file of The Update Framework."""
+    """Answers with a metadata file of The Update Framework, of the vehicle's manufacturer."""
     return Response(_repository(request, who).metadata(name), media_type="application/json")
 
 
 @router.get("/targets/{name}", response_class=Response)
 def payload(request: Request, who: Receiving, name: str) -> Response:
-    """A payload by digest and name."""
+    """Answers with a payload of the vehicle's manufacturer by its name with digest."""
     content = _repository(request, who).payload(name)
     return Response(content, media_type="application/octet-stream")

@@ -39,7 +39,7 @@ async def upload(
     drive: DriveName = "",
     vehicle_time: VehicleTime = None,
 ) -> dict[str, Any]:
-    """Keep a batch (gzip); the answer comes after the commit and names the records' ids."""
+    """Keeps a batch (gzip) and answers after the commit with the ids of its records."""
     fleet = fleet_of(request)
     body = await read_body(request, fleet.limits)
 
@@ -52,7 +52,7 @@ async def upload(
 
 
 async def read_body(request: Request, limits: Limits) -> bytes:
-    """The body, given up as soon as it is longer than allowed."""
+    """Returns the request's body; Refused (413) as soon as it is longer than allowed."""
     parts, size = [], 0
     async for part in request.stream():
         size += len(part)

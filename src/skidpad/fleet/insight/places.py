@@ -43,9 +43,9 @@ class PlaceRow:
 
 
 def places(connection: Connection, who: Principal) -> list[PlaceRow]:
-    """What happened where, most frequent first; places of fewer than 3 vehicles are left out.
+    """Returns what happened where, most frequent first; rows of fewer than 3 vehicles are left out.
 
-    An authority sees all tenants' places, everybody else those of their own vehicles.
+    An authority sees all tenants' places, all other roles those of their own vehicles.
     """
     cell = [cast(func.floor(axis / CELL), Integer) for axis in (hazards.c.x, hazards.c.y)]
     group = (hazards.c.map, *cell, hazards.c.type, hazards.c.weather)
@@ -74,7 +74,7 @@ STYLE = (
 
 
 def html(rows: Sequence[PlaceRow]) -> str:
-    """The report as one page."""
+    """Returns the report of places as one HTML page."""
     head = "".join(f"<th>{escape(name)}</th>" for name in HEADS)
     body = "".join(
         "<tr>" + "".join(f"<td>{escape(_text(v))}</td>" for v in asdict(row).values()) + "</tr>"
@@ -89,7 +89,7 @@ def html(rows: Sequence[PlaceRow]) -> str:
 
 
 def pdf(rows: Sequence[PlaceRow]) -> bytes:
-    """The report as PDF, 25 places to a page."""
+    """Returns the report of places as PDF, 25 rows to a page."""
     from matplotlib.backends.backend_pdf import PdfPages
     from matplotlib.figure import Figure
 

@@ -28,7 +28,7 @@ PUBLISHED, KIND, SERVICE = "published", "research hour", "research"
 
 
 def export(fleet: Fleet) -> list[dict[str, Any]]:
-    """All rows that were ever published, in order; hours that are due are published first."""
+    """Publishes the hours that are due and returns all rows ever published, in order of their hours."""
     _publish_due(fleet)
     with fleet.engine.connect() as connection:
         rows = connection.execute(
@@ -67,7 +67,7 @@ def _publish_due(fleet: Fleet) -> None:
 def _gather_rows(
     connection: Connection, since: float, until: float
 ) -> dict[int, list[dict[str, Any]]]:
-    """Rows by hour of the server's time within [since, until)."""
+    """Returns rows by hour of the server's time within [since, until) s; groups below K vehicles go."""
     rows = connection.execute(
         select(
             hazards.c.map, hazards.c.x, hazards.c.y, hazards.c.type, hazards.c.weather,

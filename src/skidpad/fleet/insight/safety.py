@@ -26,7 +26,7 @@ class Claim:
 
 
 def claims(trends: list[Trend]) -> list[Claim]:
-    """Every statement with its worst indicator in the newest stretch in which it was seen."""
+    """Returns every statement of the safety case with its worst indicator, each in its newest stretch."""
     newest: dict[str, Trend] = {}
     for trend in trends:
         if trend.indicator not in newest or trend.at >= newest[trend.indicator].at:
@@ -49,7 +49,10 @@ def claims(trends: list[Trend]) -> list[Claim]:
 
 
 def _verdict(worst: Trend | None) -> str:
-    """Judges by the interval, so that few vehicles say `open` and not `supported`."""
+    """Returns "no evidence", "supported", "challenged" or "open", by the interval of the share violated.
+
+    Supported takes all of it at most SUPPORTED_BELOW and 10 vehicles; challenged all of it above.
+    """
     if worst is None:
         return "no evidence"
     if worst.interval.high <= SUPPORTED_BELOW and worst.vehicles >= 10:

@@ -62,7 +62,7 @@ class AlarmRate:
 
 
 def compact(fleet: Fleet) -> int:
-    """Sum up the batches of indicators that came since the last time; how many there were."""
+    """Adds the indicator batches that came since the last call to the warehouse; returns how many."""
     done, house = 0, fleet.warehouse
     with house.lock:
         since, after = house.since(), ""
@@ -79,7 +79,7 @@ def compact(fleet: Fleet) -> int:
 
 
 def _batches(fleet: Fleet, since: float, after: str) -> Sequence[Any]:
-    """The next batches of indicators in the order of their times and ids."""
+    """Returns at most GROUP indicator batches after (`since` s, id `after`), in order of time and id."""
     later = (batches.c.at > since) | ((batches.c.at == since) & (batches.c.id > after))
     query = (
         select(batches, vehicles.c.operator, vehicles.c.manufacturer)
@@ -103,7 +103,7 @@ def _table(fleet: Fleet, row: Any) -> pl.DataFrame:
 
 
 def trends(fleet: Fleet, who: Principal, days: int = 1) -> list[Trend]:
-    """Every indicator by stretches of `days`, of the vehicles that `who` may see."""
+    """Returns every indicator by stretches of `days`, of visible vehicles; takes in new batches before."""
     compact(fleet)
     column = _RIGHT.get(who.role, "operator")
     return [_trend(m, days) for m in fleet.warehouse.moments(column, who.tenant, days)]
@@ -116,7 +116,7 @@ _RIGHT: dict[Role, str | None] = {
 
 
 def _trend(m: Moments, days: int) -> Trend:
-    """Returns the trend of an indicator in one slot of `days` days."""
+    """Returns the trend of an indicator in one stretch of `days` days."""
     return Trend(
         indicator=m.indicator,
         at=m.slot * days * DAY,
@@ -147,7 +147,7 @@ def _limits(m: Moments) -> Interval:
 
 
 def alarm_rates(connection: Connection, who: Principal) -> list[AlarmRate]:
-    """Alarms per hour by kind, over all vehicles that `who` may see and that told of drives."""
+    """Returns alarms per hour by kind over all visible vehicles with a drive; empty without hours."""
     driven = connection.execute(
         select(drives.c.vehicle, func.sum(drives.c.seconds))
         .where(visible(who, drives))

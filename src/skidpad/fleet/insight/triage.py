@@ -87,7 +87,7 @@ def set_standing(
 def reopen(
     connection: Connection, who: Principal, recurred: Sequence[tuple[str, Standing, str]], at: float
 ) -> None:
-    """Keep that fixed hazards came back; each with its standing and the release that was driven."""
+    """Adds an event at `at` s per fixed hazard that came back: subject, standing before, release driven."""
     for subject, was, driven in recurred:
         again = Standing(State.REOPENED, was.owner, was.release)
         note = f"alarms from drives with {driven}"

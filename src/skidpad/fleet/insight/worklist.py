@@ -56,7 +56,7 @@ class Work:
 
     @property
     def severity(self) -> Severity:
-        """The class of the largest risk of its alarms."""
+        """Returns the class of the largest risk of its alarms: SEVERE_FROM, NOTABLE_FROM; or unscored."""
         known = [alarm.risk for alarm in self.alarms if alarm.risk is not None]
         if not known:
             return Severity.UNSCORED
@@ -66,40 +66,40 @@ class Work:
 
     @property
     def first(self) -> float:
-        """Time of the first alarm in s."""
+        """Returns the time of the first alarm in s."""
         return self.alarms[0].at
 
     @property
     def last(self) -> float:
-        """Time of the last alarm in s."""
+        """Returns the time of the last alarm in s."""
         return self.alarms[-1].at
 
     @property
     def earlier(self) -> int:
-        """Alarms in the first half of the period."""
+        """Returns the number of alarms in the first half of the time from `first` to `last`."""
         middle = (self.first + self.last) / 2
         return sum(alarm.at <= middle for alarm in self.alarms)
 
     @property
     def later(self) -> int:
-        """Alarms in the second half of the period."""
+        """Returns the number of alarms in the second half of the time from `first` to `last`."""
         return len(self.alarms) - self.earlier
 
     @property
     def likely_true(self) -> float:
-        """Alarms times precision; all of them where the precision was not measured."""
+        """Returns the number of alarms times precision; all of them where that was not measured."""
         share = 1.0 if self.precision is None else self.precision.share
         return share * len(self.alarms)
 
     @property
     def mean_risk(self) -> float | None:
-        """Mean risk of the alarms that have one."""
+        """Returns the mean risk of the alarms that have one; None where none has."""
         known = [alarm.risk for alarm in self.alarms if alarm.risk is not None]
         return sum(known) / len(known) if known else None
 
     @property
     def weight(self) -> float:
-        """Sum of risk times precision; an alarm without a risk counts in full."""
+        """Returns the sum of risk times precision; an alarm without a risk counts as 1."""
         share = 1.0 if self.precision is None else self.precision.share
         return share * sum(1.0 if a.risk is None else a.risk for a in self.alarms)
 
@@ -126,7 +126,10 @@ def rank_work(
     wanted: WorkFilter = WorkFilter(),  # frozen
     locate: Locate | None = None,
 ) -> list[Work]:
-    """Return the clusters as far as `wanted`, the one with most risk that is likely true first."""
+    """Returns the recurring hazards that pass `wanted`, by falling `weight`.
+
+    Alarms that `who` may not see, or that the filter drops, do not count. locate: finds the road.
+    """
     found = _read_alarms(connection, who, [id for c in clusters for id in c["members"]])
     groups = [
         (c, sorted((found[i] for i in c["members"] if i in found), key=_age)) for c in clusters
@@ -149,7 +152,7 @@ def rank_work(
 def reopen_recurred(
     connection: Connection, who: Principal, clusters: Sequence[dict[str, Any]], at: float
 ) -> int:
-    """Reopen the fixed ones with later alarms from drives with the release; say how many.
+    """Reopens fixed hazards with later alarms from drives with the release; returns how many.
 
     A release that was first driven after the fixing one counts as holding the fix.
     """
@@ -170,7 +173,7 @@ def reopen_recurred(
 
 
 def _first_drives(connection: Connection, who: Principal) -> dict[str, float]:
-    """Returns when the first drive with each release came in, s, without what vehicles came with."""
+    """Returns when (s) the first visible drive with each release came in; drives without one are left out."""
     query = select(drives.c.release, func.min(drives.c.at)).where(visible(who, drives))
     rows = connection.execute(query.group_by(drives.c.release))
     return {release: at for release, at in rows if release}
@@ -184,7 +187,7 @@ def _locate(locate: Locate, cluster: dict[str, Any]) -> Locality | None:
 
 
 def _matches(one: Work, wanted: WorkFilter) -> bool:
-    """Whether a recurring hazard as a whole is one that is wanted."""
+    """Returns True when a recurring hazard as a whole passes the filters that are set."""
     return (
         wanted.map in (None, one.cluster.get("map"))
         and wanted.state in (None, one.standing.state)

@@ -24,7 +24,7 @@ SCENES_MAX = 200
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proposal:
-    """A change that somebody proposes."""
+    """Holds a proposed change: its payload, the reason, and the hazards that led to it."""
 
     kind: PayloadKind
     content: bytes
@@ -34,7 +34,10 @@ class Proposal:
 
 
 def propose(fleet: Fleet, who: Principal, proposal: Proposal) -> str:
-    """Keep a change; its id. Refused when the payload is not valid or a scene is not visible."""
+    """Keeps a change and returns its id; Refused for an invalid payload or a hazard out of sight.
+
+    It names 1 to SCENES_MAX hazards.
+    """
     if not 1 <= len(proposal.hazards) <= SCENES_MAX:
         raise Refused(422, f"a change names 1 to {SCENES_MAX} hazards that led to it")
     read_payload_content(proposal.kind, proposal.content)
@@ -67,7 +70,7 @@ def change_row(connection: Connection, who: Principal, change: str) -> Any:
 
 
 def payload_of(fleet: Fleet, who: Principal, change: str) -> tuple[PayloadKind, str, bytes]:
-    """Kind, name and content of a change's payload."""
+    """Returns kind, name and content of a change's payload; Refused (404) for another tenant's."""
     with fleet.engine.connect() as connection:
         row = change_row(connection, who, change)
     return PayloadKind(row.kind), row.name, fleet.blobs.get(row.payload)
@@ -76,7 +79,10 @@ def payload_of(fleet: Fleet, who: Principal, change: str) -> tuple[PayloadKind, 
 def re_evaluate(
     fleet: Fleet, who: Principal, change: str, before: tuple[PayloadKind, bytes]
 ) -> list[dict[str, Any]]:
-    """Judge the scenes that led to a change again: errors under what was, and under the change."""
+    """Judges the scenes that led to a change under `before` and the change; returns all evaluations.
+
+    Scenes that were evaluated earlier are not judged again.
+    """
     kind, _, content = payload_of(fleet, who, change)
     settings = [read_payload_content(*before), read_payload_content(kind, content)]
     with fleet.engine.connect() as connection:
@@ -105,7 +111,7 @@ def re_evaluate(
 
 
 def evaluations_of(connection: Connection, change: str) -> list[dict[str, Any]]:
-    """What a change does to its scenes, by hazard."""
+    """Returns the evaluations of a change as plain values, by hazard; empty before the first."""
     rows = connection.execute(
         select(evaluations).where(evaluations.c.change == change).order_by(evaluations.c.hazard)
     )

@@ -27,14 +27,14 @@ class Errors:
 
     @property
     def total(self) -> int:
-        """False alarms and missed hazards."""
+        """Returns the number of false alarms and missed hazards."""
         return self.false + self.missed
 
 
 def errors_of(
     cycles: Sequence[Cycle], channels: Sequence[str], settings: Sequence[MonitorSettings]
 ) -> list[Errors]:
-    """The errors of each of several monitors in the same scene, of the scored hazards."""
+    """Returns the errors of each of several monitors in the same scene, of the scored hazards alone."""
     true = [
         Span(h.hazard, h.t_start, h.t_end)
         for h in world_model_truth(cycles, channels)

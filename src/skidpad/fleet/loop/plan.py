@@ -29,7 +29,7 @@ class Decision(str, Enum):
 
 
 class Plan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Fixed with the release; no later word changes it."""
+    """Holds the plan of a release, which is fixed with it; ConfigError for one out of range."""
 
     stages: tuple[float, ...] = (0.1, 0.3, 1.0)  # shares of vehicles
     least_drives: int = 12  # of a stage before it is looked at; assumption
@@ -56,7 +56,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
     @property
     def alpha_of_look(self) -> float:
-        """Returns the alpha of one question of one look."""
+        """Returns the alpha of one question of one look: alpha over all looks at all stages."""
         return self.alpha / (self.looks * len(self.stages))
 
 
@@ -74,7 +74,10 @@ class Finding(msgspec.Struct, frozen=True):
 
 
 def look(differences: Sequence[float], plan: Plan, looks_left: int) -> Finding:
-    """Judge the differences of all drives so far; looks_left: at this stage after this one."""
+    """Returns what the differences (errors, update less before) of all drives so far lead to.
+
+    looks_left: at this stage after this one; with 0 left, an undecided release is reverted.
+    """
     d = np.asarray(differences, dtype=np.float64)
     seen, shifted = compare_pairs(d), compare_pairs(d - plan.margin)
     if seen.p_greater <= plan.alpha_of_look and seen.mean > 0.0:
@@ -90,9 +93,9 @@ def look(differences: Sequence[float], plan: Plan, looks_left: int) -> Finding:
 
 
 def choose_vehicles(release: str, vehicles: Iterable[str], share: float) -> frozenset[str]:
-    """Those vehicles that are among the share of a stage: by a hash, so stages hold earlier ones.
+    """Returns the vehicles that are among a share, 0 to 1, by a hash: a larger share holds the smaller.
 
-    However small the share, at least one vehicle is.
+    However small the share, at least one vehicle is; none of no vehicles.
     """
     ranks = {vehicle: _rank(release, vehicle) for vehicle in vehicles}
     first = min(ranks, key=lambda vehicle: ranks[vehicle], default=None)

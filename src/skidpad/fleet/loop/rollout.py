@@ -33,12 +33,12 @@ class Rollout:
 
     @property
     def outcome(self) -> str | None:
-        """`completed`, `reverted`, or None while it goes on."""
+        """Returns "completed", "reverted", or None while it goes on."""
         return next((e.what for e in self.events if e.what in (COMPLETED, REVERTED)), None)
 
     @property
     def stage(self) -> int:
-        """Index of the stage that the release has reached."""
+        """Returns the index of the stage that the release has reached, from 0."""
         return max(int(e.detail["stage"]) for e in self.events if e.what == STAGE)
 
     @property
@@ -60,7 +60,10 @@ class Rollout:
 
 
 def release(fleet: Fleet, who: Principal, change: str, targets: bytes, plan: Plan) -> str:
-    """Publish a change that was signed off line and begin its first stage; the release's id."""
+    """Publishes a change that was signed off line and begins its first stage; returns the release's id.
+
+    Refused (409) while another release is on its way.
+    """
     _, name, content = payload_of(fleet, who, change)
     with fleet.engine.connect() as connection:
         running = [r for r in rollouts(connection, who.tenant) if r.outcome is None]
@@ -81,7 +84,7 @@ def release(fleet: Fleet, who: Principal, change: str, targets: bytes, plan: Pla
 
 
 def rollouts(connection: Connection, tenant: str) -> list[Rollout]:
-    """The releases of a tenant, oldest first."""
+    """Returns the releases of a tenant, oldest first."""
     rows = connection.execute(
         select(releases, changes.c.name)
         .join(changes, changes.c.id == releases.c.change)
@@ -97,7 +100,7 @@ def rollouts(connection: Connection, tenant: str) -> list[Rollout]:
 
 
 def rollout_of(connection: Connection, tenant: str, id: str) -> Rollout:
-    """A release of a tenant; Refused (404) otherwise."""
+    """Returns a release of a tenant; Refused (404) when it has none of this id."""
     found = next((r for r in rollouts(connection, tenant) if r.row.id == id), None)
     if found is None:
         raise absent()
@@ -105,13 +108,16 @@ def rollout_of(connection: Connection, tenant: str, id: str) -> Rollout:
 
 
 def standing(connection: Connection, tenant: str) -> str:
-    """Name of the payload that every vehicle may run: of the last completed release; "" for none."""
+    """Returns the name of the payload that every vehicle may run: the last completed one; "" for none."""
     done = [r.name for r in rollouts(connection, tenant) if r.outcome == COMPLETED]
     return done[-1] if done else ""
 
 
 def assignment(connection: Connection, tenant: str, vehicle: str) -> dict[str, str]:
-    """What a vehicle is to run: the release under way if it is chosen, else what stands."""
+    """Returns the payload a vehicle is to run: of the release under way if chosen, else what stands.
+
+    Names are "" where there is none; `before`: what stands.
+    """
     stands = standing(connection, tenant)
     for one in rollouts(connection, tenant):
         if one.outcome is None and vehicle in running_on(connection, one):
@@ -120,7 +126,7 @@ def assignment(connection: Connection, tenant: str, vehicle: str) -> dict[str, s
 
 
 def running_on(connection: Connection, one: Rollout) -> frozenset[str]:
-    """The vehicles that run a release at its stage."""
+    """Returns the ids of the vehicles that run a release at its stage."""
     ids = connection.execute(
         select(vehicles.c.id).where(vehicles.c.manufacturer == one.row.tenant)
     ).scalars()
@@ -128,7 +134,7 @@ def running_on(connection: Connection, one: Rollout) -> frozenset[str]:
 
 
 def under_way(connection: Connection) -> list[tuple[str, str]]:
-    """Tenant and id of every release that has not ended, oldest first."""
+    """Returns tenant and id of every release that has not ended, oldest first."""
     ended = exists().where(
         events.c.subject == releases.c.id, events.c.what.in_((COMPLETED, REVERTED))
     )
@@ -141,9 +147,9 @@ def under_way(connection: Connection) -> list[tuple[str, str]]:
 
 
 def look_at(fleet: Fleet, who: Principal, id: str) -> Finding | None:
-    """Look at a release, and advance, revert or wait; None while too little was driven.
+    """Looks at a release, and advances, reverts or waits; None while too little was driven.
 
-    Refused (409) when it has ended, or when somebody else takes this look at the same moment.
+    Refused (409) when it has ended, or when another request takes this look at the same moment.
     """
     with fleet.engine.begin() as connection:
         one = rollout_of(connection, who.tenant, id)
@@ -166,7 +172,10 @@ def look_at(fleet: Fleet, who: Principal, id: str) -> Finding | None:
 
 
 def _take(connection: Connection, release: str, number: int, at: float) -> None:
-    """Two who look at once see the same drives: the second one's look would be one too many."""
+    """Takes a look by its number, so that of two requests at once one alone looks; Refused (409).
+
+    Both would see the same drives: the second look would be one too many.
+    """
     try:
         with connection.begin_nested():
             connection.execute(looks.insert(), {"release": release, "number": number, "at": at})
@@ -188,7 +197,7 @@ def _conclude(
 
 
 def _driven_differences(connection: Connection, one: Rollout) -> tuple[list[float], float]:
-    """Differences of errors of the drives under a release, of chosen vehicles, and their hours."""
+    """Returns the differences of errors of drives under a release, of chosen vehicles, and their hours."""
     rows = connection.execute(
         select(drives.c.vehicle, drives.c.seconds, drives.c.summary)
         .where(drives.c.release == one.row.id, drives.c.manufacturer == one.row.tenant)
@@ -205,7 +214,7 @@ def _driven_differences(connection: Connection, one: Rollout) -> tuple[list[floa
 
 
 def trace(connection: Connection, who: Principal, change: str) -> dict[str, Any]:
-    """One record from the hazards to the re-evaluation (C-178)."""
+    """Returns the record of a change from its hazards to its re-evaluation as plain values (C-178)."""
     row = change_row(connection, who, change)
     hazards = json.loads(row.hazards)
     released = [r.plain() for r in rollouts(connection, who.tenant) if r.row.change == change]

@@ -52,7 +52,7 @@ class Analysed:
 
 
 def analyse(fleet: Fleet, who: Principal, settings: ClusterSettings = STANDARD) -> Analysed:
-    """Look at the newest hazards that `who` may see, and keep what was found."""
+    """Clusters the newest visible hazards, keeps what was found and reopens fixed ones that came back."""
     cases, unreadable = gather(fleet, who)
     found = find_clusters(cases, settings)
     at, id = fleet.clock(), new_id()
@@ -89,7 +89,10 @@ def _with_subjects(
     cases: Sequence[Case],
     found: Sequence[Cluster],
 ) -> list[dict[str, Any]]:
-    """The clusters with the recurring hazard that each is, which their alarms are kept with."""
+    """Returns the clusters as plain values with their subject: the recurring hazard that each is.
+
+    Subjects of alarms that are new to it are kept. analysis: its id and time in s.
+    """
     age = {case.id: k for k, case in enumerate(reversed(cases))}
     groups = [sorted(cluster.members, key=age.__getitem__) for cluster in found]
     known = read_subjects(connection, who, [id for group in groups for id in group])
@@ -106,7 +109,10 @@ def _with_subjects(
 
 
 def gather(fleet: Fleet, who: Principal) -> tuple[list[Case], int]:
-    """The newest visible hazards with their series, newest first, and how many could not be read."""
+    """Returns the newest visible hazards with their series, newest first, and how many are unreadable.
+
+    At most HAZARDS_MAX; series that are computed are kept.
+    """
     there = (series.c.digest == hazards.c.digest) & (series.c.version == VERSION)
     query = (
         select(hazards, series.c.content.label("course"))
@@ -136,7 +142,7 @@ def gather(fleet: Fleet, who: Principal) -> tuple[list[Case], int]:
 
 
 def _keep(fleet: Fleet, fresh: dict[str, str]) -> None:
-    """Keep series that were computed, as far as nobody else did meanwhile."""
+    """Inserts series (JSON by digest) that were computed, except those kept meanwhile."""
     with fleet.engine.begin() as connection:
         known = connection.execute(
             select(series.c.digest).where(
@@ -149,12 +155,15 @@ def _keep(fleet: Fleet, fresh: dict[str, str]) -> None:
 
 
 def own(who: Principal) -> ColumnElement[bool]:
-    """True for analyses that looked at what `who` may see: who makes cars may run others."""
+    """Returns the condition for analyses of the principal's tenant in the same role.
+
+    A manufacturer may run vehicles, too, and sees others then.
+    """
     return (analyses.c.tenant == who.tenant) & (analyses.c.role == who.role.value)
 
 
 def newest_clusters(connection: Connection, who: Principal) -> list[dict[str, Any]]:
-    """The clusters of the newest analysis by the rights of `who`, largest first."""
+    """Returns the clusters of the newest analysis by the same rights, largest first; empty before one."""
     last = connection.execute(
         select(analyses.c.id, analyses.c.at)
         .where(own(who))
@@ -173,7 +182,7 @@ def newest_clusters(connection: Connection, who: Principal) -> list[dict[str, An
 
 
 def cluster_row(connection: Connection, who: Principal, cluster: str) -> dict[str, Any]:
-    """One cluster of an analysis by the rights of `who`; Refused (404) otherwise."""
+    """Returns one cluster of an analysis by the same rights; Refused (404) otherwise."""
     row = connection.execute(
         select(clusters)
         .join(analyses, analyses.c.id == clusters.c.analysis)
@@ -202,7 +211,7 @@ SIGNALS: tuple[tuple[Signal, float, float], ...] = (
 
 
 def series_of(record: HazardRecord) -> Floats:
-    """The signals of a record's worlds, (POINTS, len(SIGNALS)) within [0, 1]."""
+    """Returns the signals of a record's worlds, (POINTS, len(SIGNALS)) within [0, 1]; neutral without any."""
     monitor = Monitor(record.channels, MonitorSettings(keep_worlds=False))
     rows = [monitor.update(cycle).signals.values for cycle in record.worlds]
     if not rows:
@@ -217,7 +226,7 @@ def _scale_value(value: float, by: float, neutral: float) -> float:
 
 
 def _resample_table(table: Floats) -> Floats:
-    """Means of POINTS equal stretches of a table (n, k); a short one repeats its rows."""
+    """Returns means of POINTS equal stretches of a table (n, k), n >= 1; a short one repeats its rows."""
     edges = np.linspace(0.0, len(table), POINTS + 1)
     first = np.floor(edges[:-1]).astype(int)
     last = np.maximum(np.ceil(edges[1:]).astype(int), first + 1)
@@ -225,7 +234,7 @@ def _resample_table(table: Floats) -> Floats:
 
 
 def to_plain(series: Floats) -> list[list[float]]:
-    """Returns a series for JSON, in the resolution that it is compared in."""
+    """Returns a series for JSON, rounded to the four digits that it is compared in."""
     return [[round(v, 4) for v in row] for row in series.tolist()]
 
 
@@ -241,10 +250,10 @@ def from_plain(plain: Sequence[Sequence[float]]) -> Floats:
 
 
 def name_subjects(groups: Sequence[Sequence[str]], known: Mapping[str, str]) -> list[str]:
-    """Returns the subject of each group of alarms, whose ids are in order of time.
+    """Returns the subject (an id) of each group of alarms, whose ids are in order of time.
 
-    A group is what most of its alarms belonged to. Where two groups were one, the first in the list
-    keeps the subject, and the other one gets a new one.
+    known: subjects so far by alarm. A group is what most of its alarms belonged to; where two groups
+    were one, the first in the list keeps the subject, and the other one gets a new one.
     """
     taken: set[str] = set()
     subjects = []
@@ -278,7 +287,7 @@ def read_subjects(connection: Connection, who: Principal, ids: Sequence[str]) ->
 def keep_subjects(
     connection: Connection, analysis: tuple[str, float], subjects: Mapping[str, str]
 ) -> None:
-    """Keep the subjects of hazards as an analysis (id, s) found them."""
+    """Inserts the subjects of hazards (by id) as an analysis (id, s) found them."""
     id, at = analysis
     rows = [
         {"analysis": id, "hazard": hazard, "subject": subject, "at": at}

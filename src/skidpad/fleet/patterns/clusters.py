@@ -27,7 +27,7 @@ BLOCK = 2000  # hazards of one map and kind that density is asked of at once
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterSettings:
-    """What counts as the same."""
+    """Holds what counts as the same hazard; ConfigError for a value out of range."""
 
     cell: float = 25.0  # m, of the exact key
     reach: float = 50.0  # m that weigh as much as the whole range of one signal
@@ -64,7 +64,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Cluster:
-    """Hazards that are taken as one."""
+    """Holds hazards that are taken as one."""
 
     representative: str  # id: the medoid by DTW
     members: tuple[str, ...]  # ids, nearest to the representative first
@@ -79,7 +79,7 @@ class Cluster:
 
 
 def key_of(case: Case, settings: ClusterSettings) -> tuple[str, str, int, int, str]:
-    """What two hazards share that are taken as the same without looking closer."""
+    """Returns the exact key of a hazard: map, type, cell of the road and weather."""
     cell = floor(case.x / settings.cell), floor(case.y / settings.cell)
     return case.map, case.type, *cell, case.weather
 
@@ -87,7 +87,7 @@ def key_of(case: Case, settings: ClusterSettings) -> tuple[str, str, int, int, s
 def recurring(
     cases: Sequence[Case], settings: ClusterSettings
 ) -> dict[tuple[str, str, int, int, str], list[str]]:
-    """Ids by exact key, of keys that came more than once, the most frequent first."""
+    """Returns ids by exact key, of keys that came more than once, the most frequent first."""
     groups: dict[tuple[str, str, int, int, str], list[str]] = defaultdict(list)
     for case in sorted(cases, key=_order):
         groups[key_of(case, settings)].append(case.id)
@@ -96,7 +96,7 @@ def recurring(
 
 
 def find_clusters(cases: Sequence[Case], settings: ClusterSettings = STANDARD) -> list[Cluster]:
-    """The clusters among `cases`, largest first; hazards that resemble no other are in none."""
+    """Returns the clusters among `cases`, largest first; hazards that resemble no other are in none."""
     groups: dict[tuple[str, str], list[Case]] = defaultdict(list)
     for case in sorted(cases, key=_order):
         groups[case.map, case.type].append(case)
@@ -113,7 +113,7 @@ def _order(case: Case) -> tuple[str, str]:
 
 
 def _dense(group: list[Case], settings: ClusterSettings) -> list[list[Case]]:
-    """Groups of one map and kind that lie densely in place and indicators."""
+    """Returns groups of hazards of one map and type that lie densely in place and indicators."""
     if len(group) < settings.least:
         return []
     found: list[list[Case]] = []
@@ -151,7 +151,7 @@ def _labels(features: Floats, settings: ClusterSettings) -> list[int]:
 
 
 def _by_course(group: list[Case], settings: ClusterSettings) -> list[Cluster]:
-    """The group without those that went another way, told by its medoid."""
+    """Returns one cluster: the group near its medoid by course and place; empty below `least` hazards."""
     distances = warping_table([case.series for case in group])
     medoid = int(np.argmin(distances.sum(axis=1)))
     chosen = group[medoid]
@@ -178,7 +178,7 @@ def _by_course(group: list[Case], settings: ClusterSettings) -> list[Cluster]:
 
 
 def warping_table(series: Sequence[Floats]) -> Floats:
-    """DTW distance of each pair, (n, n), symmetric with zeros on the diagonal."""
+    """Returns the DTW distance of each pair, (n, n), symmetric with zeros on the diagonal."""
     n = len(series)
     out = np.zeros((n, n))
     for i in range(n):

@@ -31,7 +31,7 @@ class Provenance:
     first_seed: int
 
     def describe(self) -> str:
-        """Return it as one line of text."""
+        """Returns the provenance as one line of text."""
         return (
             f"recorded {self.date} at commit {self.commit} by `{self.command}`: {self.vehicles} vehicles,"
             f" {self.drives} drives (seeds from {self.first_seed}), {self.hazards} hazards"
@@ -39,10 +39,10 @@ class Provenance:
 
 
 def unpack_recorded(data: Path) -> Provenance:
-    """Unpack the recorded fleet into a new data folder.
+    """Unpacks the recorded fleet into a new data folder and returns its provenance.
 
     Raises:
-        FileError: the archive is missing or damaged.
+        FileError: the archive is missing or damaged, or the folder is there already.
     """
     try:
         found = Provenance(**json.loads(PROVENANCE.read_text(encoding="utf-8")))

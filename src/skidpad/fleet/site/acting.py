@@ -20,12 +20,12 @@ from skidpad.pages.guard import WHO
 
 
 def visitor(fleet: Fleet, request: Request) -> Principal:
-    """Whose session a page was opened in; Refused (401) when their credentials have ended."""
+    """Returns the principal whose session opened the page; Refused (401) when its credentials ended."""
     return person(fleet, str(request.scope.get(WHO)))
 
 
 def person(fleet: Fleet, id: str) -> Principal:
-    """Someone with a credential that still holds; Refused (401) otherwise."""
+    """Returns the principal of this id with a credential that still holds; Refused (401) otherwise."""
     with fleet.engine.connect() as connection:
         who = principal_by_id(connection, id, fleet.clock())
     if who is None:
@@ -34,7 +34,7 @@ def person(fleet: Fleet, id: str) -> Principal:
 
 
 def require_right(fleet: Fleet, id: str, action: Action) -> Principal:
-    """The person, if their role may; Refused (401, 403) otherwise."""
+    """Returns the principal of this id, if its role may do `action`; Refused (401, 403) otherwise."""
     who = person(fleet, id)
     if not who.may(action):
         raise Refused(403, f"the role {who.role.value} may not {action.value}")
@@ -42,25 +42,25 @@ def require_right(fleet: Fleet, id: str, action: Action) -> Principal:
 
 
 def click_answer(fleet: Fleet, id: str, alert: str, what: What) -> dict[str, Any]:
-    """Acknowledge, escalate or close an alert."""
+    """Acknowledges, escalates or closes an alert and returns it; Refused without the right."""
     return keep_answer(fleet, require_right(fleet, id, Action.ANSWER_ALERTS), alert, what)
 
 
 def click_order(fleet: Fleet, id: str, alert: str, what: Order) -> dict[str, Any]:
-    """Order the vehicle of an alert to stop, slow down or go on."""
+    """Orders the vehicle of an alert to stop, slow down or go on; Refused without the right."""
     return keep_order(fleet, require_right(fleet, id, Action.GUIDE), alert, (what, new_id()))
 
 
 def click_triage(fleet: Fleet, id: str, subject: str, text: TriageText) -> dict[str, Any]:
-    """Set state, owner and release of a recurring hazard."""
+    """Sets state, owner and release of a recurring hazard; Refused without the right."""
     return triage(fleet, require_right(fleet, id, Action.TRIAGE), subject, text)
 
 
 def click_export(fleet: Fleet, id: str, hazard: str) -> bytes:
-    """Return the scenario of a hazard as .zip."""
+    """Returns the scenario of a hazard as .zip; Refused without the right."""
     return export_scenario(fleet, require_right(fleet, id, Action.EXPORT_SCENARIO), hazard)
 
 
 def click_analyse(fleet: Fleet, id: str) -> int:
-    """Look for recurring hazards; how many clusters were found."""
+    """Looks for recurring hazards and returns how many clusters were found; Refused without the right."""
     return len(analyse(fleet, require_right(fleet, id, Action.ANALYSE)).clusters)

@@ -30,8 +30,9 @@ ORDERS = {
 
 
 def alerts_of(fleet: Fleet, who: Principal) -> tuple[int, Principal, list[Alert]]:
-    """What came so far, counted before it is read; who looks, as long as their credential holds; and
-    the newest alerts that they may see.
+    """Returns the count of what came so far, the principal, and the newest alerts that it may see.
+
+    The count is taken before the alerts are read. Refused (401) when the credential has ended.
     """
     now, seen = person(fleet, who.id), fleet.hub.count(f"alerts {who.tenant}")
     with fleet.engine.connect() as connection:
@@ -41,7 +42,7 @@ def alerts_of(fleet: Fleet, who: Principal) -> tuple[int, Principal, list[Alert]
 def draw_alerts(
     fleet: Fleet, lines: MapLines, ui: Any, seen: int, who: Principal, found: list[Alert]
 ) -> None:
-    """The newest alerts; what changes is pushed to the page within half a second."""
+    """Adds the newest alerts to the page, drawn anew within LOOK_S s of a change while it is open."""
     topic = f"alerts {who.tenant}"
 
     @ui.refreshable  # type: ignore[untyped-decorator]
@@ -94,11 +95,11 @@ def _card(fleet: Fleet, lines: MapLines, ui: Any, who: Principal, alert: Alert) 
 
 
 def _answering(fleet: Fleet, ui: Any, who: Principal, alert: str, what: What) -> Any:
-    """Returns what a click on an answer does."""
+    """Returns the handler of a click that answers an alert and tells how it went."""
     return lambda: say(ui, lambda: click_answer(fleet, who.id, alert, what), what.value)
 
 
 def _ordering(fleet: Fleet, ui: Any, who: Principal, alert: str, order: Order) -> Any:
-    """Returns what a click on an order does."""
+    """Returns the handler of a click that orders the vehicle of an alert and tells how it went."""
     told = f"{order.value} ordered, good for 2 s"
     return lambda: say(ui, lambda: click_order(fleet, who.id, alert, order), told)

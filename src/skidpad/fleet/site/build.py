@@ -40,7 +40,7 @@ class Page(NamedTuple):
 
 
 def make_site(fleet: Fleet, lines: MapLines, sessions: Sessions) -> FastAPI:
-    """Pages and interface; one per process."""
+    """Returns the application with pages and interface; one per process."""
 
     def routes(app: FastAPI) -> None:
         add_api(app, fleet)
@@ -51,7 +51,7 @@ def make_site(fleet: Fleet, lines: MapLines, sessions: Sessions) -> FastAPI:
 
 
 def pages_of(fleet: Fleet, lines: MapLines) -> dict[str, Page]:
-    """Every page by path; there is no other."""
+    """Returns every page by its path."""
 
     def read(what: Callable[..., Any]) -> Callable[[Principal, Request], Any]:
         return lambda who, _: what(fleet, who)

@@ -65,7 +65,7 @@ class Overview:
 
 
 def overview(fleet: Fleet, lines: MapLines, who: Principal) -> Overview:
-    """Everything that a manufacturer or operator sees at once."""
+    """Returns all that the dashboard shows of what a manufacturer or operator may see."""
     seen = fleet.hub.count(f"{CAME} {who.tenant}")
     found = trends(fleet, who)
     with fleet.engine.connect() as connection:
@@ -80,9 +80,9 @@ def overview(fleet: Fleet, lines: MapLines, who: Principal) -> Overview:
 
 
 def draw_overview(fleet: Fleet, lines: MapLines, ui: Any, who: Principal, found: Overview) -> None:
-    """What is known now; what comes is shown within LOOK_S, as long as the credential holds.
+    """Adds the dashboard to the page, drawn anew within LOOK_S s of something new.
 
-    The open page keeps who looks and a count, not what it shows.
+    It ends with the credential. The open page keeps the principal and a count, not what it shows.
     """
     topic, box = f"{CAME} {who.tenant}", ui.element("div").classes("parts")
     seen = found.seen
@@ -113,7 +113,7 @@ def draw_overview(fleet: Fleet, lines: MapLines, ui: Any, who: Principal, found:
 
 
 def _parts(ui: Any, found: Overview) -> None:
-    """Alarms per hour, trends, the map, clusters."""
+    """Adds alarms per hour, trends, the map and recurring hazards to the page."""
     with ui.element("section"):
         ui.label("Alarms per hour").classes("h2")
         rows = [
@@ -173,7 +173,10 @@ def _map(ui: Any, found: Overview) -> None:
 
 
 def _clusters(ui: Any, found: list[Work], again: Callable[[], int]) -> None:
-    """A click keeps what it needs for as long as the page is open: `again`, not all that was shown."""
+    """Adds the top of the work list to the page, with a button that calls `again`.
+
+    A click keeps `again` alone for as long as the page is open, not all that was shown.
+    """
     with ui.element("section"):
         ui.label("Recurring hazards").classes("h2")
 
@@ -188,7 +191,7 @@ def _clusters(ui: Any, found: list[Work], again: Callable[[], int]) -> None:
 def read_replay(
     fleet: Fleet, lines: MapLines, who: Principal, request: Request
 ) -> tuple[dict[str, Any], HazardRecord, Sequence[Line]]:
-    """Row and record of a hazard that `who` may see, and the roads around it."""
+    """Returns row and record of the requested hazard, and the roads around it; Refused (404) out of sight."""
     hazard = str(request.path_params["hazard"])
     with fleet.engine.connect() as connection:
         row = hazard_row(connection, who, hazard)
@@ -197,7 +200,7 @@ def read_replay(
 
 
 def draw_replay(ui: Any, found: tuple[dict[str, Any], HazardRecord, Sequence[Line]]) -> None:
-    """Draws one hazard, cycle by cycle, as every channel saw it."""
+    """Adds one hazard to the page, cycle by cycle, as every channel saw it."""
     row, record, roads = found
     ui.label(f"{row['type'].replace('_', ' ')}, {row['map']}, {row['weather']}")
     if not record.worlds:
@@ -226,7 +229,10 @@ def draw_replay(ui: Any, found: tuple[dict[str, Any], HazardRecord, Sequence[Lin
 
 
 def trend_svg(trends: Sequence[Trend], name: str) -> str:
-    """Draw the share of cycles in violation over time, with its interval as a band (of one day: a bar)."""
+    """Returns an SVG of the share of cycles in violation over time, with its interval as a band.
+
+    Of one day: a bar. trends: of one indicator, in order of time, at least one.
+    """
     most = max(max(t.interval.high, t.share) for t in trends)
     top = next((limit for limit in TOPS if limit >= most), 1.0)
     first, last = trends[0].at, trends[-1].at
@@ -249,7 +255,10 @@ def trend_svg(trends: Sequence[Trend], name: str) -> str:
 
 
 def _axes(top: float, y: Callable[[float], float]) -> str:
-    """Lines at nothing, half and the top of the axis, each with its share in percent."""
+    """Returns SVG lines at 0, half and the top of the axis, each with its share in percent.
+
+    y: height in the drawing of a share.
+    """
     return "".join(
         f'<path d="M{LEFT:g} {y(share):.1f}H{WIDTH - RIGHT:g}" stroke="#303944"/>'
         f'<text x="{LEFT - 4:g}" y="{y(share) + 4:.1f}" text-anchor="end">{100 * share:g} %</text>'
@@ -258,14 +267,14 @@ def _axes(top: float, y: Callable[[float], float]) -> str:
 
 
 def _date(x: float, at: float, is_end: bool) -> str:
-    """A day (UTC) under the plot; the first and the last of several stay within the picture."""
+    """Returns the SVG of a day (UTC) under the plot; those at an end stay within the picture."""
     day = f"{datetime.fromtimestamp(at, timezone.utc):%Y-%m-%d}"
     anchor = "middle" if not is_end else "start" if x < WIDTH / 2 else "end"
     return f'<text x="{x:.1f}" y="{HEIGHT - 8:g}" text-anchor="{anchor}">{day}</text>'
 
 
 def _data(points: Sequence[tuple[float, float, float, float]]) -> str:
-    """Points (x, share, low, high) as a line within a band; a single one as a dot on a bar."""
+    """Returns the SVG of points (x, share, low, high) as a line within a band; of one as a dot on a bar."""
     if len(points) == 1:
         x, share, low, high = points[0]
         return (

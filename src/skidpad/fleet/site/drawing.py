@@ -37,7 +37,7 @@ class Dot:
 
 
 def _svg(box: tuple[float, float, float, float], body: str, name: str) -> str:
-    """y is up in the world and down on a screen, so everything is drawn at -y."""
+    """Returns an SVG element of a box (x, y, width, height) in m; what is in it is drawn at -y."""
     x, y, w, h = box
     return (
         f'<svg role="img" aria-label="{escape(name)}" viewBox="{x:.1f} {-y - h:.1f} {w:.1f} {h:.1f}" '
@@ -46,7 +46,7 @@ def _svg(box: tuple[float, float, float, float], body: str, name: str) -> str:
 
 
 def map_svg(lines: Sequence[Line], dots: Sequence[Dot], name: str) -> str:
-    """Roads and hazards from above."""
+    """Returns an SVG of roads and marks from above, with a scale."""
     points = [p for line in lines for p in line] or [(d.x, d.y) for d in dots] or [(0.0, 0.0)]
     xs, ys = [p[0] for p in points], [p[1] for p in points]
     box = min(xs) - 30, min(ys) - 30, max(xs) - min(xs) + 60, max(ys) - min(ys) + 60
@@ -57,7 +57,10 @@ def map_svg(lines: Sequence[Line], dots: Sequence[Dot], name: str) -> str:
 
 
 def _mark(dot: Dot, least: float) -> str:
-    """A small disc of one hazard; a ring around those that recur, so that no mark hides another."""
+    """Returns the SVG of a mark: a disc for one hazard, a ring for those that recur.
+
+    least: radius of the disc in m.
+    """
     colour, ring = KINDS.get(dot.kind, "#fff"), dot.count > 1
     radius = least * (min(2.0 + 0.5 * dot.count**0.5, 6.0) if ring else 1.0)
     paint = (
@@ -72,13 +75,16 @@ def _mark(dot: Dot, least: float) -> str:
 
 
 def scale_m(width: float) -> float:
-    """Returns the length of the scale's bar for a picture of this width: 1, 2 or 5 times a power of ten."""
+    """Returns the length in m of the scale's bar, 1, 2 or 5 times a power of ten, at most a quarter.
+
+    width: of the picture, m.
+    """
     decade = 10.0 ** floor(log10(width / 4.0))
     return max(k * decade for k in (1.0, 2.0, 5.0) if k * decade <= width / 4.0)
 
 
 def _scale(box: tuple[float, float, float, float]) -> str:
-    """A bar at the lower left, with its length."""
+    """Returns the SVG of the scale's bar at the lower left of a box, with its length."""
     x, y, w, h = box
     bar, size = scale_m(w), max(w, h) / 40.0
     left, low = x + size, -y - size
@@ -90,7 +96,7 @@ def _scale(box: tuple[float, float, float, float]) -> str:
 
 
 def legend_html(entries: Iterable[tuple[str, str]]) -> str:
-    """Names (text) with their colours, in a line that wraps."""
+    """Returns the HTML of names with their colours, in a line that wraps; entries: (name, colour)."""
     return "".join(
         f'<span style="display:inline-block;margin-right:14px"><span style="color:{colour}">'
         f"&#9632;</span> {escape(name)}</span>"
@@ -99,14 +105,14 @@ def legend_html(entries: Iterable[tuple[str, str]]) -> str:
 
 
 def kinds_legend(dots: Sequence[Dot]) -> str:
-    """The legend of a map: the kinds that are on it, and what a ring is."""
+    """Returns the legend of a map: the kinds that are on it, and what a ring is."""
     kinds = sorted({d.kind for d in dots})
     named = legend_html((kind.replace("_", " "), KINDS.get(kind, "#fff")) for kind in kinds)
     return named + legend_html([("disc: one hazard; ring: a hazard that recurs", "#9aa5b1")])
 
 
 def replay_legend(record: HazardRecord) -> str:
-    """The legend of a replay: a colour for each channel, and what marks the hazard."""
+    """Returns the legend of a replay: a colour for each channel, and what marks the hazard."""
     named = [(f"channel {c}", COLOURS[i % len(COLOURS)]) for i, c in enumerate(record.channels)]
     return legend_html(
         [*named, ("solid: the vehicle itself; pale: what it reported; dashes: plan", "#9aa5b1"),
@@ -128,7 +134,7 @@ def _points(line: Line) -> str:
 
 
 def scene_svg(ego: Body, objects: Sequence[Body], name: str, roads: Sequence[Line] = ()) -> str:
-    """What a vehicle showed at the moment of its alert: roads, itself, others, and the nearest of them."""
+    """Returns an SVG of what a vehicle showed with its alert: roads, itself, others, the nearest marked."""
     box = ego.x - REACH, ego.y - REACH, 2 * REACH, 2 * REACH
     body = _roads(roads) + "".join(_body(o, "#9aa5b1") for o in objects) + _body(ego, COLOURS[0])
     nose = ego.length / 2 * cos(ego.heading), ego.length / 2 * sin(ego.heading)
@@ -160,7 +166,7 @@ def scene_text(ego: Body, objects: Iterable[Body]) -> str:
 
 
 def scene_legend() -> str:
-    """The legend of an alert's scene."""
+    """Returns the legend of an alert's scene."""
     return legend_html(
         [("the vehicle; the line is its heading", COLOURS[0]), ("what it showed", "#9aa5b1"),
          ("circle: the nearest", HAZARD)]
@@ -178,7 +184,7 @@ def _body(o: Body, colour: str) -> str:
 
 
 def near(lines: Iterable[Line], x: float, y: float) -> list[Line]:
-    """Those lines that come within sight of a place for as long as a record lasts."""
+    """Returns the lines whose box comes within AROUND m of a place, what a record can show of it."""
     return [
         line
         for line in lines
@@ -190,7 +196,7 @@ def near(lines: Iterable[Line], x: float, y: float) -> list[Line]:
 
 
 def replay_svg(record: HazardRecord, k: int, roads: Sequence[Line] = ()) -> str:
-    """Cycle k of a hazard's record, every channel's world over the others and over the roads."""
+    """Returns an SVG of cycle k of a record: every channel's world over the others and over the roads."""
     cycle = record.worlds[k]
     known = [f for f in cycle.frames if f is not None]
     if not known:
@@ -207,7 +213,10 @@ def replay_svg(record: HazardRecord, k: int, roads: Sequence[Line] = ()) -> str:
 
 
 def _involved_objects(record: HazardRecord, k: int) -> str:
-    """A circle around each object that the hazard is about, where its channel reports it in cycle k."""
+    """Returns SVG circles around the objects that the hazard is about, where cycle k has them.
+
+    Dashed while the hazard is not there.
+    """
     cycle, places = record.worlds[k], []
     for one in record.objects:
         at = record.channels.index(one.channel) if one.channel in record.channels else None

@@ -50,7 +50,10 @@ def page(
     read: Callable[[Principal, Request], Found],
     draw: Callable[[Any, Found], None],
 ) -> Callable[[Request], Awaitable[None]]:
-    """A builder of a page for whoever may open it: `read` in a thread, then `draw` in the loop."""
+    """Returns a builder of a page: calls `read` in a thread, then `draw`, if the visitor may `action`.
+
+    Else the page says what was refused; / leads to the role's first page.
+    """
 
     async def build(request: Request) -> None:
         ui = nicegui().ui
@@ -73,7 +76,7 @@ def page(
 
 
 def head(ui: Any, who: Principal, title: str) -> None:
-    """Title, who looks, and where they may go."""
+    """Adds title, the visitor's name and role, and links to the pages that the role may open."""
     with ui.element("nav"):
         ui.label(title).style("font-size:20px")
         for name, path, action in LINKS:
@@ -83,7 +86,7 @@ def head(ui: Any, who: Principal, title: str) -> None:
 
 
 def table(ui: Any, heads: list[str], rows: list[list[str]]) -> None:
-    """A table of plain text that scrolls by itself on a phone."""
+    """Adds a table of plain text that scrolls by itself on a phone."""
     top = "".join(f"<th>{escape(h)}</th>" for h in heads)
     body = "".join(
         "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
@@ -93,7 +96,7 @@ def table(ui: Any, heads: list[str], rows: list[list[str]]) -> None:
 
 
 async def say(ui: Any, act: Callable[[], Any], done: str) -> None:
-    """Do what a click asks, in a thread, and tell whether it was granted."""
+    """Calls `act` in a thread and shows `done`, or the sentence of its error."""
     try:
         await run_in_threadpool(act)
     except SkidpadError as error:

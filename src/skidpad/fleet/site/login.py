@@ -47,5 +47,5 @@ document.getElementById("log-in").addEventListener("submit", async event => {{
 
 
 def log_in_page(wrong: str) -> str:
-    """Returns the page, with what was wrong about the last attempt ("" for the first)."""
+    """Returns the HTML page to log in, with what was wrong about the last attempt ("" for the first)."""
     return PAGE.format(ask=escape(ASK), wrong=escape(wrong))

@@ -23,13 +23,13 @@ ROWS = 200  # of the export that its page shows, newest first
 
 
 def places_of(fleet: Fleet, who: Principal) -> list[PlaceRow]:
-    """Lists hazards by place and weather that `who` may see, most frequent first; from 3 vehicles on."""
+    """Returns visible hazards by place and weather, most frequent first; from 3 vehicles on."""
     with fleet.engine.connect() as connection:
         return places(connection, who)
 
 
 def draw_places(ui: Any, found: Sequence[PlaceRow]) -> None:
-    """Places x hazard x weather."""
+    """Adds the table of hazards by place and weather to the page."""
     ui.label(
         f"{sum(r.count for r in found)} hazards; places of fewer than 3 vehicles are left out."
     )
@@ -44,13 +44,13 @@ def draw_places(ui: Any, found: Sequence[PlaceRow]) -> None:
 
 
 def research_of(fleet: Fleet, who: Principal) -> list[dict[str, Any]]:
-    """Returns the rows of the anonymised export."""
+    """Returns the rows of the anonymised export, after publishing the hours that are due."""
     del who  # the export is the same for everybody with the right
     return export(fleet)
 
 
 def draw_research(ui: Any, found: Sequence[dict[str, Any]]) -> None:
-    """Show the newest rows of the anonymised export, and where all of them are."""
+    """Adds the newest ROWS rows of the anonymised export to the page, and where all of them are."""
     count = f"{len(found)} row{'' if len(found) == 1 else 's'}"
     ui.label(
         f"{count}: places of {CELL:g} m in one hour where at least {K} vehicles reported a hazard;"
@@ -69,12 +69,12 @@ def draw_research(ui: Any, found: Sequence[dict[str, Any]]) -> None:
 
 
 def case_of(fleet: Fleet, who: Principal) -> list[Claim]:
-    """What the page of the safety case shows."""
+    """Returns the claims of the safety case by the newest trends of visible vehicles."""
     return claims(trends(fleet, who))
 
 
 def draw_case(ui: Any, found: Sequence[Claim]) -> None:
-    """The safety case with current evidence."""
+    """Adds the safety case with current evidence to the page."""
     last = ""
     for claim in found:
         if claim.argument != last:
@@ -97,7 +97,7 @@ def changes_of(fleet: Fleet, who: Principal) -> list[tuple[Rollout, str]]:
 
 
 def draw_changes(ui: Any, found: Sequence[tuple[Rollout, str]]) -> None:
-    """Releases, newest first, with every look."""
+    """Adds the releases to the page, newest first, with every look."""
     if not found:
         ui.label("Nothing was released yet.").classes("dim")
     for one, reason in reversed(found):

@@ -43,7 +43,7 @@ class WorkPage(NamedTuple):
 
 
 def work_of(fleet: Fleet, who: Principal, request: Request) -> WorkPage:
-    """Read the work list as far as the address's filters ask for it."""
+    """Returns the work list as far as the address's filters ask; unknown filters and values are ignored."""
     chosen = {k: v for k, v in request.query_params.items() if v != ALL}
     everything = work_list(fleet, who, WorkFilter())
     choices = {
@@ -77,7 +77,7 @@ def _words(values: Any) -> list[str]:
 
 
 def draw_work(ui: Any, found: WorkPage) -> None:
-    """Draw the filters and a card for each recurring hazard."""
+    """Adds the filters and a card for each of the first SHOWN recurring hazards to the page."""
     with ui.element("section"):
         ui.label(WORK_NOTE).classes("dim")
         with ui.element("div").classes("few"):
@@ -93,7 +93,7 @@ def draw_work(ui: Any, found: WorkPage) -> None:
 
 
 def _navigate(ui: Any, chosen: dict[str, str], name: str) -> Callable[[Any], None]:
-    """Return what a change of the filter `name` does: it opens the list anew with it."""
+    """Returns the handler of a change of the filter `name`: it opens the list anew with it."""
 
     def change(event: Any) -> None:
         ui.navigate.to("/work?" + urlencode(chosen | {name: event.value}))
@@ -117,7 +117,7 @@ def _card(ui: Any, found: WorkPage, rank: int, one: Work) -> None:
 
 
 def _export(ui: Any, found: WorkPage, hazard: str) -> Callable[[], Any]:
-    """Return what a click on a scenario's button does: it downloads a .zip, or shows an error."""
+    """Returns the handler of a click on a scenario's button: downloads a .zip, or shows an error."""
 
     async def click() -> None:
         try:
@@ -193,7 +193,7 @@ def standing_text(one: Work) -> str:
 
 
 def draw_top(ui: Any, work: Sequence[Work], most: int) -> None:
-    """Draw the first hazards of the list, for the dashboard."""
+    """Adds the first `most` hazards of the list to the page, for the dashboard."""
     for rank, one in enumerate(work[:most], 1):
         with ui.element("div").classes("card"):
             ui.label(f"{rank}. {work_title(one)}")

@@ -19,14 +19,17 @@ ENDED = "credential ended"
 
 @dataclass(frozen=True, slots=True)
 class Account:
-    """Someone new; the token is shown once and not kept."""
+    """Holds a new principal and its token, which is shown once and not kept."""
 
     principal: Principal
     token: str
 
 
 def tenant_id(connection: Connection, name: str, at: float) -> str:
-    """The tenant of that name, made when it is new."""
+    """Returns the id of the tenant of that name, which is added when it is new.
+
+    Raises ConfigError for a name of another length than 1 to 200.
+    """
     if not 0 < len(name) <= 200:
         raise ConfigError(f"a tenant's name has 1 to 200 characters, got {len(name)}")
     row = connection.execute(select(tenants.c.id).where(tenants.c.name == name)).first()
@@ -49,7 +52,10 @@ def find_tenant(connection: Connection, name: str) -> str:
 
 
 def add_person(connection: Connection, tenant: str, role: Role, name: str, at: float) -> Account:
-    """A person of `tenant` (its name) with a fresh credential."""
+    """Adds a person of `tenant` (its name, added if new) with a fresh credential from `at` s on.
+
+    Raises ConfigError for the role of a vehicle.
+    """
     if role is Role.VEHICLE:
         raise ConfigError("a vehicle is added with its manufacturer, not as a person")
     return _add(connection, tenant_id(connection, tenant, at), role, name, None, at)
@@ -58,7 +64,10 @@ def add_person(connection: Connection, tenant: str, role: Role, name: str, at: f
 def add_vehicle(
     connection: Connection, operator: str, manufacturer: str, name: str, at: float
 ) -> Account:
-    """A vehicle of two tenants (their names) with a fresh credential of its own."""
+    """Adds a vehicle of two tenants (their names, added if new) with a fresh credential of its own.
+
+    Raises ConfigError when the operator has one of that name.
+    """
     owner, maker = tenant_id(connection, operator, at), tenant_id(connection, manufacturer, at)
     there = (vehicles.c.operator == owner) & (vehicles.c.name == name)
     if connection.execute(select(vehicles.c.id).where(there)).first() is not None:
@@ -86,7 +95,7 @@ def _add(
 
 
 def add_credential(connection: Connection, principal: str, at: float) -> str:
-    """A fresh credential of someone."""
+    """Adds a fresh credential of a principal, good for a YEAR from `at` s, and returns its token."""
     token = new_token()
     row = {
         "id": new_id(), "principal": principal, "token_hash": token_hash(token),
@@ -97,12 +106,12 @@ def add_credential(connection: Connection, principal: str, at: float) -> str:
 
 
 def principal_of(connection: Connection, token: str, at: float) -> Principal | None:
-    """Whose credential `token` is; None when it is nobody's, expired or ended."""
+    """Returns the principal whose credential `token` is at `at` s; None when unknown, expired or ended."""
     return _principal(connection, credentials.c.token_hash == token_hash(token), at)
 
 
 def principal_by_id(connection: Connection, id: str, at: float) -> Principal | None:
-    """Someone who still has a credential; None otherwise."""
+    """Returns the principal of this id while it has a credential that holds at `at` s, else None."""
     return _principal(connection, principals.c.id == id, at)
 
 
@@ -122,7 +131,7 @@ def _principal(connection: Connection, which: ColumnElement[bool], at: float) ->
 
 
 def end_credentials(connection: Connection, principal: str, by: str, at: float) -> int:
-    """End every credential of a principal; says how many there are."""
+    """Ends every credential of a principal; returns how many there are, ended ones among them."""
     rows = connection.execute(
         select(credentials.c.id).where(credentials.c.principal == principal)
     ).all()
@@ -132,7 +141,7 @@ def end_credentials(connection: Connection, principal: str, by: str, at: float) 
 
 
 def principals_named(connection: Connection, tenant: str, role: Role, name: str) -> list[str]:
-    """Ids of those of that name (of the tenant, too); ConfigError when there is nobody."""
+    """Returns ids of the principals with this tenant's name, role and name; ConfigError without any."""
     found = connection.execute(
         select(principals.c.id)
         .join(tenants, tenants.c.id == principals.c.tenant)
@@ -146,5 +155,5 @@ def principals_named(connection: Connection, tenant: str, role: Role, name: str)
 
 
 def vehicle_row(connection: Connection, vehicle: str) -> Any:
-    """The row of a vehicle that is known to exist."""
+    """Returns the row of a vehicle, which must exist."""
     return connection.execute(select(vehicles).where(vehicles.c.id == vehicle)).one()

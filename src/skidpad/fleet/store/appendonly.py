@@ -13,7 +13,7 @@ $$ LANGUAGE plpgsql
 
 
 def statements(dialect: str, tables: Iterable[str]) -> list[str]:
-    """The SQL that protects `tables` in that dialect."""
+    """Returns the SQL that forbids change and removal of rows of `tables`, for "sqlite" or PostgreSQL."""
     if dialect == "sqlite":
         return [
             f"CREATE TRIGGER {table}_no_{verb.lower()} BEFORE {verb} ON {table} "

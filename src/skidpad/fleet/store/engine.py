@@ -18,7 +18,7 @@ DRIVERS = {"sqlite": "sqlite", "postgresql": "postgresql+psycopg"}
 
 
 def open_engine(url: str) -> Engine:
-    """An engine whose commits are durable; ConfigError for an address of another kind."""
+    """Returns an engine whose commits are durable; ConfigError for an address of another kind."""
     try:
         parsed = make_url(url)
     except ArgumentError as error:
@@ -38,7 +38,7 @@ def sqlite_url(folder: Path) -> str:
 
 
 def migrate(engine: Engine) -> None:
-    """Bring the tables to this version; ConfigError when the database cannot be used."""
+    """Brings the tables to this version; ConfigError when the database cannot be used."""
     config = Config()
     config.set_main_option("script_location", SCRIPTS.replace("%", "%%"))
     try:

@@ -32,7 +32,10 @@ def add_event(
     by: tuple[str, float],
     **detail: Any,
 ) -> None:
-    """Say that `what` happened to `subject` (kind, id), `by` whom and when (s)."""
+    """Inserts an event: `what` happened to `subject` (kind, id), `by` (actor, time in s).
+
+    detail: anything that JSON holds but nan and inf.
+    """
     connection.execute(
         events.insert(),
         {
@@ -43,7 +46,7 @@ def add_event(
 
 
 def events_of(connection: Connection, subjects: Sequence[str]) -> list[Event]:
-    """The events of some subjects in the order in which they were kept."""
+    """Returns the events of these subjects (ids) in the order in which they were kept."""
     rows = connection.execute(
         select(events).where(events.c.subject.in_(list(subjects))).order_by(events.c.number)
     )

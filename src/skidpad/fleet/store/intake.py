@@ -59,7 +59,7 @@ class Receipt:
 
 
 class Intake:
-    """One thread that commits what has gathered while it committed."""
+    """Commits batches in one thread, in each commit those that came during the one before."""
 
     def __init__(
         self, engine: Engine, blobs: Blobs, clock: Clock, came: Callable[[Batch], None]
@@ -72,7 +72,10 @@ class Intake:
         self._thread.start()
 
     def submit(self, batch: Batch) -> Future[Receipt]:
-        """The receipt, when `batch` is durable."""
+        """Queues a batch; the future gives its receipt once it is durable, or raises Refused.
+
+        Refused (503) at once when the fleet is closing.
+        """
         if self._closed:
             raise Refused(503, "the fleet is closing")
         future: Future[Receipt] = Future()
@@ -80,7 +83,7 @@ class Intake:
         return future
 
     def close(self) -> None:
-        """Commit what was submitted and end the thread; safe to call twice."""
+        """Commits what was submitted and ends the thread; safe to call twice."""
         if not self._closed:
             self._closed = True
             self._queue.put(None)
@@ -138,7 +141,7 @@ class Intake:
     def _write_one(
         self, connection: Connection, batch: Batch, pack: str, start: int
     ) -> Receipt | Refused:
-        """Writes a batch at `start` of a pack unless known; returns its receipt, or a refusal of its key."""
+        """Writes a batch at `start` of a pack unless known; returns its receipt, or a refusal (409)."""
         body = digest(batch.body)
         about = {"vehicle": batch.vehicle, "key": batch.key}
         known = connection.execute(BY_KEY, about).first()
@@ -158,7 +161,7 @@ class Intake:
     def _facts(
         self, connection: Connection, batch: Batch, row: dict[str, Any]
     ) -> tuple[bool, tuple[str, ...]]:
-        """Keep what the batch says; False when all of it was known. Ids of its hazards in order."""
+        """Inserts what the batch says; returns False when all of it was known, and ids of its hazards."""
         owned = {
             "operator": batch.operator, "manufacturer": batch.manufacturer,
             "vehicle": batch.vehicle, "batch": row["id"], "drive": batch.drive,
@@ -206,7 +209,7 @@ def _hazard_row(found: Found) -> dict[str, Any]:
 
 
 def _known_records(connection: Connection, batch: Batch) -> dict[str, str]:
-    """Id by digest of those records of the batch that are kept."""
+    """Returns the id by digest of those records of the batch that are kept already."""
     asked = [found.digest for found in batch.found]
     known: dict[str, str] = {}
     for first in range(0, len(asked), 500):
@@ -222,5 +225,5 @@ def _ids(connection: Connection, batch: Batch) -> tuple[str, ...]:
 
 
 def plain(receipt: Receipt) -> dict[str, Any]:
-    """The receipt as it is sent."""
+    """Returns the receipt as plain values, as it is sent."""
     return {"batch": receipt.batch, "ids": list(receipt.ids), "known": receipt.known}

@@ -31,7 +31,7 @@ class Wanted:
 
 
 def hazard_rows(connection: Connection, who: Principal, wanted: Wanted) -> list[dict[str, Any]]:
-    """The newest hazards that `who` may see, at most a page of them."""
+    """Returns the newest wanted hazards that `who` may see as plain values, at most PAGE."""
     query = select(hazards).where(visible(who, hazards)).order_by(hazards.c.at.desc(), hazards.c.id)
     if wanted.type is not None:
         query = query.where(hazards.c.type == wanted.type)
@@ -45,7 +45,7 @@ def hazard_rows(connection: Connection, who: Principal, wanted: Wanted) -> list[
 
 
 def hazard_row(connection: Connection, who: Principal, hazard: str) -> dict[str, Any]:
-    """One hazard; Refused (404) when there is none that `who` may see."""
+    """Returns one hazard as plain values; Refused (404) when there is none that `who` may see."""
     row = connection.execute(
         select(hazards).where(hazards.c.id == hazard, visible(who, hazards))
     ).first()
@@ -64,7 +64,7 @@ def _plain(row: Any) -> dict[str, Any]:
 
 
 def record_text(connection: Connection, blobs: Blobs, hazard: str) -> str:
-    """The text of a record whose row was visible; FileError when it is not what was kept."""
+    """Returns the text of a hazard's record, whose right the caller has checked; FileError if damaged."""
     row = connection.execute(
         select(hazards.c.start, hazards.c.size, hazards.c.digest, hazards.c.batch).where(
             hazards.c.id == hazard
@@ -81,5 +81,5 @@ def record_text(connection: Connection, blobs: Blobs, hazard: str) -> str:
 
 
 def record_of(connection: Connection, blobs: Blobs, hazard: str) -> HazardRecord:
-    """The record of a hazard whose row was visible."""
+    """Returns the record of a hazard, whose right the caller has checked; FileError if damaged."""
     return decode_record(record_text(connection, blobs, hazard))

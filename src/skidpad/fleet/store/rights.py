@@ -8,7 +8,10 @@ from skidpad.fleet.words import Principal, Role
 
 
 def visible(who: Principal, table: Table) -> ColumnElement[bool]:
-    """True for the rows of `table` that `who` may see; columns `operator`, `manufacturer`, `vehicle`."""
+    """Returns the SQL condition for the rows of `table` that `who` may see; no row for other roles.
+
+    The table has the columns `operator`, `manufacturer` and `vehicle`.
+    """
     if who.role is Role.VEHICLE:
         return table.c.vehicle == who.vehicle
     if who.role in (Role.OPERATOR, Role.TELEOPERATOR):

@@ -29,7 +29,7 @@ class UpdateRefused(BackendError):
 
 
 class _Fetcher(FetcherInterface):
-    """Gives parts as they come: who reads stops at the length that an answer may have."""
+    """Gives a download in parts as they come, so that a reader stops at the length that it may have."""
 
     def __init__(self, stream: Stream) -> None:
         self._stream = stream
@@ -56,7 +56,7 @@ class UpdateClient:
             (folder / part).mkdir(parents=True, exist_ok=True)
 
     def fetch(self, name: str) -> Path:
-        """The update of that name, checked; UpdateRefused when anything is wrong."""
+        """Downloads the update of that name, checks it and returns its path; UpdateRefused otherwise."""
         self._check_clock()
         config = UpdaterConfig(
             timestamp_max_length=65536, snapshot_max_length=1024 * 1024,
@@ -84,7 +84,10 @@ class UpdateClient:
         return self.folder / "trusted_time"
 
     def _check_clock(self) -> None:
-        """A clock set back would let expired metadata pass."""
+        """Raises UpdateRefused when the clock is more than SKEW_S behind the latest signed time it saw.
+
+        A clock set back would let expired metadata pass.
+        """
         trusted = float(self._trusted_time.read_text()) if self._trusted_time.exists() else 0.0
         if self.clock() + SKEW_S < trusted:
             raise UpdateRefused(

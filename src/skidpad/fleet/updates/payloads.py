@@ -49,17 +49,17 @@ _READERS: dict[PayloadKind, Callable[[Path], dict[str, Any]]] = {
 
 
 def payload_name(kind: PayloadKind, content: bytes) -> str:
-    """The name of an update: kind and digest, so that two different ones never share it."""
+    """Returns the name of an update: kind and digest, so that two different ones never share it."""
     return f"{kind.value}-{digest(content)[:24]}.{SUFFIX[kind]}"
 
 
 def read_payload(kind: PayloadKind, path: Path) -> MonitorSettings:
-    """How a monitor judges under the update at `path`; FileError or ConfigError when it is none."""
+    """Returns a monitor's settings under the update at `path`; FileError or ConfigError when it is none."""
     return MonitorSettings(**_READERS[kind](path))
 
 
 def read_payload_content(kind: PayloadKind, content: bytes) -> MonitorSettings:
-    """Reads content as `read_payload` does; Refused (422) for what the vehicle's reader would not take."""
+    """Returns the settings as `read_payload`; Refused (413, 422) for what a vehicle would not take."""
     if len(content) > PAYLOAD_MAX:
         raise Refused(413, f"an update may have {PAYLOAD_MAX} bytes")
     if kind is not PayloadKind.MODEL and b"&" in content:

@@ -31,25 +31,25 @@ class Repository:
 
     @property
     def there(self) -> bool:
-        """Whether the repository has its first root of trust."""
+        """Returns True when the repository has its first root of trust."""
         return (self.folder / "metadata" / "1.root.json").exists()
 
     def begin(self, root: bytes, targets: bytes) -> None:
-        """Take the first root and list; OutputError when there is one already."""
+        """Writes the first root and list of updates; OutputError when there is a root already."""
         if self.there:
             raise OutputError(f"{self.folder} has a root already")
         self._write("1.root.json", root)
         self._publish(targets)
 
     def targets(self) -> bytes:
-        """The current list of updates as it was signed."""
+        """Returns the current list of updates as it was signed; Refused (404) before the first."""
         return self.metadata(f"{self._version('snapshot', 'targets.json')}.targets.json")
 
     def publish(self, targets: bytes, name: str, content: bytes) -> None:
-        """Take a list that was signed off line, and the payload that it adds.
+        """Takes a list of updates that was signed off line, and the payload that it adds.
 
-        Refused (422) unless two of three signed it, it follows the current one, keeps all that was
-        there, and names exactly this payload.
+        Refused (422) unless two of three signed it, it has the next version and has not expired, keeps
+        all that was there, adds only `name`, and names exactly this content.
         """
         try:
             new: Metadata[Targets] = Metadata.from_bytes(targets)
@@ -78,17 +78,17 @@ class Repository:
         self._publish(targets)
 
     def metadata(self, name: str) -> bytes:
-        """A file of metadata; the timestamp is signed anew when it is old. Refused (404)."""
+        """Returns a file of metadata; Refused (404). The timestamp is signed anew after RENEW_S s."""
         if name == "timestamp.json" and self._age() > RENEW_S:
             self._stamp()
         return self._read("metadata", name)
 
     def payload(self, name: str) -> bytes:
-        """The content of `<digest>.<name>`; Refused (404)."""
+        """Returns the content of `<digest>.<name>`; Refused (404) where there is none."""
         return self._read("targets", name)
 
     def content(self, name: str) -> bytes:
-        """The payload of that name in the current list; Refused (404)."""
+        """Returns the payload of that name in the current list; Refused (404) where it names none."""
         current: Metadata[Targets] = Metadata.from_bytes(self.targets())
         if name not in current.signed.targets:
             raise absent()
@@ -110,7 +110,10 @@ class Repository:
         self._stamp(version)
 
     def _stamp(self, version: int | None = None) -> None:
-        """Sign the timestamp anew, and a snapshot that is about to expire."""
+        """Signs and writes the timestamp anew, and a snapshot that expires within two days.
+
+        version: of the snapshot; None: the one that is served.
+        """
         now, old = self.clock(), self._read_timestamp()
         version = version or (old.signed.snapshot_meta.version if old else 1)
         path = self.folder / "metadata" / f"{version}.snapshot.json"
@@ -166,7 +169,7 @@ class Repository:
         write_bytes(self.folder / "metadata" / name, content)
 
     def _read(self, part: str, name: str) -> bytes:
-        """Returns the bytes of a file in `part`; refuses names that are not plain and absent files."""
+        """Returns the bytes of a file in `part`; Refused (404) for an absent file or a name with a path."""
         if not name.replace("-", "").replace(".", "").isalnum() or ".." in name:
             raise absent()
         try:

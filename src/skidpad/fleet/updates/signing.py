@@ -26,12 +26,12 @@ ROLES = ("root", "targets")
 
 
 def instant(seconds: float) -> datetime:
-    """Seconds since 1970 as TUF writes them."""
+    """Returns s since 1970 as a UTC time in whole s, as TUF writes them."""
     return datetime.fromtimestamp(int(seconds), timezone.utc)
 
 
 def new_key(path: Path) -> CryptoSigner:
-    """A fresh Ed25519 key, kept at `path`; OutputError when one is there already."""
+    """Writes a fresh Ed25519 key to `path` and returns it; OutputError when a file is there already."""
     if path.exists():
         raise OutputError(f"{path} exists, and a key is never replaced")
     key = Ed25519PrivateKey.generate()
@@ -45,7 +45,7 @@ def new_key(path: Path) -> CryptoSigner:
 
 
 def load_key(path: Path) -> CryptoSigner:
-    """The key at `path`; FileError when it is none."""
+    """Returns the Ed25519 key at `path`; FileError when it is none."""
     try:
         key = serialization.load_pem_private_key(path.read_bytes(), None)
     except (OSError, ValueError, TypeError) as error:
@@ -56,7 +56,10 @@ def load_key(path: Path) -> CryptoSigner:
 
 
 def make_offline_keys(folder: Path, data: Path) -> dict[str, list[CryptoSigner]]:
-    """Three keys each for root and targets; ConfigError for a folder below the data folder."""
+    """Writes KEYS keys each for root and targets and returns them by role.
+
+    Raises ConfigError for a folder that holds the data folder or lies in it.
+    """
     inside = folder.resolve().is_relative_to(data.resolve())
     if inside or data.resolve().is_relative_to(folder.resolve()):
         raise ConfigError(f"--out {folder}: keys that sign must never lie with the data ({data})")
@@ -66,7 +69,7 @@ def make_offline_keys(folder: Path, data: Path) -> dict[str, list[CryptoSigner]]
 
 
 def make_root(signers: dict[str, list[CryptoSigner]], online: CryptoSigner, now: float) -> bytes:
-    """The first root: who may sign what; vehicles pin it."""
+    """Returns the first root, signed: it says whose keys may sign what, and vehicles pin it. now: s."""
     root = Root(version=1, expires=instant(now) + ROOT_VALID, consistent_snapshot=True)
     for role in ROLES:
         for signer in signers[role]:
@@ -78,7 +81,7 @@ def make_root(signers: dict[str, list[CryptoSigner]], online: CryptoSigner, now:
 
 
 def empty_targets(signers: Sequence[CryptoSigner], now: float) -> bytes:
-    """The first list of updates, which names none."""
+    """Returns the first list of updates, signed, which names none. now: s."""
     return _sign_metadata(
         Metadata(Targets(version=1, expires=instant(now) + TARGETS_VALID)), signers
     )
@@ -91,7 +94,10 @@ def add_target(
     signers: Sequence[CryptoSigner],
     now: float,
 ) -> bytes:
-    """The next list of updates: the current one and `payload` (name, content), signed anew."""  # fmt: skip
+    """Returns the next list of updates: the current one and `payload` (name, content), signed anew.
+
+    custom: what is said of it in the list. now: s.
+    """  # fmt: skip
     metadata: Metadata[Targets] = Metadata.from_bytes(current)
     targets = metadata.signed
     name, content = payload

@@ -31,7 +31,7 @@ READ = {"ego": (ODOMETRY,), "plan": PLANS, "objects": tuple(OBJECT_READERS)}
 
 
 class RosTopics:
-    """What `mapping` names, from the wire. It ends when all writers have gone, or all is silent."""
+    """Reads the topics that `mapping` names; ends when all writers have gone, or all is silent."""
 
     def __init__(
         self, mapping: Mapping, domain: int = 0, patience: float = 60.0, silence: float = 60.0
@@ -49,7 +49,7 @@ class RosTopics:
         self._open(patience)
 
     def _open(self, patience: float) -> None:
-        """Wait for a writer of every topic, and read as it writes."""
+        """Waits `patience` s for a writer of every topic and opens a reader of each; FileError otherwise."""
         found = BuiltinDataReader(self.participant, BuiltinTopicDcpsPublication)
         deadline = time.monotonic() + patience
         wanted, heard = set(self.frames.roles), set[str]()
@@ -93,7 +93,10 @@ class RosTopics:
         self.readers[topic] = DataReader(self.participant, rt, qos=asked)
 
     def messages(self) -> Iterator[Message]:
-        """Frames as they complete; a second call goes on where the first ended."""
+        """Yields frames as they complete; a second call goes on where the first ended.
+
+        It ends with the writers, after `silence` s without a sample (a loss), or by Ctrl-C.
+        """
         merge = _Merge(tuple(self.readers), {t: self._rank(t) for t in self.readers})
         quiet = time.monotonic()
         try:
@@ -120,7 +123,7 @@ class RosTopics:
         return min(ROLES.index(role) for _, role in self.frames.roles[topic])
 
     def _take(self, merge: _Merge) -> bool:
-        """Whether anything new came."""
+        """Adds the samples that came to `merge`; returns True when there was any."""
         some = False
         for topic, reader in self.readers.items():
             for sample in reader.take(AT_ONCE):
@@ -131,7 +134,7 @@ class RosTopics:
         return some
 
     def _frames(self, t: float, topic: str, content: Any) -> Iterator[Message]:
-        """Yields the channel messages in a topic's message at `t` s; counts a malformed one as lost."""
+        """Yields the channel messages in a topic's message at `t` s; a malformed one counts as lost."""
         try:
             yield from self.frames.take(topic, t, content, self.kinds[topic])
         except (FileError, ValueError, KeyError, IndexError, AttributeError, TypeError):
@@ -144,7 +147,7 @@ class RosTopics:
 
 
 class _Merge:
-    """Messages of several topics in the order of stamps, then of roles."""
+    """Sorts messages of several topics by their stamps, then by roles."""
 
     def __init__(self, topics: tuple[str, ...], rank: dict[str, int]) -> None:
         self.rank, self.newest = rank, dict.fromkeys(topics, -float("inf"))
@@ -153,7 +156,7 @@ class _Merge:
 
     @property
     def has_begun(self) -> bool:
-        """Whether any message has arrived."""
+        """Returns True when any message has arrived."""
         return self.count > 0
 
     def add(self, topic: str, t: float, content: Any) -> None:
@@ -163,7 +166,7 @@ class _Merge:
         heapq.heappush(self.waiting, (t, self.rank[topic], topic, self.count, content))
 
     def ready(self) -> Iterator[tuple[float, str, Any]]:
-        """Yields messages that no topic can precede; a topic silent for 5 s of stamps is left out."""
+        """Yields messages that none can precede; a topic LAG s of stamps behind is not waited for."""
         last = max(self.newest.values())
         safe = min(t for t in self.newest.values() if t >= last - LAG)
         while self.waiting and self.waiting[0][0] <= safe:

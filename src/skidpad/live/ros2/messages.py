@@ -19,13 +19,13 @@ LABELS = {int(ours): label for label, ours in reversed(AUTOWARE_CLASSES.items())
 
 
 class Messages:
-    """Makes the three messages of a channel's frame; world coordinates, times as stamps."""
+    """Makes the three messages of a channel's frame; world coordinates, times in s as stamps."""
 
     def __init__(self, types: Types) -> None:
         self.types = types
 
     def odometry(self, frame: ChannelFrame) -> Any:
-        """nav_msgs/Odometry at the body's centre."""
+        """Returns the ego's pose and twist as nav_msgs/Odometry, at the body's centre."""
         x, y, h, vx, vy = frame.ego.tolist()
         return self.types.make(
             ODOMETRY,
@@ -36,7 +36,7 @@ class Messages:
         )
 
     def path(self, frame: ChannelFrame) -> Any:
-        """nav_msgs/Path with a stamp per pose."""
+        """Returns the plan, of at least one row, as nav_msgs/Path with a stamp per pose."""
         rows = frame.plan
         steps = np.diff(rows[:, :2], axis=0, append=rows[-1:, :2])
         headings = np.arctan2(steps[:, 1], steps[:, 0])
@@ -122,7 +122,7 @@ class Messages:
         return self._make("geometry_msgs", "Pose", place, turn)
 
     def _twist(self, vx: float, vy: float, h: float) -> Any:
-        """Returns a twist in the body's own frame, as ROS gives it."""
+        """Returns the Twist message of a velocity in the world (m/s) in the body's frame, as ROS gives it."""
         c, s = cos(h), sin(h)
         forward = self._vector(c * vx + s * vy, c * vy - s * vx)
         return self._make("geometry_msgs", "Twist", forward, self._vector(0.0, 0.0))

@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 
 
 def participant(domain: int) -> Any:
-    """A participant of the domain; the first one says what that opens."""
+    """Returns a new participant of a DDS domain; the first one logs what that opens."""
     with _LOCK:
         if domain not in _DOMAINS:
             log.warning(
@@ -52,7 +52,7 @@ def qos(flow: Flow, announced: bytes = b"") -> Any:
 
 
 def like(writer: Any) -> Any:
-    """What a reader of this writer asks for: its reliability, and all of it."""
+    """Returns the policies of a reader that fits a writer's: its reliability, and all of its history."""
     reliability = Policy.Reliability.Reliable(duration(seconds=BLOCKING))
     if Policy.Reliability.BestEffort in writer:
         reliability = Policy.Reliability.BestEffort
@@ -60,7 +60,7 @@ def like(writer: Any) -> Any:
 
 
 def said_of_type(writer: Any) -> str:
-    """The type hash that a writer announces; empty where it says none."""
+    """Returns the type hash that a writer announces, "" where it says none."""
     data = writer[Policy.Userdata].data if Policy.Userdata in writer else b""
     text = bytes(data).decode(errors="replace")
     return next(

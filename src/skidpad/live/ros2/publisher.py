@@ -41,12 +41,12 @@ LISTENERS = 120.0  # s that a lossless drive waits for its listeners
 
 
 def topic_of(channel: str, part: str) -> str:
-    """The name of a channel's topic, as ROS knows it."""
+    """Returns the ROS name of a channel's topic; part: odom, plan or objects."""
     return f"/skidpad/{channel}/{part}"
 
 
 def mapping_of(channels: Sequence[str], length: float = 4.7, width: float = 1.9) -> Mapping:
-    """How our own topics are read back."""
+    """Returns the mapping by which our own topics are read back; the ego's size in m."""
     return Mapping(
         channels={
             name: ChannelTopics(
@@ -60,7 +60,7 @@ def mapping_of(channels: Sequence[str], length: float = 4.7, width: float = 1.9)
 
 
 class RosPublisher:
-    """A `Listener` that writes to DDS. Lossless: it waits for a reader, and for its room."""
+    """Publishes channels over DDS. Lossless: it waits for a reader, and for its room."""
 
     def __init__(
         self,
@@ -101,7 +101,10 @@ class RosPublisher:
             time.sleep(POLL)
 
     def hear(self, channel: int | None, item: Item) -> None:
-        """Write what a channel says; objects and plan before the pose that completes a frame."""
+        """Publishes a channel's frame: objects and plan before the pose, which completes it.
+
+        Nothing for other items, a pose that is not finite, or after a reader had no room.
+        """
         if channel is None or not isinstance(item, ChannelFrame) or self.ended or self.cut:
             return
         if not self.described:
@@ -130,7 +133,7 @@ class RosPublisher:
         self.cut = False
 
     def close(self) -> None:
-        """Wait until readers have it all, and leave the domain."""
+        """Waits until readers have it all, leaves the domain and writes NAME.ros2.json."""
         if self.flow is Flow.LOSSLESS and not self.ended:
             for writer in self.writers.values():
                 if not writer.wait_for_acks(duration(seconds=BLOCKING)):
@@ -143,7 +146,7 @@ class RosPublisher:
         write_bytes(self.recording.with_suffix(".ros2.json"), text)
 
     def _describe(self, frame: ChannelFrame) -> None:
-        """The mapping file that reads these topics, with the ego's true size."""
+        """Writes NAME.ros2.yaml, the mapping that reads these topics, with the ego's true size."""
         length, width = np.ptp(frame.ego_polygon, axis=0).tolist()
         mapping = mapping_of(self.channels, round(length, 3), round(width, 3))
         plain = msgspec.to_builtins(mapping)

@@ -53,7 +53,7 @@ PLAIN: dict[str, Any] = {
 
 
 class Types:
-    """Messages of one distribution, e.g. ros2_humble, as classes of the DDS library."""
+    """Gives messages of one distribution, e.g. ros2_humble, as classes of the DDS library."""
 
     def __init__(self, typestore: str = "ros2_humble") -> None:
         try:
@@ -67,7 +67,7 @@ class Types:
         self._classes: dict[str, Any] = {}
 
     def cls(self, name: str) -> Any:
-        """The DDS class of a message such as nav_msgs/msg/Odometry; KeyError for an unknown one."""
+        """Returns the DDS class of a message such as nav_msgs/msg/Odometry; KeyError for an unknown one."""
         if name not in self._classes:
             package, _, kind = name.split("/")
             fields = {n: self._field(d) for n, d in self.store.fielddefs[name][1]}
@@ -87,12 +87,12 @@ class Types:
         return container.array[inner, what[1]] if kind == ARRAY else container.sequence[inner]
 
     def make(self, name: str, *values: Any) -> Any:
-        """A message of its fields in their order."""
+        """Returns a message with these values of its fields, in their order."""
         fields = [n for n, _ in self.store.fielddefs[name][1]]
         return self.cls(name)(**dict(zip(fields, values, strict=True)))
 
     def from_rosbags(self, name: str, message: Any) -> Any:
-        """A message of rosbags as one of the DDS library."""
+        """Returns a message of rosbags as one of the DDS library."""
         defs = self.store.fielddefs[name][1]
         return self.cls(name)(**{n: self._value(d, getattr(message, n)) for n, d in defs})
 
@@ -113,13 +113,13 @@ class Types:
 
 
 def dds_name(name: str) -> str:
-    """The DDS name of a message's type."""
+    """Returns the DDS name of a message's type such as nav_msgs/msg/Odometry."""
     package, _, kind = name.split("/")
     return f"{package}::msg::dds_::{kind}_"
 
 
 def ros_name(dds: str) -> str:
-    """The message's name of a DDS type; the name itself where it is none of ROS."""
+    """Returns the message's name of a DDS type; the name itself where it is none of ROS."""
     parts = dds.split("::")
     if len(parts) != 4 or parts[1:3] != ["msg", "dds_"] or not parts[3].endswith("_"):
         return dds

@@ -58,12 +58,12 @@ class MonitoredDrive:
 
     @property
     def context(self) -> dict[str, str]:
-        """Words that describe the drive."""
+        """Returns the words that describe the drive, empty where the summary has none."""
         words: dict[str, str] = self.summary.get("context", {})
         return words
 
     def traces(self, indicator: AnyIndicator) -> list[Trace]:
-        """The indicator's course, one per channel or pair."""
+        """Returns the indicator's course per channel or pair; empty where it was not computed."""
         rows = self.table.filter(pl.col("indicator") == indicator.value)
         return [
             Trace(

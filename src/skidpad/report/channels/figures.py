@@ -20,7 +20,7 @@ QUANTILES = (0.5, 0.9, 0.99)
 
 
 def drive_timeline(drive: MonitoredDrive) -> str:
-    """The worst of all channels or pairs, for every indicator with a threshold."""
+    """Returns an SVG strip per indicator with a threshold, and the safety score: the worst of all pairs."""
     strips = [
         strip
         for indicator, entry in drive.thresholds.items()
@@ -75,7 +75,7 @@ def _worst(traces: list[Trace], upper: bool) -> NDArray[np.float64]:
 
 
 def risk(drive: MonitoredDrive) -> list[Block]:
-    """Risk of every channel's plan, in hazard-free driving (decision C-8) and near hazards."""
+    """Returns figure and quantiles of the plan's risk in hazard-free driving (C-8); a note without any."""
     scores = drive.traces(Indicator.SAFETY_SCORE)
     free = {t.subject: values for t in scores if (values := _free_risk(drive, t)).size}
     if not free:
@@ -96,7 +96,7 @@ def risk(drive: MonitoredDrive) -> list[Block]:
 
 
 def _free_risk(drive: MonitoredDrive, trace: Trace) -> NDArray[np.float64]:
-    """Sorted risks of the cycles that are far from every hazard."""
+    """Returns the sorted known risks (1 less the score) of cycles more than MARGIN s from every hazard."""
     near = np.zeros(trace.t.size, dtype=bool)
     for e in drive.summary["hazards"]:
         near |= (trace.t >= e["t_start"] - MARGIN) & (trace.t <= e["t_end"] + MARGIN)
@@ -125,7 +125,7 @@ def _risk_behind(drive: MonitoredDrive) -> str:
 
 
 def timing(drive: MonitoredDrive) -> list[Block]:
-    """Time per module over the drive (C-236) and against the number of objects (C-238)."""
+    """Returns figures of time per module over the drive (C-236) and by objects (C-238); or nothing."""
     if drive.timing is None:
         return []
     by_objects = time_by_objects(drive.timing)

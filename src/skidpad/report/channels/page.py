@@ -55,7 +55,7 @@ def write_drive_report(folder: Path) -> Path:
 
 
 def drive_page(drive: MonitoredDrive) -> Page:
-    """All sections in the order in which a reader asks."""
+    """Returns the report page of a monitored drive."""
     sections = [
         Section(
             "What happened", [*_warnings(drive), _answers(drive), _headline(drive), Text(LEAD)]
@@ -106,7 +106,7 @@ def _warnings(drive: MonitoredDrive) -> list[Block]:
 
 
 def _answers(drive: MonitoredDrive) -> Answers:
-    """What was found, how bad it was, how sure."""
+    """Returns the answers to what was found, what was worst, and how sure that is."""
     scored = [r for r in drive.records if not _candidate(r.type.value)]
     counts = Counter(r.type for r in scored)
     told = ", ".join(f"{n} of {tables.NAMES[h].lower()}" for h, n in counts.most_common())
@@ -201,12 +201,12 @@ def _hazards(drive: MonitoredDrive) -> list[Block]:
 
 
 def _severity(record: HazardRecord) -> tuple[bool, float]:
-    """Scored hazards first, then by the safety score when it was worst."""
+    """Returns a sort key: scored hazards first, then by the least safety score, 1 where unknown."""
     return _candidate(record.type.value), record.extremes.get("safety_score", 1.0)
 
 
 def hazard_card(record: HazardRecord, drawn: bool, searched: Sequence[str] = ()) -> Card:
-    """Draws what was found, which objects are involved, and the worlds as the channels saw them.
+    """Returns the card of a hazard: facts, objects involved and, if `drawn`, the channels' worlds.
 
     searched: sentences of a search around the hazard.
     """

@@ -59,12 +59,12 @@ HAZARD_COLUMNS: tuple[Column[HazardRecord], ...] = (
 
 
 def hazard_list(records: Sequence[HazardRecord]) -> Table:
-    """Draws a table with one row per record."""
+    """Returns a table with one row per record."""
     return table(HAZARD_COLUMNS, records, "All hazards")
 
 
 def safety_case_tree(drive: MonitoredDrive) -> Tree:
-    """Goal, arguments, statements and indicators with evidence now and over the drive (C-033)."""
+    """Returns the tree of goal, arguments and statements with their indicators' evidence (C-033)."""
     case = safety_case()
     evidence = evidence_of(drive.table)
     arguments = [_argument(evidence, a) for a in case.arguments]
@@ -89,7 +89,7 @@ def _statement(nodes: Nodes, statement: Statement) -> Node:
 
 
 def evidence_line(n: NodeEvidence) -> str:
-    """Now and so far, of one indicator."""
+    """Returns a line on an indicator: value at the end, range, cycles violated and not evaluated."""
     name = f"{words(n.indicator.value)} ({n.subject})"
     if n.now is None or n.least is None or n.greatest is None:
         return f"{name}: never evaluated in {n.cycles} cycles"
@@ -105,7 +105,7 @@ def _worst(states: Sequence[str]) -> str:
 
 
 def indicators(drive: MonitoredDrive) -> list[Block]:
-    """Every indicator and subject: claim, threshold, violations and gaps (decision C-17)."""
+    """Returns the table of every indicator and subject: claim, threshold, violations, gaps (C-17)."""
     return [
         table(
             _indicator_columns(drive),
@@ -175,7 +175,7 @@ TIMING_COLUMNS: tuple[Column[Row], ...] = (
 
 
 def timing(drive: MonitoredDrive) -> list[Block]:
-    """The table of C-233 with the published means beside ours."""
+    """Returns the table of module times (C-233) beside the published; a note where not measured."""
     if drive.timing is None:
         return [
             Text("Not measured: `skidpad monitor --timing` measures every module.", tone="note")
@@ -204,7 +204,7 @@ LOSS_COLUMNS: tuple[Column[tuple[str, str, int]], ...] = (
 
 
 def losses(drive: MonitoredDrive) -> list[Block]:
-    """What was lost while reading or could not be evaluated."""
+    """Returns the table of what was lost in reading or not evaluated; a sentence where nothing was."""
     s = drive.summary
     rows = [
         (words(kind), channel, n)

@@ -19,7 +19,7 @@ EGO = (77, 157, 255)
 
 
 def require_rerun() -> Any:
-    """The module `rerun`; MissingExtra without it."""
+    """Returns the module `rerun`; MissingExtra without it."""
     try:
         import rerun
     except ImportError as error:
@@ -30,7 +30,10 @@ def require_rerun() -> Any:
 def log_drive(
     channels: tuple[str, ...], cycles: Iterable[Cycle], save: Path | None, spawn: bool
 ) -> int:
-    """Send every cycle to a viewer, or into the file `save` (.rrd); returns the number of cycles."""
+    """Sends every cycle, monitored, to a viewer or the file `save` (.rrd); returns the number of cycles.
+
+    spawn: start a viewer; without it and `save` nothing is shown.
+    """
     rr = require_rerun()
     recording = rr.RecordingStream(APPLICATION)
     if save is not None:
@@ -61,7 +64,7 @@ def log_drive(
 def _world(
     rr: Any, recording: Any, name: str, frame: ChannelFrame | None, colour: tuple[int, int, int]
 ) -> None:
-    """One channel's world; cleared where the channel is silent. Rerun's y points down, ours up."""
+    """Logs one channel's world, or clears it where the channel is silent. Rerun's y points down, ours up."""
     root = f"worlds/{name}"
     if frame is None or not np.isfinite(frame.ego).all():
         recording.log(root, rr.Clear(recursive=True))
@@ -77,7 +80,7 @@ def _world(
 
 
 def outline(state: Floats, polygon: Floats) -> Floats:
-    """Closed outline (k + 1, 2) of a shape (k, 2) carried to the place and heading of `state`."""
+    """Returns the closed outline (k + 1, 2) of a shape (k, 2) placed at x, y, yaw of `state`."""
     c, s = np.cos(state[2]), np.sin(state[2])
     placed = polygon @ np.array([[c, s], [-s, c]]) + state[:2]
     return np.concatenate([placed, placed[:1]])

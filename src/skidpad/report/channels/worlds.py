@@ -20,7 +20,7 @@ SPAN = 92.0  # m across a panel
 
 
 def worlds_replay(record: HazardRecord) -> dict[str, Any] | None:
-    """The record's worlds as whole numbers; None when it holds none."""
+    """Returns the record's worlds as whole numbers for the page's script; None without a known ego."""
     cycles = with_intentions(record.worlds)[::STRIDE]
     origin = next((_ego(c) for c in cycles if _ego(c) is not None), None)
     if origin is None:
@@ -48,7 +48,10 @@ def worlds_replay(record: HazardRecord) -> dict[str, Any] | None:
 
 
 def with_intentions(cycles: Sequence[Cycle]) -> list[Cycle]:
-    """The cycles with each channel's newest plan and predictions, which a record keeps each 0.5 s."""
+    """Returns the cycles with each channel's last plan and predictions filled in, until it is silent.
+
+    A record keeps them each 0.5 s only.
+    """
     newest: dict[int, ChannelFrame] = {}
     out = []
     for cycle in cycles:
@@ -72,7 +75,10 @@ def _ego(cycle: Cycle) -> NDArray[np.float64] | None:
 
 
 def _world(frame: ChannelFrame | None, origin: NDArray[np.float64]) -> list[Any] | None:
-    """[ego box, plan, objects, predictions]; a box is x, y, heading in mrad, length, width."""
+    """Returns [ego box, plan, objects, predictions] within REACH m, in UNIT; None for a silent channel.
+
+    A box is x, y, yaw in mrad, length, width.
+    """
     if frame is None or not np.isfinite(frame.ego).all():
         return None
     offset = frame.objects[:, :2] - frame.ego[:2]

@@ -59,7 +59,7 @@ STATUS = {
 
 
 def severity(crash: Crash) -> tuple[bool, float, float]:
-    """What makes a crash the worse one: a person, the delta-v, else the closing speed, the speed."""
+    """Returns a sort key, larger is worse: person or two wheels hit, grading speed, ego's speed."""
     contact = crash.contact
     if contact is None:
         return False, 0.0, crash.v_ego
@@ -67,7 +67,7 @@ def severity(crash: Crash) -> tuple[bool, float, float]:
 
 
 def crash_card(crash: Crash, drive: Drive, road_map: RoadMap, run: Path) -> Card:
-    """The card of one crash of the run in the folder `run`."""
+    """Returns the card of one crash of the run in the folder `run`, with pictures and a replay."""
     story = tell_story(drive, crash)
     allowed = read_allowed(run, drive.log.header.dt)
     sentence = "" if allowed is None else describe_allowed(allowed, crash.t)
@@ -85,7 +85,7 @@ def crash_card(crash: Crash, drive: Drive, road_map: RoadMap, run: Path) -> Card
 
 
 def headline(crash: Crash) -> str:
-    """One line that says what happened."""
+    """Returns one line on what happened, such as "Off the road at 60 km/h"."""
     if crash.kind is CrashKind.WRONG_WAY:
         return "Facing the wrong way"
     alone = " in a bend, without a lead" if crash.bend_exit else ""
@@ -124,7 +124,7 @@ def _class_mark(contact: Contact | None) -> str:
 
 
 def facts(crash: Crash) -> list[tuple[str, str]]:
-    """Numbers of the moment; what was not there is left out."""
+    """Returns names and values as text of the moment's numbers; unknown ones are left out."""
     contact = crash.contact
     delta_v = None if contact is None else contact.delta_v
     rows = [
@@ -142,7 +142,7 @@ def facts(crash: Crash) -> list[tuple[str, str]]:
 
 
 def _closing_name(contact: Contact | None) -> str:
-    """What stands is hit by the part of the ego's speed that is square to the piece hit first."""
+    """Returns the name of the closing speed; of what stands, it is the part square to the piece hit."""
     if contact is None or contact.actor >= 0:
         return "closing"
     return f"of it square to the {contact.other}"
@@ -157,7 +157,7 @@ def _delta_v_name(crash: Crash) -> str:
 
 
 def timeline(story: Story) -> list[Event]:
-    """What happened in order of time; mismatches of measured and true are marked."""
+    """Returns the events of a crash in order of time; reports unlike the truth are marked wrong."""
     crash, found = story.crash, []
     found += [(s.before, _news_event(s, story)) for s in story.news]
     for moment, text in (
@@ -185,7 +185,7 @@ def _event(before: float, parts: Sequence[str], is_wrong: bool = False) -> Event
 
 
 def _news_event(s: Sighting, story: Story) -> Event:
-    """One change of what the stack said."""
+    """Returns the event of one change in what the stack reported, beside the true gap."""
     parts = [STATUS[s.status]] if s.status is not None else []
     if s.distance is not None:
         parts.append(f"measured {format_metres(s.distance)}")
@@ -202,14 +202,14 @@ def _news_event(s: Sighting, story: Story) -> Event:
 
 
 def contact_text(contact: Contact) -> str:
-    """One contact in words, with its class and what it is graded by."""
+    """Returns one contact in words, with the speed that grades it and its severity."""
     what = contact.other if contact.actor > 0 else f"the {contact.other}"
     by = f"{contact.graded_by.value} {format_speed(contact.v_graded)}"
     return f"contact with {what}, {by}, {contact.severity.value}"
 
 
 def pictures(run: Path, t: float) -> list[Image]:
-    """The snapshot of that moment, if there is one, small enough to travel inside the page."""
+    """Returns the picture of the run at `t` s as WebP; empty where none was taken."""
     found = snapshot(run, t)
     if found is None:
         return []
@@ -217,12 +217,12 @@ def pictures(run: Path, t: float) -> list[Image]:
 
 
 def webp_uri(path: Path) -> str:
-    """A picture as a WebP data URI of at most 60 kB."""
+    """Returns a picture as WebP data URI of PICTURE_WIDTH px, at most PICTURE_BYTES if it can be."""
     return _webp(path, PICTURE_WIDTH, PICTURE_BYTES)
 
 
 def thumbnail_uri(path: Path) -> str:
-    """The same, small enough for many on a page."""
+    """Returns a picture as WebP data URI of THUMBNAIL_WIDTH px, at most THUMBNAIL_BYTES if it can be."""
     return _webp(path, THUMBNAIL_WIDTH, THUMBNAIL_BYTES)
 
 

@@ -48,7 +48,7 @@ def write_cause(story: Story) -> str:
 
 
 def _describe_sideways(story: Story) -> list[str]:
-    """The two drove side by side, and one moved across faster than the other."""
+    """Returns clauses on a sideways contact: which of the two moved across, and the ego's offset."""
     crash = story.crash
     ego, other = f"the ego at {format_speed(crash.v_ego)}", crash.other
     if crash.v_other is not None:
@@ -59,7 +59,7 @@ def _describe_sideways(story: Story) -> list[str]:
 
 
 def _describe_offset(crash: Crash) -> str:
-    """Says where in its lane the ego was, when that is worth a word."""
+    """Returns a clause on the ego's place in its lane; "" within ASIDE m of the middle or unknown."""
     if crash.lane_offset is None or abs(crash.lane_offset) <= ASIDE:
         return ""
     side = "left" if crash.lane_offset > 0.0 else "right"
@@ -67,7 +67,7 @@ def _describe_offset(crash: Crash) -> str:
 
 
 def _describe_struck(story: Story) -> list[str]:
-    """Others drove into the ego."""
+    """Returns clauses on another that drove into the ego, and on a wrong report of it."""
     crash, wrong = story.crash, story.worst
     where = " from behind" if crash.rear_ended else ""
     closing = "" if crash.v_closing is None else f", {format_speed(crash.v_closing)} faster"
@@ -82,7 +82,7 @@ def _describe_struck(story: Story) -> list[str]:
 
 
 def _describe_striking(story: Story) -> list[str]:
-    """The ego drove into another."""
+    """Returns clauses on how the ego drove into another: the other's coming, reports, braking."""
     came = _describe_arrival(story)
     if came:
         return [came, _describe_perception(story), _describe_braking(story)]
@@ -90,7 +90,7 @@ def _describe_striking(story: Story) -> list[str]:
 
 
 def _describe_arrival(story: Story) -> str:
-    """How the other came before the ego, if it did so just before."""
+    """Returns a clause on how the other came before the ego; "" if it was ahead for long."""
     moment, other = story.arrived, story.crash.other
     if moment is None:
         return f"{other} crossed the way of the ego and was never ahead in its lane"
@@ -118,7 +118,7 @@ def _describe_lead(story: Story) -> str:
 
 
 def _describe_perception(story: Story) -> str:
-    """What the stack said of it."""
+    """Returns a clause on a wrong or late report of the other; "" if it came within LATE s."""
     if story.worst is not None:
         return _describe_report(story.worst, story.crash.other)
     first, arrived = story.first, story.arrived
@@ -143,7 +143,7 @@ def _describe_report(wrong: Sighting, hit: str) -> str:
 
 
 def _describe_braking(story: Story) -> str:
-    """Says when the ego braked, and whether that could have been enough."""
+    """Returns a clause on when the ego braked, and whether full braking there could have been enough."""
     crash, braked = story.crash, story.braked
     if braked is None:
         return f"the ego did not brake and drove at {format_speed(crash.v_ego)}"
@@ -160,7 +160,7 @@ def _describe_braking(story: Story) -> str:
 
 
 def _describe_departure(story: Story) -> list[str]:
-    """A departure: the bend against the grip, what the ego braked for, where in the lane it was."""
+    """Returns clauses on a departure: speed and place in the lane, bend against grip, braking, report."""
     crash, wrong, braked = story.crash, story.worst, story.braked
     end = f" and hit the {crash.other}" if crash.kind is CrashKind.STATIC else ENDS[crash.kind]
     text = f"the ego drove at {format_speed(crash.v_ego)}{end}"
@@ -180,7 +180,7 @@ def _describe_departure(story: Story) -> list[str]:
 
 
 def is_thrown_back(crash: Crash) -> bool:
-    """Whether what stands changed the ego's velocity by more than its speed."""
+    """Returns True when something static changed the ego's velocity by more than its speed."""
     contact = crash.contact
     if contact is None or contact.actor >= 0 or contact.delta_v is None:
         return False
@@ -188,7 +188,7 @@ def is_thrown_back(crash: Crash) -> bool:
 
 
 def _describe_rebound(crash: Crash) -> str:
-    """Why a delta-v is larger than the speed that was lost."""
+    """Returns a clause on why delta-v exceeds the speed that was lost; "" where it does not."""
     if not is_thrown_back(crash) or crash.contact is None:
         return ""
     back = format_speed(crash.contact.delta_v)
@@ -211,20 +211,20 @@ def _describe_bend(crash: Crash) -> str:
 
 
 def format_speed(v: float | None) -> str:
-    """Returns a speed as text in km/h."""
+    """Returns a speed in m/s as text in km/h; "unknown speed" for None."""
     return "unknown speed" if v is None else f"{kmh_from_mps(v):.0f} km/h"
 
 
 def format_metres(value: float | None) -> str:
-    """Returns a distance as text in m."""
+    """Returns a distance as text in m; "an unknown distance" for None."""
     return "an unknown distance" if value is None else f"{value:.1f} m"
 
 
 def format_seconds(value: float) -> str:
-    """Returns a time as text in s."""
+    """Returns a time as text in s, without its sign."""
     return f"{abs(value):.1f} s"
 
 
 def format_gap(moment: Moment) -> str:
-    """The gap of a moment, "" where there is none."""
+    """Returns the gap of a moment as text in m, "" where there is none."""
     return format_metres(moment.gap) if isfinite(moment.gap) else ""

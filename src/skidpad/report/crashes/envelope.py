@@ -72,7 +72,7 @@ def describe_allowed(allowed: AllowedSpeeds, t: float) -> str:
 
 
 def draw_allowed(allowed: AllowedSpeeds, t: float) -> list[Figure]:
-    """Draws speed and lowest limit before a crash at t, coloured by the limit's name."""
+    """Returns a figure of speed and lowest limit in the SHOWN s before `t`; empty with less than 2 points."""
     part = allowed.between(t - SHOWN, t)
     if len(part.t) < 2:
         return []

@@ -19,7 +19,10 @@ SHOWN = 20  # cards at most
 
 
 def find_contacts(log: RunLog, road: RoadMap, run: Path) -> list[Found]:
-    """Return the ego's first contact with each other body; run: the folder of the log."""
+    """Returns the ego's first contact with each other body as a crash; empty without contacts.
+
+    run: the folder of the log.
+    """
     if not log.contacts:
         return []
     drive = prepare(log, road)
@@ -27,7 +30,7 @@ def find_contacts(log: RunLog, road: RoadMap, run: Path) -> list[Found]:
 
 
 def contact_cards(found: Sequence[Found]) -> Cards:
-    """Return the cards of crashes, hardest first; of drives that moved alike once (T-3)."""
+    """Returns the SHOWN hardest crashes as cards, hardest first; drives that moved alike count once (T-3)."""
     found = list({(motion_hash(f[1].log), f[0].tick, f[0].other): f for f in found[::-1]}.values())
     hardest = sorted(found, key=lambda item: severity(item[0]), reverse=True)[:SHOWN]
     title = f"{len(found)} crashes" if len(found) > 1 else "One crash"
@@ -37,7 +40,7 @@ def contact_cards(found: Sequence[Found]) -> Cards:
 
 
 def write_crashes(run: Path, road: RoadMap) -> Path | None:
-    """Write the page with the crashes of one run; None when there was none, and no page then."""
+    """Writes crashes.html of one run and returns its path; None without a crash, no page then."""
     page = run / PAGE
     page.unlink(missing_ok=True)
     found = find_contacts(read_log(run), road, run)

@@ -53,14 +53,14 @@ class Metric:
 
     @property
     def heading(self) -> str:
-        """Title of the metric with its unit."""
+        """Returns the metric's title with its unit, as "speed, km/h"."""
         if self.unit and self.title.endswith(" per 100"):
             return f"{self.title} {self.unit}"
         return f"{self.title}, {self.unit}" if self.unit else self.title
 
 
 def metrics_of(rows: type[Any]) -> list[Metric]:
-    """The metrics of a class of rows; units stand in the names (A-252)."""
+    """Returns the metrics that a class of rows defines; units are those of the names (A-252)."""
     return [
         Metric(name, unit_of(name), f"{meaning} ({source})")
         for name, meaning, source in definitions_of(rows)
@@ -68,7 +68,7 @@ def metrics_of(rows: type[Any]) -> list[Metric]:
 
 
 def unit_of(name: str) -> str:
-    """Returns the unit that a column's suffix says."""
+    """Returns the unit that a column's suffix stands for, "" without one."""
     return next((UNITS[end] for end in ENDINGS if name.endswith(end)), "")
 
 
@@ -88,7 +88,7 @@ class CampaignView(Generic[E]):
 
     @cached_property
     def finished(self) -> pl.DataFrame:
-        """Runs that count in denominators (decision L-7)."""
+        """Returns the runs that have a result: those that denominators count (decision L-7)."""
         return self.results.filter(~pl.col("outcome").is_in(NOT_RUN))
 
     @cached_property
@@ -97,19 +97,19 @@ class CampaignView(Generic[E]):
         return self.folder.names(*self.columns.sort)
 
     def names(self, runs: pl.DataFrame) -> list[str | None]:
-        """Names of these runs; None for one that the ledger does not know."""
+        """Returns the names of these runs; None for one that the ledger does not know."""
         return [self._run_names.get(key) for key in runs.select(self.columns.sort).rows()]
 
     def values(self, column: str) -> str:
-        """All values of a column, for people."""
+        """Returns the different values of a column, sorted, as text with commas."""
         return ", ".join(sorted(map(str, self.results[column].unique().to_list())))
 
     def facts(self) -> list[tuple[str, str]]:
-        """What all runs have in common."""
+        """Returns the columns that describe the whole campaign, each with its values as text."""
         return [(column, self.values(column)) for column in self.common]
 
     def missing(self) -> list[Block]:
-        """A warning that names runs without a result."""
+        """Returns a warning that names runs without a result; empty where all have one."""
         gone = self.results.filter(pl.col("outcome").is_in(NOT_RUN))
         if not len(gone):
             return []
@@ -120,7 +120,7 @@ class CampaignView(Generic[E]):
 
     @cached_property
     def metrics(self) -> list[Metric]:
-        """All metrics of the rows, those that packages added last."""
+        """Returns all metrics of the rows, last those that packages added."""
         added = {m.name: m for entry in self.folder.entries for m in entry.added}
         own = metrics_of(self.columns.metrics)
         return own + [Metric(m.name, m.units, m.title) for m in added.values()]
@@ -130,7 +130,7 @@ class CampaignView(Generic[E]):
         return Definitions([(m.name, m.unit, m.meaning) for m in self.metrics])
 
     def provenance(self) -> list[Block]:
-        """Versions, machines, times, and what all runs have in common."""
+        """Returns versions, machines and times as text, and the configuration common to all runs."""
         lines = [
             f"Skidpad {__version__}, results hash {self.columns.hash(self.results)}.",
             f"Machine fingerprints: {', '.join(self.folder.fingerprints) or 'none'}.",
@@ -144,7 +144,7 @@ class CampaignView(Generic[E]):
 
     @cached_property
     def processor_minutes(self) -> float:
-        """Processor time of all runs."""
+        """Returns the processor time of all runs in min, 0 where none was measured."""
         timing = self.folder.timing
         if "cpu_s" not in timing.columns:
             return 0.0

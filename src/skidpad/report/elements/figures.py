@@ -57,7 +57,7 @@ class Series:
 def canvas(
     width: float = 8.4, height: float = 3.4, columns: int = 1, rows: int = 1
 ) -> Iterator[tuple[Canvas, list[Axes]]]:
-    """A figure with axes in the common style, in inches."""
+    """Yields a figure of `width` by `height` inches with its axes, row by row, in the common style."""
     with mpl.rc_context(STYLE):
         figure = Canvas(figsize=(width, height), layout="constrained")
         axes = figure.subplots(rows, columns, sharex="col", squeeze=False)
@@ -65,7 +65,7 @@ def canvas(
 
 
 def svg_of(figure: Canvas) -> str:
-    """The figure as an SVG element that scales with the page."""
+    """Returns the figure as an SVG element that scales with the page; equal figures give equal text."""
     with mpl.rc_context(STYLE):
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
@@ -80,8 +80,10 @@ def svg_of(figure: Canvas) -> str:
 
 
 def _numbered_ids(text: str) -> str:
-    """Ids by order of appearance behind a hash of the drawing: the library's own may vary between
-    calls, and two charts in one page must not share any."""
+    """Returns the SVG with ids numbered by order of appearance behind a hash of the drawing.
+
+    The library's own may vary between calls, and two charts in one page must not share any.
+    """
     order = {
         old: str(k) for k, old in enumerate(dict.fromkeys(re.findall(r'\bid="([^"]+)"', text)))
     }
@@ -97,7 +99,7 @@ def _numbered_ids(text: str) -> str:
 
 
 def grouped_bars(groups: Sequence[str], series: Sequence[Series], y_label: str) -> str:
-    """Bars side by side per group, with intervals and published values."""
+    """Returns an SVG of bars side by side per group, with intervals and published values."""
     with canvas() as (figure, (axes,)):
         draw_bars(axes, groups, series, y_label)
         if len(series) > 1 or any(s.published for s in series):
@@ -106,7 +108,7 @@ def grouped_bars(groups: Sequence[str], series: Sequence[Series], y_label: str) 
 
 
 def draw_bars(axes: Axes, groups: Sequence[str], series: Sequence[Series], y_label: str) -> None:
-    """Draws bars into existing axes."""
+    """Draws bars per group into the axes, and an arrow where an interval is cut off."""
     width = 0.8 / len(series)
     named = False
     for k, one in enumerate(series):
@@ -150,14 +152,17 @@ def _mark_cut_bars(axes: Axes, series: Sequence[Series], groups: int, width: flo
 
 
 def interval_reach(series: Sequence[Series], least: float = 0.0) -> float:
-    """How far an axis goes for the sake of intervals: a few wide ones would press all estimates
-    into one place."""
+    """Returns how far an axis may go for the sake of intervals: WIDEST times the largest value.
+
+    At least `least`; inf where all values are 0. A few wide intervals would press all estimates into
+    one place.
+    """
     values = [abs(v) for one in series for v in (*one.values, *one.published) if v is not None]
     return max(WIDEST * max(values, default=0.0), least) or float("inf")
 
 
 def cut_note(series: Sequence[Series], least: float = 0.0) -> str:
-    """The sentence of a caption where an interval goes beyond the axis; else nothing."""
+    """Returns the sentence of a caption where an interval goes beyond the axis, else ""."""
     reach = interval_reach(series, least)
     ends = (end for one in series for end in (*one.low, *one.high) if end is not None)
     cut = any(abs(end) > reach for end in ends)
@@ -167,10 +172,10 @@ def cut_note(series: Sequence[Series], least: float = 0.0) -> str:
 def points_with_intervals(
     rows: Sequence[str], series: Sequence[Series], x_label: str, origin: float | None = None
 ) -> str:
-    """Estimates as points on a common scale, one row per label, with their intervals as lines.
+    """Returns an SVG of estimates as points on a common scale, a row per label, intervals as lines.
 
     A bound that holds on one side is an arrow, an estimate without limits is hollow. origin: where a
-    vertical rule is drawn.
+    vertical rule is drawn; None: the axis begins at 0.
     """
     height = 1.1 + 0.3 * len(rows) + 0.12 * len(rows) * len(series)
     with canvas(height=height) as (figure, (axes,)):
@@ -197,7 +202,7 @@ def points_with_intervals(
 
 
 def _keep_points_apart(axes: Axes, series: Sequence[Series], origin: float | None) -> None:
-    """Limit the axis to where estimates stand apart."""
+    """Limits the x axis to `interval_reach`; without an origin it begins at 0."""
     reach = interval_reach(series, POINTS_REACH)
     low, high = axes.get_xlim()
     axes.set_xlim(0.0 if origin is None else max(low, -reach), min(high, reach))
@@ -214,12 +219,12 @@ def _mark_cut_points(axes: Axes, heights: Sequence[float], one: Series, ink: str
 
 
 def _ink(one: Series, place: int) -> str:
-    """The colour of a series at this place of its chart."""
+    """Returns the colour of a series: its own of the PALETTE, else that of its place in the chart."""
     return PALETTE[(place if one.colour is None else one.colour) % len(PALETTE)]
 
 
 def _draw_points(axes: Axes, y: Sequence[float], one: Series, ink: str) -> None:
-    """The estimates of one series at the heights y."""
+    """Draws the estimates of one series at the heights y, with intervals or bounds."""
     style: dict[str, Any] = {
         "marker": one.marker,
         "color": ink,
@@ -242,7 +247,7 @@ def _draw_points(axes: Axes, y: Sequence[float], one: Series, ink: str) -> None:
 
 
 def stacked_bars(rows: Sequence[str], series: Sequence[Series], x_label: str) -> str:
-    """Parts of a whole per row, laid end to end."""
+    """Returns an SVG of parts of a whole per row, laid end to end; None counts as 0."""
     with canvas(height=1.2 + 0.36 * len(rows)) as (figure, (axes,)):
         left = [0.0] * len(rows)
         for k, one in enumerate(series):
@@ -261,7 +266,7 @@ def stacked_bars(rows: Sequence[str], series: Sequence[Series], x_label: str) ->
 
 
 def panel(groups: Sequence[str], charts: Sequence[tuple[str, Series]]) -> str:
-    """Small bar charts beside each other, one quantity each."""
+    """Returns an SVG of small bar charts beside each other, one (label, series) each."""
     with canvas(width=10.5, height=2.9, columns=len(charts)) as (figure, all_axes):
         for axes, (label, series) in zip(all_axes, charts, strict=True):
             draw_bars(axes, groups, [series], label)
@@ -271,7 +276,7 @@ def panel(groups: Sequence[str], charts: Sequence[tuple[str, Series]]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A line or a cloud of points; curves of one name share their entry in the legend."""
+    """Holds a line or a cloud of points; curves of one name share their entry in the legend."""
 
     name: str
     x: ArrayLike
@@ -302,7 +307,10 @@ POINTS = {"marker": "o", "linestyle": "none", "alpha": 0.75, "markersize": 5}
 def curves(
     charts: Sequence[Chart], width: float = 8.4, height: float = 3.4, stacked: bool = False
 ) -> str:
-    """Charts beside or above each other, under one legend where there are several names."""
+    """Returns an SVG of charts beside (stacked: above) each other, in inches, with one legend.
+
+    The legend is left out where there is one name.
+    """
     rows, columns = (len(charts), 1) if stacked else (1, len(charts))
     named: set[str] = set()
     with canvas(width, height, columns, rows) as (figure, all_axes):
@@ -317,13 +325,13 @@ def curves(
 
 
 def legend_columns(names: Iterable[str], width: float) -> int:
-    """Columns of a legend in which the longest name fits; width of the figure in inches."""
+    """Returns 1 to 6, the columns of a legend in which the longest name fits; width: inches."""
     longest = max(map(len, names)) + LEGEND_MARK
     return max(1, min(6, int(width * LEGEND_CHARACTERS / longest)))
 
 
 def _draw_curves(axes: Axes, chart: Chart, named: set[str]) -> None:
-    """Draws a chart's curves, bands and rules on the axes; a name already in `named` gets no label again."""
+    """Draws a chart's curves, bands and rules; adds their names to `named`, which are labelled once."""
     for k, curve in enumerate(chart.curves):
         colour = PALETTE[(k if curve.colour is None else curve.colour) % len(PALETTE)]
         if curve.band is not None:
@@ -350,11 +358,11 @@ Named = tuple[str, ArrayLike, ArrayLike]  # name, x, y
 
 
 def scatter(points: Sequence[Named], x_label: str, y_label: str) -> str:
-    """Draws clouds of points in one chart."""
+    """Returns an SVG of clouds of points (name, x, y) in one chart."""
     clouds = [Curve(*one, style=POINTS) for one in points]
     return curves([Chart(clouds, x_label, y_label)], height=3.6)
 
 
 def lines(series: Sequence[Named], x_label: str, y_label: str) -> str:
-    """Draws curves in one chart."""
+    """Returns an SVG of curves (name, x, y) in one chart."""
     return curves([Chart([Curve(*one) for one in series], x_label, y_label)])

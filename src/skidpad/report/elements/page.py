@@ -50,8 +50,7 @@ class Table:
     kind: str = "table"
 
     def csv(self) -> str:
-        """The table as CSV: beside a column with intervals their limits, beside one with published
-        values those."""
+        """Returns the table as CSV; beside a column with intervals or published values, columns of those."""
         columns = [
             (heading, [row[k] for row in self.rows]) for k, (heading, _) in enumerate(self.columns)
         ]
@@ -61,11 +60,11 @@ class Table:
         return out.getvalue()
 
     def file_name(self) -> str:
-        """Returns the file name of the table's CSV."""
+        """Returns the file name of the table's CSV, made of its caption, or table.csv."""
         return (anchor(self.caption) or "table") + ".csv"
 
     def csv_uri(self) -> str:
-        """The same as the target of a link."""
+        """Returns the CSV as a data URI, the target of a link."""
         return "data:text/csv;charset=utf-8," + quote(self.csv())
 
 
@@ -183,11 +182,11 @@ class Card:
     kind: str = "card"
 
     def replay_json(self) -> str:
-        """The replay as JSON that is safe inside a script element."""
+        """Returns the replay as JSON that is safe inside a script element."""
         return _script_json(self.replay)
 
     def worlds_json(self) -> str:
-        """The same for worlds of channels."""
+        """Returns the channels' worlds as JSON that is safe inside a script element."""
         return _script_json(self.worlds)
 
 
@@ -275,7 +274,7 @@ class Section:
 
     @property
     def anchor(self) -> str:
-        """Returns the identifier by which links find the block."""
+        """Returns the section's identifier for links: its id, else made of its title."""
         return self.id or anchor(self.title)
 
 
@@ -290,7 +289,7 @@ class Page:
 
 
 def render(page: Page) -> str:
-    """The page as one HTML document without any reference to the network."""
+    """Returns the page as one HTML document that needs no network; empty sections are left out."""
     return _template().render(
         page=page,
         sections=[s for s in page.sections if s.blocks],
@@ -300,29 +299,29 @@ def render(page: Page) -> str:
 
 
 def words(name: str) -> str:
-    """An identifier as it is read."""
+    """Returns an identifier as it is read, with spaces for underscores."""
     return name.replace("_", " ")
 
 
 def anchor(text: str) -> str:
-    """Text as the name of a place or file."""
+    """Returns text as name of a place or file: lower case, "-" for all but letters and digits."""
     return "".join(c if c.isalnum() else "-" for c in text.lower()).strip("-")
 
 
 def write_report_page(page: Page, folder: Path) -> Path:
-    """Write the report of a folder; returns its path."""
+    """Writes the page to report.html in `folder` and returns its path."""
     path = folder / REPORT
     write_page(page, path)
     return path
 
 
 def write_page(page: Page, path: Path) -> None:
-    """Render to `path`; an earlier report is replaced only by a complete one."""
+    """Writes the page to `path`; an earlier one is replaced only by a complete one."""
     write_bytes(path, render(page).encode("utf-8", "backslashreplace"))
 
 
 def _script_json(value: Any) -> str:
-    """JSON that stays inside its <script>, whatever its words are: no "<" leaves it."""
+    """Returns JSON that stays inside its <script>, whatever its words are: no "<" is in it."""
     return msgspec.json.encode(value).decode().replace("<", "\\u003c")
 
 
@@ -332,7 +331,7 @@ def _asset(name: str) -> str:
 
 
 def _prose(text: str) -> Markup:
-    """Text of a page; what stands between backticks is code."""
+    """Returns escaped text as HTML in which what stands between backticks is code."""
     found = re.sub(r"`(--[^`]{,20})`", r'<code class="option">\1</code>', str(escape(text)))
     return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", found))
 

@@ -33,7 +33,10 @@ def replay(
     after_s: float = AFTER_S,
     surface: Sequence[SurfacePatch] = (),
 ) -> dict[str, Any]:
-    """The seconds around `row`, ego-centred: lanes, patches, barriers and the actors near the ego."""
+    """Returns the s around tick row `row` for the page's script, centred on the ego's place there.
+
+    Lanes, patches, barriers and actors within REACH m. Times in s.
+    """
     dt = log.header.dt
     stride = max(round(STEP_S / dt), 1)
     first = max(row - round(before_s / dt) // stride * stride, row % stride)
@@ -47,7 +50,10 @@ def replay_run(
     mark: int | None = None,
     surface: Sequence[SurfacePatch] = (),
 ) -> dict[str, Any]:
-    """A whole run, with `FRAMES` frames at most; mark: the row that is shown first and marked."""
+    """Returns a whole run for the page's script, with FRAMES frames at most, lanes along its way.
+
+    mark: the row that is shown first and marked.
+    """
     stride = max(round(STEP_S / log.header.dt), -(-len(log) // FRAMES))
     rows = np.arange(0, len(log), stride)
     return _cut_log(log, road_map, rows, mark, rows, surface)
@@ -61,7 +67,7 @@ def replay_stretch(
     mark_s: float,
     surface: Sequence[SurfacePatch] = (),
 ) -> dict[str, Any]:
-    """The part of a run between two times, with lanes along its whole way; mark_s: shown first."""
+    """Returns the part of a run between two times in s for the page's script; mark_s: shown first."""
     stride = max(round(STEP_S / log.header.dt), 1)
     first, last = np.searchsorted(log.t, (begin_s - 1e-9, end_s + 1e-9))
     rows = np.arange(first, last, stride)
@@ -77,7 +83,10 @@ def _cut_log(
     stops: NDArray[np.int64],
     surface: Sequence[SurfacePatch],
 ) -> dict[str, Any]:
-    """These rows; lanes and barriers near the ego's places in `stops`."""
+    """Returns these rows of a log for the page's script, lanes and barriers near the places in `stops`.
+
+    mark: the row that is shown first. stops: rows of the log.
+    """
     a = log.actors
     way = _stations(np.column_stack([v[stops, 0] for v in (a.x, a.y, a.z)]).astype(np.float64))
     centre = way[0, :2]
@@ -104,13 +113,13 @@ def _cut_log(
 
 
 def _stations(way: Floats) -> Floats:
-    """The places of a way (n, 3) that lie a quarter of the reach apart, the first one among them."""
+    """Returns the places of a way (n, 3) that lie a quarter of REACH apart, the first one among them."""
     gone = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way[:, :2], axis=0).T))])
     return way[np.flatnonzero(np.diff(np.floor(gone / (0.25 * REACH)), prepend=-1.0) > 0.0)]
 
 
 def _near(points: Floats, way: Floats) -> NDArray[np.bool_]:
-    """(n,) whether points (n, 3) lie within reach of a station of the way, on its level."""
+    """Returns (n,) True for points (n, 3) within 1.3 REACH of a station of the way, on its level."""
     near = np.zeros(len(points), bool)
     for x, y, z in way:
         far = np.hypot(points[:, 0] - x, points[:, 1] - y)
@@ -133,7 +142,10 @@ def _whole(points: Floats) -> list[int]:
 
 
 def lane_borders(road_map: RoadMap, way: Floats) -> list[list[int]]:
-    """Both borders of every lane for vehicles within reach of a way (n, 3), from its first place."""
+    """Returns both borders of every lane for vehicles near a way (n, 3), [x, y, ...] in UNIT.
+
+    From the way's first place; sidewalks and the like are left out.
+    """
     s, lanes = road_map.samples, road_map.lanes
     near, centre = _near(np.column_stack([s.x, s.y, s.z]), way), way[0]
     borders = []
@@ -154,7 +166,7 @@ def lane_borders(road_map: RoadMap, way: Floats) -> list[list[int]]:
 
 
 def barriers(road_map: RoadMap, way: Floats) -> list[list[int]]:
-    """Stretches of barriers within reach of a way (n, 3), from its first place."""
+    """Returns stretches of barriers near a way (n, 3), [x, y, ...] in UNIT from its first place."""
     stretches = []
     for barrier in road_map.roadside.barriers:
         rows = np.flatnonzero(_near(barrier.points, way))

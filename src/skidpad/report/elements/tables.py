@@ -15,7 +15,7 @@ R = TypeVar("R")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quantity:
-    """An estimate, in the unit of its column, with its 95 % interval and what was published of it."""
+    """Holds an estimate in the unit of its column, its 95 % interval and what was published of it."""
 
     value: float | None
     interval: Interval | None = None
@@ -53,7 +53,7 @@ class Column(Generic[R]):
 
     @property
     def heading(self) -> str:
-        """Title of the column with its unit."""
+        """Returns the title of the column with its unit, as "speed, km/h"."""
         return f"{self.title}, {self.unit}" if self.unit else self.title
 
     def cell(self, row: R) -> Cell:
@@ -75,7 +75,7 @@ def table(
     note: str = "",
     sortable: bool = True,
 ) -> Table:
-    """One row per item, one cell per column."""
+    """Returns a table with one row per item and one cell per column."""
     return Table(
         [(c.heading, c.definition) for c in columns],
         [[c.cell(row) for c in columns] for row in rows],
@@ -86,7 +86,10 @@ def table(
 
 
 def quantity_cell(q: Quantity, style: Format) -> Cell:
-    """The estimate; below it the interval with its remark, further lines, the published value."""
+    """Returns the cell of an estimate; below it the interval with remark, further lines, what was published.
+
+    Without a value it reads `style.absent`, muted.
+    """
     told = [] if q.interval is None or q.value is None else [_limits(q, style)]
     told += [line for line in (*([] if told else [q.remark]), *q.lines) if line]
     if q.published is not None:
@@ -114,7 +117,7 @@ def _limits(q: Quantity, style: Format) -> str:
 
 
 def number(value: float, spec: str = "") -> str:
-    """A number by specification, else whole or with two digits if it is below 100."""
+    """Returns a number as text by `spec`, else whole, or with two digits below 100 if it is not."""
     if spec:
         return f"{value:{spec}}"
     whole = abs(value) >= 100 or value == int(value)

@@ -40,7 +40,10 @@ class Mark:
 
 
 def timelines(strips: Sequence[Strip], marks: Sequence[Mark], t0: float, t1: float) -> str:
-    """An SVG element: strips below each other on one time axis, alarms and marks in orange."""
+    """Returns an SVG element: strips below each other on one time axis from t0 to t1 s.
+
+    Alarms and marks are orange.
+    """
     t1 = max(t1, t0 + 0.1)
     top = 22.0 if marks else 4.0
     height = top + len(strips) * (STRIP + GAP) + 24.0
@@ -120,7 +123,7 @@ def _strip(s: Strip, y: float, t0: float, t1: float) -> str:
 
 
 def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Stretches of true values as (first, length)."""
+    """Returns the stretches of true values as (first, length)."""
     padded = np.concatenate([[False], flags, [False]])
     change = np.flatnonzero(padded[1:] != padded[:-1])
     return [(int(a), int(b - a)) for a, b in zip(change[::2], change[1::2], strict=True)]

@@ -15,7 +15,7 @@ TALLIED = {Outcome.BY_CONSTRUCTION: "not measured (both sides are the same drive
 
 
 def verdict_blocks(judged: Iterable[Judgement]) -> list[Verdict]:
-    """One block per finding: claim, verdict, a plain sentence, numbers, and how it was judged."""
+    """Returns one block per finding: claim, verdict, a plain sentence, numbers, and how it was judged."""
     return [
         Verdict(
             j.finding.id,
@@ -31,7 +31,7 @@ def verdict_blocks(judged: Iterable[Judgement]) -> list[Verdict]:
 
 
 def plain(j: Judgement) -> str:
-    """What the runs say about a claim, without numbers of statistics."""
+    """Returns a sentence on what the runs say about a claim, without numbers of statistics."""
     match j.verdict:
         case Outcome.SUPPORTED if j.is_counted:
             return "Every case of these runs shows it; more runs may bring one that does not."
@@ -60,7 +60,7 @@ def plain(j: Judgement) -> str:
 
 
 def tally_text(judged: Sequence[Judgement]) -> str:
-    """How many claims were judged how."""
+    """Returns a sentence on how many claims got which verdict; judged: at least one."""
     counts = Counter(j.verdict for j in judged)
     told = ", ".join(f"{counts[v]} {TALLIED.get(v, v.value)}" for v in Outcome if counts[v])
     if len(judged) == 1:
@@ -69,7 +69,7 @@ def tally_text(judged: Sequence[Judgement]) -> str:
 
 
 def unjudged_text(judged: Sequence[Judgement]) -> str:
-    """The line that stands in place of verdicts where there is one seed per cell."""
+    """Returns the sentence that stands in place of verdicts where there is one seed per cell."""
     least = seeds_for_verdict(len(judged))
     return (
         f"One seed per cell judges none of the sources' {count_text(len(judged), 'claim')}: what "
@@ -78,7 +78,7 @@ def unjudged_text(judged: Sequence[Judgement]) -> str:
 
 
 def least_seeds_text(judged: Sequence[Judgement]) -> str:
-    """Says with how many seeds any claim of this report can be judged at all; empty: none is tested."""
+    """Returns a sentence on the seeds that any verdict of this report takes; "" where none is tested."""
     tested = sum(j.p is not None for j in judged)
     if not tested:
         return ""
@@ -90,7 +90,7 @@ def least_seeds_text(judged: Sequence[Judgement]) -> str:
 
 
 def seeds_text(seeds: int) -> str:
-    """How far verdicts can be trusted with so many seeds per cell."""
+    """Returns a sentence on how far verdicts can be trusted with so many seeds per cell."""
     if seeds == 1:
         return (
             "One seed per cell: what differs between two cells may be chance; no verdict can rest "

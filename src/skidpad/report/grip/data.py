@@ -51,30 +51,30 @@ class GripCampaign(CampaignView[GripEntry]):
 
     @cached_property
     def four_cells(self) -> bool:
-        """Whether each run was driven with and without drops on the cameras (B-161)."""
+        """Returns True when runs were driven with and without drops on the cameras (B-161)."""
         return self.results["overlay"].n_unique() > 1
 
     @cached_property
     def plain(self) -> pl.DataFrame:
-        """The campaign proper: where both were driven, the runs without drops."""
+        """Returns the results of the campaign proper: without the runs with drops, where both were driven."""
         return self.results.filter(~pl.col("overlay")) if self.four_cells else self.results
 
     @cached_property
     def pairs(self) -> dict[Key, Pair]:
-        """Cells of the campaign proper, in the published order."""
+        """Returns the cells of the campaign proper by (scenario, weather), in the published order."""
         found = {(p.scenario, p.weather): p for p in pairs(self.plain) if p.cutin == FIXED}
         return {k: found[k] for k in sorted(found, key=self._order)}
 
     @cached_property
     def variants(self) -> dict[str, Pair]:
-        """Variants of the cut-in at the baseline; none when only one was driven (B-075)."""
+        """Returns the variants of the cut-in at the baseline; empty when only one was driven (B-075)."""
         cut_ins = [p for p in pairs(self.plain) if p.scenario == CUT_IN]
         found = {p.cutin: p for p in cut_ins if p.weather == BASELINE}
         return found if len(found) > 1 else {}
 
     @cached_property
     def counted(self) -> pl.DataFrame:
-        """Finished runs of the campaign proper."""
+        """Returns the finished runs of the campaign proper, with the fixed cut-in."""
         here = ~pl.col("outcome").is_in(NOT_RUN) & (pl.col("cutin") == FIXED)
         return self.plain.filter(here)
 
@@ -86,7 +86,7 @@ class GripCampaign(CampaignView[GripEntry]):
 
     @cached_property
     def scenarios(self) -> list[str]:
-        """Scenarios that were driven, in order."""
+        """Returns the scenarios that were driven, in order."""
         return list(dict.fromkeys(s for s, _ in self.pairs))
 
     def of(self, scenario: str) -> list[Pair]:
@@ -95,12 +95,12 @@ class GripCampaign(CampaignView[GripEntry]):
 
     @property
     def titles(self) -> list[tuple[str, str]]:
-        """Scenarios with their names for people."""
+        """Returns the driven scenarios with their names for people."""
         return [(s, scenario_title(s)) for s in self.scenarios]
 
     @cached_property
     def both(self) -> bool:
-        """Whether both settings of friction were driven."""
+        """Returns True when any cell was driven with both settings of friction."""
         return any(len(p.original) and len(p.reduced) for p in self.pairs.values())
 
     @cached_property
@@ -109,7 +109,7 @@ class GripCampaign(CampaignView[GripEntry]):
         return {}
 
     def series(self, pair: Pair, friction: str) -> CellSeries | None:
-        """Recorded series of a cell; None without runs."""
+        """Returns the recorded series of a cell with this friction, read once; None without runs."""
         key = (pair.scenario, pair.cutin, pair.weather, friction)
         runs = pair.side(friction)
         if key not in self._series and len(runs):
@@ -131,7 +131,10 @@ class GripCampaign(CampaignView[GripEntry]):
 
     @cached_property
     def variant_distances(self) -> dict[str, dict[str, Distance]]:
-        """Compares each variant of the cut-in with `original`, friction untouched (B-077)."""
+        """Returns warping distances of each cut-in from `original`, by variant and metric (B-077).
+
+        Friction untouched; empty without the original.
+        """
         base = self.variants.get("original")
         start = self.series(base, ORIGINAL) if base is not None else None
         found = {}
@@ -144,7 +147,7 @@ class GripCampaign(CampaignView[GripEntry]):
 
     @cached_property
     def delays(self) -> dict[Key, np.ndarray[tuple[int], np.dtype[np.float64]]]:
-        """Delay of each pair in s; NaN where no shift explains the difference."""
+        """Returns the delay of each pair of runs in s by cell; nan where no shift explains the difference."""
         found = {}
         for key, pair in self.pairs.items():
             a, b = self.series(pair, ORIGINAL), self.series(pair, REDUCED)
@@ -153,7 +156,10 @@ class GripCampaign(CampaignView[GripEntry]):
         return found
 
     def with_delays(self) -> pl.DataFrame:
-        """Results with `delay_s` in the rows of reduced friction."""
+        """Returns the results of the campaign proper with `delay_s`, null but for reduced friction.
+
+        Without any delay the column is missing.
+        """
         parts = []
         for key, values in self.delays.items():
             runs = self.pairs[key].reduced["seed"].to_list()[: len(values)]
@@ -175,7 +181,7 @@ class GripCampaign(CampaignView[GripEntry]):
 
 
 def load_grip(folder: Path) -> GripCampaign:
-    """The campaign in a folder; FileError when it holds no results of one."""
+    """Returns the campaign in a folder; FileError when it holds no results of one."""
     found = GripCampaign(CampaignFolder(folder, GripEntry))
     if "friction" not in found.results.columns:
         raise FileError(f"{folder} holds no friction campaign")
@@ -183,5 +189,5 @@ def load_grip(folder: Path) -> GripCampaign:
 
 
 def scenario_title(name: str) -> str:
-    """Returns the title of a scenario for readers."""
+    """Returns the title of a scenario for readers; an unknown one's name."""
     return SCENARIOS.get(name, name)

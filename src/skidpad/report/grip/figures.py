@@ -23,7 +23,7 @@ LANE_EDGES = (0.0, -3.5, -7.0, -10.5)  # m left
 
 
 def both_modes(campaign: GripCampaign) -> list[Block]:
-    """Distance, speed and steering over time and the density of steering, by friction."""
+    """Returns a figure per SHOWN cell with both frictions: three series over time, steering density."""
     pairs = [campaign.pairs.get((s, w)) for s in campaign.scenarios for w in SHOWN]
     return [
         _both(campaign, pair)
@@ -64,14 +64,14 @@ def _density(name: str, steer: Floats, bins: Floats) -> Curve:
 
 
 def _steering_bins(sides: Sequence[CellSeries]) -> Floats:
-    """Edges that hold nearly all steering of both modes, at least a hundredth of full steer."""
+    """Returns BINS edges that hold all steering of both modes, at least +-STEER_MIN."""
     most = max(float(np.nanmax(np.abs(s.values["steer"]))) for s in sides)
     reach = max(most, STEER_MIN)
     return np.linspace(-reach, reach, BINS)
 
 
 def across_weathers(campaign: GripCampaign) -> list[Block]:
-    """Distance to the nearest vehicle by weather, in one mode each (B-141)."""
+    """Returns figures of the distance to the nearest vehicle by weather, a chart per friction (B-141)."""
     blocks: list[Block] = []
     for scenario, prefix in ACROSS:
         pairs = [p for p in campaign.of(scenario) if p.weather.startswith(prefix)]
@@ -95,7 +95,7 @@ def _medians(campaign: GripCampaign, pairs: Sequence[Pair], friction: str) -> li
 
 
 def trajectories(campaign: GripCampaign) -> list[Block]:
-    """Ways of ego and other vehicle in the cut-in, all runs, by friction and by variant (B-146)."""
+    """Returns figures of the ways of ego and ghost in the cut-in, by friction and by variant (B-146)."""
     blocks: list[Block] = []
     for weather in SHOWN:
         pair = campaign.pairs.get(("ghost_cut_in", weather))

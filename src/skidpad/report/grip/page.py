@@ -62,7 +62,7 @@ def write_grip_report(folder: Path) -> Path:
 
 
 def build_page(campaign: GripCampaign) -> Page:
-    """All sections in the order in which a reader asks."""
+    """Returns the report page of a friction campaign."""
     both = campaign.both
     judged = judge(FINDINGS, [campaign.with_delays() if both else campaign.plain] * len(FINDINGS))
     first: list[Block] = [_answers(campaign, judged), _headline(campaign), Text(LEAD), Text(MODEL)]
@@ -114,7 +114,7 @@ def _warnings(campaign: GripCampaign) -> list[Block]:
 
 
 def _answers(campaign: GripCampaign, judged: Sequence[Judgement]) -> Answers:
-    """Whether grip matters, where, how sure."""
+    """Returns the answers to whether grip matters, where most, and how sure that is."""
     runs = campaign.counted
     shares = {f: completion(runs.filter(pl.col("friction") == f)) for f in (ORIGINAL, REDUCED)}
     told = [f"{_percent(s)} with {f} friction" for f, s in shares.items() if s.value is not None]
@@ -152,7 +152,7 @@ def _percent(share: Share) -> str:
 
 
 def _headline(campaign: GripCampaign) -> Numbers:
-    """Returns the head numbers: runs, completion per friction, cells that changed, others out of control."""
+    """Returns the head numbers: runs, completion per friction, cells that changed, loss of control."""
     all_runs = campaign.plain
     items = [Number(f"{len(all_runs)}", "runs", f"{all_runs['seed'].n_unique()} per cell")]
     for friction in (ORIGINAL, REDUCED):
@@ -185,7 +185,7 @@ def _verdicts(judged: Sequence[Judgement]) -> list[Block]:
 
 
 def _replays(campaign: GripCampaign) -> list[Block]:
-    """The median and the worst run of each cell, as far as their logs were kept."""
+    """Returns cards of the median and the worst run of each cell, as far as their logs were kept."""
     blocks: list[Block] = []
     for (scenario, weather), pair in campaign.pairs.items():
         cards = []
@@ -200,7 +200,7 @@ def _replays(campaign: GripCampaign) -> list[Block]:
 
 
 def _card(campaign: GripCampaign, run: pl.DataFrame, role: str) -> list[Card]:
-    """Card of a run (one row); none without its log."""
+    """Returns the card of a run (one row) with a replay; empty without its log."""
     row = run.row(0, named=True)
     (name,) = campaign.names(run)
     folder = None if name is None else campaign.folder.log(name)

@@ -44,7 +44,7 @@ R = TypeVar("R")
 
 
 def completion_tables(campaign: GripCampaign) -> list[Block]:
-    """Both completions and the score of every cell, original beside reduced (B-147)."""
+    """Returns a table per scenario of completions and score, original beside reduced (B-147)."""
     without = "runs without an accident, friction"
     happened = "of runs in which the scenario happened"
     columns = (
@@ -68,18 +68,18 @@ def completion_tables(campaign: GripCampaign) -> list[Block]:
 
 
 def completion_share(friction: str, pair: Pair) -> Quantity:
-    """Share without an accident, in percent."""
+    """Returns the share without an accident in percent, beside the published."""
     found = completion(pair.side(friction))
     return share(found, kind=mark(pair, friction), **find_published(pair, friction, COMPLETED))
 
 
 def if_triggered(friction: str, pair: Pair) -> Quantity:
-    """The same of the runs in which the scenario happened."""
+    """Returns the share without an accident in percent, of runs in which the scenario happened."""
     return share(completion(pair.side(friction), given_triggered=True), kind=mark(pair, friction))
 
 
 def score_of_runs(runs: pl.DataFrame) -> tuple[float | None, Interval | None]:
-    """The mean score of runs with the part of its interval in which a score can lie."""
+    """Returns the mean score of runs, and its interval cut to 0 to SCORE_MAX; None where unknown."""
     value, limits = mean_interval(runs["score"]) or (None, None)
     if limits is None:
         return value, None
@@ -96,7 +96,7 @@ def score(friction: str, pair: Pair) -> Quantity:
 
 
 def paired_test(pair: Pair) -> Cell:
-    """Whether both frictions complete alike."""
+    """Returns a cell with the exact p of both frictions completing alike, or "same drives"."""
     p = completion_p(pair) if len(pair.common) else 1.0
     text = "same drives" if pair.identical else p_text(p)
     return Cell(text, sort=p, kind="muted" if p >= P_MARKED else "")
@@ -113,7 +113,7 @@ def mark(pair: Pair, friction: str) -> str:
 
 
 def find_published(pair: Pair, friction: str, column: str) -> dict[str, Any]:
-    """The published value of a cell and whether we doubt it."""
+    """Returns the published value of a cell and whether it is doubted, as fields of Quantity; or {}."""
     rows = published_rows(Source.COMPLETION, "scenario", "preset", "friction_mode")
     row = rows.get((pair.scenario, pair.weather, friction))
     if row is None:
@@ -122,7 +122,7 @@ def find_published(pair: Pair, friction: str, column: str) -> dict[str, Any]:
 
 
 def share(found: Share, kind: str = "", **more: Any) -> Quantity:
-    """Returns a share in percent."""
+    """Returns a share in percent with its interval and n; `more`: further fields of Quantity."""
     if found.value is None:
         return Quantity(value=None, **more)
     limits = Interval(*(100.0 * end for end in found.interval))
@@ -132,7 +132,7 @@ def share(found: Share, kind: str = "", **more: Any) -> Quantity:
 
 
 def distance_tables(campaign: GripCampaign) -> list[Block]:
-    """Warping distance of the seven series (B-148)."""
+    """Returns a table per scenario of warping distances of the seven series (B-148)."""
     published = published_rows(Source.WARPING, "scenario", "preset", "metric")
 
     def of(metric: str, pair: Pair) -> Quantity:
@@ -157,14 +157,14 @@ def distance_tables(campaign: GripCampaign) -> list[Block]:
 
 
 def metric_columns(of: Callable[[str, R], Quantity], definition: str = "") -> list[Column[R]]:
-    """Returns a column per compared series."""
+    """Returns a column per compared series, whose cell is `of(metric, row)`."""
     return [
         Column(m, partial(of, m), definition, UNITS.get(m, ""), format=DISTANCE) for m in METRICS
     ]
 
 
 def distance(d: Distance, published: dict[str, Any] | None) -> Quantity:
-    """Distance between two series, muted where chance alone gives as much."""
+    """Returns the distance of two series beside the published, muted where chance gives as much."""
     return Quantity(
         value=d.value,
         interval=d.interval if d.value > 0.0 else None,
@@ -175,7 +175,7 @@ def distance(d: Distance, published: dict[str, Any] | None) -> Quantity:
 
 
 def change_tables(campaign: GripCampaign) -> list[Block]:
-    """What else changes: outcome, delay, control (B-142 to B-145, B-149)."""
+    """Returns a table per scenario of outcome, delay and control by pairs (B-142 to B-145, B-149)."""
 
     def difference_of(column: str, pair: Pair) -> Quantity:
         return difference(compare_pair(pair, column))
@@ -210,7 +210,7 @@ def change_tables(campaign: GripCampaign) -> list[Block]:
 
 
 def control_lost_cell(column: str, pair: Pair) -> Cell:
-    """Shares out of control, before and after."""
+    """Returns a cell with the shares out of control in %, original and reduced; bad from 5 more on."""
     before, after = (
         100.0 * float(side[column].mean() or 0.0)  # type: ignore[arg-type]
         for side in (pair.original, pair.reduced)
@@ -220,7 +220,7 @@ def control_lost_cell(column: str, pair: Pair) -> Cell:
 
 
 def late(delay: NDArray[np.float64]) -> Quantity:
-    """Mean delay, where at least half of the pairs have one."""
+    """Returns the mean delay in s where at least half of the pairs have one (nan: none)."""
     known = delay[~np.isnan(delay)]
     told = (f"in {len(known)} of {len(delay)} pairs",)
     if 2 * len(known) < len(delay) or not len(known):
@@ -229,7 +229,7 @@ def late(delay: NDArray[np.float64]) -> Quantity:
 
 
 def difference(c: Comparison | None, lines: tuple[str, ...] = ()) -> Quantity:
-    """A paired difference with its effect size, muted where its sign is not clear."""
+    """Returns a paired difference with its effect size, muted where its sign is not clear; None: none."""
     if c is None:
         return Quantity(value=None)
     sized = c.effect is not None and abs(c.effect) < EFFECT_MAX
@@ -244,7 +244,10 @@ def difference(c: Comparison | None, lines: tuple[str, ...] = ()) -> Quantity:
 
 
 def variant_table(campaign: GripCampaign) -> list[Block]:
-    """Original, unfixed and fixed cut-in, friction untouched (B-075 to B-077)."""
+    """Returns the table of original, unfixed and fixed cut-in, friction untouched (B-075 to B-077).
+
+    Empty where none was driven.
+    """
     outcomes = published_rows(Source.CUTIN_COMPLETION, "variant")
     distances = published_rows(Source.CUTIN_WARPING, "variant_compared_with_original", "metric")
 
@@ -286,7 +289,7 @@ STOPS = (
 
 
 def stopping_table(rows: pl.DataFrame) -> list[Block]:
-    """Ratio, friction and stopping distances under both models (decision G-5)."""
+    """Returns the table of ratio, friction and stopping distances under both models (G-5), or nothing."""
     if not len(rows):
         return []
     by_cell = {(row["weather"], row["model"]): row for row in rows.to_dicts()}

@@ -66,22 +66,22 @@ class ThresholdMap(CampaignView[ThresholdEntry]):
 
     @cached_property
     def situations(self) -> list[Situation]:
-        """All situations that were driven."""
+        """Returns all situations that were driven."""
         return situations(self.results)
 
     @cached_property
     def telling(self) -> list[Situation]:
-        """Situations that are completed on dry road."""
+        """Returns the situations that are completed on dry road."""
         return [s for s in self.situations if s.tells]
 
     @cached_property
     def reached_situations(self) -> list[Situation]:
-        """Those of them in which half of the drives end in an accident on some level."""
+        """Returns the telling situations in which half of the drives have an accident on some level."""
         return [s for s in self.telling if s.threshold.mu is not None]
 
 
 def load_threshold(folder: Path) -> ThresholdMap:
-    """The map in a folder; FileError when it holds no results of one."""
+    """Returns the threshold map in a folder; FileError when it holds no results of one."""
     found = ThresholdMap(CampaignFolder(folder, ThresholdEntry))
     if "deceleration" not in found.results.columns:
         raise FileError(f"{folder} holds no threshold map")
@@ -94,7 +94,7 @@ def write_threshold_report(folder: Path) -> Path:
 
 
 def build_page(campaign: ThresholdMap) -> Page:
-    """All sections in the order in which a reader asks."""
+    """Returns the report page of a threshold map."""
     first: list[Block] = [_answers(campaign), _headline(campaign), Text(LEAD)]
     sections = [
         Section("What happened", [*campaign.missing(), *first]),
@@ -164,7 +164,7 @@ def title(s: Situation) -> str:
 
 
 def groups(campaign: ThresholdMap) -> dict[str, list[Situation]]:
-    """Situations by driver and by how the lead is moved."""
+    """Returns the situations by driver and by how the lead is moved, under a name for people."""
     found: dict[str, list[Situation]] = {}
     for s in campaign.situations:
         name = f"{DRIVERS.get(s.driver, s.driver)}, {s.actors} lead"
@@ -263,7 +263,7 @@ def _verdict(id: str, row: tuple[Situation, dict[str, Judgement]]) -> Cell:
 
 
 def _replays(campaign: ThresholdMap) -> list[Block]:
-    """The first accident of each shown situation, coming from dry road."""
+    """Returns cards of the first accident of each telling situation, coming from dry road."""
     cards = []
     for s in campaign.telling:
         crashed = s.runs.filter(~pl.col("completion")).sort(

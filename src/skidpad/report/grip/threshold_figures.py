@@ -19,7 +19,7 @@ COLUMNS = 3  # charts beside each other
 
 
 def map_figure(groups: Mapping[str, Sequence[Situation]]) -> str:
-    """Draws a panel per group: starts against decelerations, coloured by the threshold."""
+    """Returns an SVG with a panel per group: starts against decelerations, coloured by the threshold."""
     columns = min(2, len(groups))
     rows = -(-len(groups) // columns)
     with canvas(9.6, 2.9 * rows, columns, rows) as (figure, all_axes):
@@ -32,7 +32,7 @@ def map_figure(groups: Mapping[str, Sequence[Situation]]) -> str:
 
 
 def _panel(axes: Axes, found: Sequence[Situation]) -> None:
-    """Draws one map: a coloured square with the threshold per situation, start by deceleration in m/s²."""
+    """Draws one map: a square with the threshold per situation, start by deceleration in m/s²."""
     starts = list(dict.fromkeys(s.start for s in sorted(found, key=_order)))
     brakings = sorted({s.deceleration for s in found})
     scale = mpl.colormaps[COLOURS]
@@ -68,7 +68,10 @@ def _order(s: Situation) -> tuple[float, float]:
 
 
 def curve_figures(groups: Mapping[str, Sequence[Situation]]) -> dict[str, str]:
-    """Draws by group a chart per start and a curve per deceleration; only those that tell something."""
+    """Returns SVGs by name of a group: a chart per start, a curve per deceleration, telling ones alone.
+
+    More than COLUMNS charts go on under NAME, continued.
+    """
     found = {}
     for name, all_of in groups.items():
         telling = sorted((s for s in all_of if s.tells), key=_order)
@@ -91,7 +94,7 @@ def curve_figures(groups: Mapping[str, Sequence[Situation]]) -> dict[str, str]:
 
 
 def _curve(s: Situation, colour: int) -> Curve:
-    """Returns the share completed in % over friction with its 95 % band, as a curve of one deceleration."""
+    """Returns the share completed in % over friction with its 95 % band, of one situation."""
     shares = [s.at(mu) for mu in s.levels]
     limits = 100.0 * np.array([share.interval for share in shares])
     values = [100.0 * (share.value or 0.0) for share in shares]

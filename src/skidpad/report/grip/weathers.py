@@ -29,7 +29,7 @@ STATISTICAL = "statistical"
 
 
 def weather_blocks(campaign: GripCampaign) -> list[Block]:
-    """One row per weather that the source printed; nothing where none of them was driven."""
+    """Returns the table of weathers that the source printed; empty where none of them was driven."""
     presets = published_rows(Source.PRESETS, "preset")
     ratios = _ratios(campaign)
     rows = [presets[w] | {"ours": ratios[w]} for w in presets if w in ratios]
@@ -49,7 +49,7 @@ def weather_blocks(campaign: GripCampaign) -> list[Block]:
 
 
 def _ratios(campaign: GripCampaign) -> dict[str, float]:
-    """The ratio of the runs with weather's friction, by weather."""
+    """Returns by weather the mean friction ratio of the runs with weather's friction."""
     reduced = campaign.plain.filter(pl.col("friction") == REDUCED).drop_nulls("ratio")
     return dict(reduced.group_by("weather").agg(pl.col("ratio").mean()).rows())
 
@@ -65,7 +65,7 @@ def _ratio(row: Row) -> Quantity:
 
 
 def _note(campaign: GripCampaign) -> str:
-    """What the ratios are, and whether both are of one model."""
+    """Returns a sentence on what the ratios are, and whether both are of one model."""
     model = campaign.values("model")
     if model == STATISTICAL:
         return (
@@ -96,7 +96,7 @@ EFFECTS: tuple[tuple[Effect, str], ...] = (
 
 
 def rain_tables(campaign: GripCampaign) -> list[Block]:
-    """One table per quantity; none unless the campaign drove the four cells."""
+    """Returns one table per quantity; empty unless the campaign drove the four cells."""
     if not campaign.four_cells:
         return []
     tables: list[Block] = []

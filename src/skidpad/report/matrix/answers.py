@@ -40,14 +40,14 @@ MARKERS = "ovsD^P*X"
 def answers(
     matrix: Matrix, judged: Sequence[Judgement], crashes: dict[Cell, list[Found]]
 ) -> Answers:
-    """Three questions, each with its picture."""
+    """Returns the three answers at the head of the report, each with its picture; one without runs."""
     if not len(matrix.finished):
         return Answers([Answer("What happened?", "No run was finished.")])
     return Answers([_functions(matrix), _weather(matrix), look_next(matrix, judged, crashes)])
 
 
 def terminal_answer(matrix: Matrix) -> list[str]:
-    """The first two answers as lines, and what to look at next as a command."""
+    """Returns the first two answers as lines, and a command that shows the worst kept run with a crash."""
     if not len(matrix.finished):
         return ["No run was finished."]
     functions, weather = _functions(matrix), _weather(matrix)
@@ -69,7 +69,7 @@ def terminal_answer(matrix: Matrix) -> list[str]:
 
 
 def _functions(matrix: Matrix) -> Answer:
-    """The functions with the fewest crashes in each weather, and how sure that is.
+    """Returns the answer on the functions with the fewest crashes in each weather, and how sure it is.
 
     The reference driver is a model of a human and has no functions, so it is told beside them.
     """
@@ -105,7 +105,7 @@ def _functions(matrix: Matrix) -> Answer:
 
 
 def _without_crashes(judged: dict[WeatherGroup, dict[str, Rate]]) -> list[str]:
-    """A sentence where no configuration had a crash in any weather, and what that still allows."""
+    """Returns two sentences where no configuration had a crash, with what that still allows; else nothing."""
     rates = [rate for by_config in judged.values() for rate in by_config.values()]
     if not rates or any(rate.events for rate in rates):
         return []
@@ -121,7 +121,10 @@ def _without_crashes(judged: dict[WeatherGroup, dict[str, Rate]]) -> list[str]:
 
 
 def _fewest(group: WeatherGroup, rates: dict[str, Rate], least: float) -> str:
-    """All configurations that share the least rate of a group; without their functions where all do."""
+    """Returns a clause on all configurations that share the least rate of a group of weathers.
+
+    Where all share it, without their functions. least: events per run.
+    """
     found = [c for c, rate in rates.items() if rate.rate == least]
     all_alike = len(found) == len(rates) > 1
     named = f"{config_list(found)} alike" if all_alike else functions_list(found)
@@ -131,7 +134,7 @@ def _fewest(group: WeatherGroup, rates: dict[str, Rate], least: float) -> str:
 def _beside_reference(
     rates: dict[WeatherGroup, dict[str, Rate]], judged: dict[WeatherGroup, dict[str, Rate]]
 ) -> str:
-    """A sentence with the rates of the reference driver where functions are judged without it."""
+    """Returns a sentence with the rates of the reference driver where it is not judged; "" otherwise."""
     told = [
         f"{r[REFERENCE].rate:.2f} in {g.name}"
         for g, r in rates.items()
@@ -143,7 +146,7 @@ def _beside_reference(
 
 
 def _too_few_seeds(seeds: int, least: int) -> str:
-    """Why nothing is said of differences."""
+    """Returns the sentence that says why so few seeds show no differences; least: seeds it takes."""
     return (
         f"{count_text(seeds, 'seed')} per cell cannot tell two configurations apart: what differs "
         f"may be chance. It takes at least {least} (`--seeds {least}`)."
@@ -151,7 +154,7 @@ def _too_few_seeds(seeds: int, least: int) -> str:
 
 
 def _rates(matrix: Matrix, group: WeatherGroup) -> dict[str, Rate]:
-    """Returns the event rate by configuration in a group of weathers; those without a rate are left out."""
+    """Returns the event rate by configuration in a group of weathers; unknown ones are left out."""
     found = {c: rate_by_seed(matrix.within(c, group), EVENTS) for c in matrix.comparison_configs}
     return {c: rate for c, rate in found.items() if rate is not None}
 
@@ -162,9 +165,9 @@ def _sureness(
     differences: dict[tuple[WeatherGroup, str, str], Contrast],
     rate: Rate,
 ) -> str:
-    """Which others the best one of a group surely beats, and which it may beat by chance.
+    """Returns a sentence on which others the best one of a group surely beats, or may by chance.
 
-    Where chance may explain every difference, a sentence before says so.
+    "" where there is nothing to say. Where chance may explain all, a sentence before says so.
     """
     others = {
         (a if b == best else b): c
@@ -199,7 +202,7 @@ def _at_most(p: float) -> str:
 
 
 def weather_series(group: WeatherGroup, k: int, **values: Sequence[float | None]) -> Series:
-    """A series in the colour and with the mark of its weather."""
+    """Returns a series in the colour and with the mark of its weather; k: its place in the figure."""
     colour = COLOURS.get(group.name, 2 + k)
     return Series(group.name, colour=colour, marker=MARKERS[k % len(MARKERS)], **values)
 
@@ -227,7 +230,7 @@ def _rate_figure(matrix: Matrix, rates: dict[WeatherGroup, dict[str, Rate]]) -> 
 
 
 def ends(interval: Interval | None) -> tuple[float | None, float | None]:
-    """The finite ends of an interval."""
+    """Returns the ends of an interval, None for infinite ones and for no interval."""
     if interval is None:
         return None, None
     low, high = (None if abs(end) == float("inf") else end for end in interval)
@@ -238,7 +241,7 @@ def ends(interval: Interval | None) -> tuple[float | None, float | None]:
 
 
 def _weather(matrix: Matrix) -> Answer:
-    """Answers what the weather changes: every climate against the first one, per configuration."""
+    """Returns the answer on what weather changes: every climate against the first, by configuration."""
     question = "What does the weather change?"
     first, *rest = matrix.climates
     if not rest:
@@ -260,7 +263,7 @@ def _weather(matrix: Matrix) -> Answer:
 def _changes(
     matrix: Matrix, group: WeatherGroup, changes: dict[tuple[str, WeatherGroup], Contrast]
 ) -> str:
-    """One sentence: for which configurations a climate surely changes the interventions."""
+    """Returns a sentence: for which configurations a climate surely changes the crashes."""
     mine = {c: changes[c, group] for c in matrix.comparison_configs if (c, group) in changes}
     more = [c for c, d in mine.items() if d.is_sure and d.mean > 0.0]
     fewer = [c for c, d in mine.items() if d.is_sure and d.mean < 0.0]
@@ -281,7 +284,7 @@ def _changes(
 
 
 def _levels(matrix: Matrix, config: str) -> str:
-    """A configuration in every climate: interventions per run, speed, dropout."""
+    """Returns a line on a configuration in every climate: crashes per run, speed, dropout."""
     groups = {g: matrix.within(config, g) for g in matrix.climates}
     rates = {g: rate for g, r in groups.items() if (rate := rate_by_seed(r, EVENTS)) is not None}
     between = " → " if len(groups) == 2 else ", "
@@ -300,7 +303,7 @@ def _levels(matrix: Matrix, config: str) -> str:
 
 
 def _meaning(matrix: Matrix) -> list[str]:
-    """What the arrows and the word dropout mean."""
+    """Returns what the arrows and the word dropout mean as one line; empty where neither is used."""
     told = []
     if len(matrix.climates) == 2:
         first, second = matrix.climates
@@ -311,7 +314,7 @@ def _meaning(matrix: Matrix) -> list[str]:
 
 
 def _times_of_day(matrix: Matrix) -> list[str]:
-    """Weathers that every configuration drove alike."""
+    """Returns a line on weathers that every configuration drove alike; empty without any."""
     groups = [g for g in matrix.weather_groups if len(g.weathers) > 1]
     if not groups:
         return []

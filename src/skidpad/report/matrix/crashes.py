@@ -36,7 +36,7 @@ Cell = tuple[str, str]  # configuration, weather
 
 
 def found_crashes(matrix: Matrix) -> dict[Cell, list[Found]]:
-    """The crashes of every cell that has some, hardest first.
+    """Returns the crashes of every cell that has some, hardest first, as far as logs were kept.
 
     A drive that moved alike in several weathers stands once, under the first of them (T-3).
     """
@@ -48,7 +48,7 @@ def found_crashes(matrix: Matrix) -> dict[Cell, list[Found]]:
 
 
 def crashed_runs(matrix: Matrix) -> dict[Cell, pl.DataFrame]:
-    """The runs of each cell that had an intervention, what moved alike in the first cell only."""
+    """Returns the runs of each cell that had an intervention, what moved alike in the first cell only."""
     keys = ("config", "seed", "sensors", "moved")
     seen: set[tuple[object, ...]] = set()
     found = {}
@@ -64,7 +64,7 @@ def crashed_runs(matrix: Matrix) -> dict[Cell, pl.DataFrame]:
 
 
 def worst_of_each(crashes: dict[Cell, list[Found]]) -> list[Block]:
-    """The hardest crash of each configuration, open."""
+    """Returns the card of the hardest crash of each configuration, open; empty without crashes."""
     cards = [
         replace(card, title=f"{config_title(config)}: {card.title}", id=worst_id(config))
         for config, item in _worst(crashes).items()
@@ -74,12 +74,12 @@ def worst_of_each(crashes: dict[Cell, list[Found]]) -> list[Block]:
 
 
 def worst_id(config: str) -> str:
-    """Name of the place of a configuration's worst crash in the page."""
+    """Returns the name of the place of a configuration's worst crash in the page."""
     return "worst-" + slug(config)
 
 
 def _worst(crashes: dict[Cell, list[Found]]) -> dict[str, Found]:
-    """Returns the most severe crash per configuration, over its weathers; each list has its worst first."""
+    """Returns the most severe crash per configuration over its weathers; lists come hardest first."""
     worst: dict[str, Found] = {}
     for (config, _), found in crashes.items():
         if config not in worst or severity(found[0][0]) > severity(worst[config][0]):
@@ -88,7 +88,7 @@ def _worst(crashes: dict[Cell, list[Found]]) -> dict[str, Found]:
 
 
 def crash_sections(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[Block]:
-    """One fold per cell with its worst crashes; pages with all of them beside the report.
+    """Returns one fold per cell with its worst crashes; writes pages with all of them beside the report.
 
     The worst of a configuration stands at the top of the page, so its cell leaves it out here.
     """
@@ -109,7 +109,7 @@ def crash_sections(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[Blo
 
 
 def montages(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[Block]:
-    """The pictures of all crashes of a configuration side by side, hardest first."""
+    """Returns the pictures of crashes of each configuration side by side, hardest first, MONTAGE at most."""
     blocks: list[Block] = []
     for config in matrix.configs:
         cells = [(w, f) for (c, w), found in crashes.items() if c == config for f in found]
@@ -127,7 +127,10 @@ def montages(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[Block]:
 
 
 def _hardest(matrix: Matrix, crashed: pl.DataFrame) -> list[Found]:
-    """Crashes in the runs with the hardest impacts, as far as their logs were kept, hardest first."""
+    """Returns the crashes in the RUNS_READ runs with the hardest impacts whose logs were kept.
+
+    They come hardest first.
+    """
     runs = crashed.sort(
         "max_delta_v_kmh", "max_impact_kmh", "seed", descending=[True, True, False], nulls_last=True
     )
@@ -137,7 +140,7 @@ def _hardest(matrix: Matrix, crashed: pl.DataFrame) -> list[Found]:
 
 
 def _crashes(matrix: Matrix, name: str) -> Iterator[Found]:
-    """Yields the crashes in a run's log with drive, map and folder; nothing if the log is missing."""
+    """Yields the crashes in a run's log with drive, map and folder; nothing without the log."""
     run = matrix.folder.log(name)
     if run is not None:
         log = read_log(run)
@@ -149,7 +152,7 @@ def _crashes(matrix: Matrix, name: str) -> Iterator[Found]:
 def _cell_block(
     matrix: Matrix, cell: Cell, found: list[Found], crashed: pl.DataFrame, worst: Found
 ) -> Cards:
-    """Returns a cell's cards, the first few inline; writes a page of all where those do not suffice."""
+    """Returns a cell's cards, the first INLINE at once; writes a page of all where those do not do."""
     config, weather = cell
     title = f"{config_title(config)}, {weather_title(weather)}"
     others = [item for item in found if item is not worst]

@@ -63,7 +63,7 @@ class WeatherGroup:
 
     @property
     def title(self) -> str:
-        """The heading of its column."""
+        """Returns the heading of its column, as "Clear Sky: noon and night"."""
         first, *rest = (weather_title(w) for w in self.weathers)
         if not rest:
             return first
@@ -83,7 +83,7 @@ class WeatherGroup:
 
     @property
     def is_published(self) -> bool:
-        """Whether they are published weathers."""
+        """Returns True when all of them are published weathers."""
         return all(w in WEATHERS for w in self.weathers)
 
     @property
@@ -104,7 +104,10 @@ class Matrix(CampaignView[MatrixEntry]):
 
     @property
     def results(self) -> pl.DataFrame:
-        """Every run; what an older version did not count is derived where it can be, else null."""
+        """Returns every run; what an older version did not count is derived where it can be, else null.
+
+        With the columns EVENTS and FIRST.
+        """
         found = self.folder.results
         kinds = schema(Metrics)
         gone = [name for name in kinds if name not in found.columns]
@@ -122,22 +125,22 @@ class Matrix(CampaignView[MatrixEntry]):
 
     @cached_property
     def has_grades(self) -> bool:
-        """Whether contacts were graded by how hard they were, which older results were not."""
+        """Returns True when contacts were graded by how hard they were, which older results were not."""
         return self.finished["serious_contacts"].null_count() == 0
 
     @cached_property
     def configs(self) -> list[str]:
-        """All configurations, the published ones first."""
+        """Returns all configurations, the published ones first."""
         return _known_first(self.results["config"], CONFIGS)
 
     @cached_property
     def weathers(self) -> list[str]:
-        """All weathers, the published ones first."""
+        """Returns all weathers, the published ones first."""
         return _known_first(self.results["weather"], WEATHERS)
 
     @cached_property
     def comparison_configs(self) -> list[str]:
-        """Configurations that comparisons and figures are about (decision T-5).
+        """Returns the configurations that comparisons and figures are about (decision T-5).
 
         With no driver at the pedals a run measures how often the car is put back, so the baseline is
         left out wherever there is another configuration.
@@ -146,7 +149,7 @@ class Matrix(CampaignView[MatrixEntry]):
 
     @cached_property
     def weather_groups(self) -> list[WeatherGroup]:
-        """Weathers that no configuration drives differently, together; most often rain and clear."""
+        """Returns the weathers, those together that no configuration drives differently."""
         groups: list[list[str]] = []
         for weather in self.weathers:
             drives_alike = (
@@ -163,7 +166,7 @@ class Matrix(CampaignView[MatrixEntry]):
 
     @cached_property
     def climates(self) -> list[WeatherGroup]:
-        """Published weathers by what falls, over all times of day; every other weather by itself."""
+        """Returns published weathers by what falls, over all times of day; every other one by itself."""
         kinds = dict(self.results.select("weather", "precipitation_kind").rows())
         groups: dict[str, list[str]] = {}
         for weather in self.weathers:
@@ -173,12 +176,12 @@ class Matrix(CampaignView[MatrixEntry]):
         return [WeatherGroup(tuple(g)) for g in groups.values()]
 
     def weathers_like(self, config: str, weather: str) -> list[str]:
-        """The weathers in which a configuration drives as in this one, in every seed of both."""
+        """Returns the weathers in which a configuration drives as in this one, in every shared seed."""
         return self._equal_weathers[config][weather]
 
     @cached_property
     def _equal_weathers(self) -> dict[str, dict[str, list[str]]]:
-        """Returns per configuration and weather the weathers with the same drives in all shared seeds."""
+        """Returns by configuration and weather the weathers with the same drives in all shared seeds."""
         drives: dict[tuple[str, str], dict[int, str]] = {}
         columns = ("config", "weather", "seed", self.drive_column)
         for config, weather, seed, drive in self.finished.select(columns).rows():
@@ -198,24 +201,24 @@ class Matrix(CampaignView[MatrixEntry]):
 
     @cached_property
     def drive_column(self) -> str:
-        """The column in which equal values are one drive (decision T-3)."""
+        """Returns the column in which equal values are one drive (decision T-3)."""
         there = self.results
         known = MOTION in there.columns and there[MOTION].null_count() < len(there)
         return MOTION if known else "log_hash"
 
     @cached_property
     def same_weather(self) -> list[tuple[str, list[str]]]:
-        """(configuration, weathers) with the same drives for every seed (decision M-1)."""
+        """Returns (configuration, weathers) with the same drives for every seed (decision M-1)."""
         groups = [(c, tuple(self.weathers_like(c, w))) for c in self.configs for w in self.weathers]
         return [(c, list(ws)) for c, ws in dict.fromkeys(groups) if len(ws) > 1]
 
     @cached_property
     def counted(self) -> pl.DataFrame:
-        """Finished runs, each drive once."""
+        """Returns the finished runs, each drive once."""
         return self._once(self.finished)
 
     def cell(self, config: str, weather: str | None = None) -> pl.DataFrame:
-        """Finished runs of one cell, or of a configuration with each drive once.
+        """Returns the finished runs of a cell; without a weather those of a configuration, each drive once.
 
         What drives alike in several weathers may have been driven in one of them only, so a cell
         has the seeds of all weathers like its own.
@@ -230,41 +233,41 @@ class Matrix(CampaignView[MatrixEntry]):
         return runs.unique(["seed", "sensors"], keep="first", maintain_order=True).sort("seed")
 
     def within(self, config: str, group: WeatherGroup) -> pl.DataFrame:
-        """Finished runs of a configuration in a group of weathers, each drive once."""
+        """Returns the finished runs of a configuration in a group of weathers, each drive once."""
         there = pl.col("weather").is_in(group.weathers) & (pl.col("config") == config)
         return self._once(self.finished.filter(there))
 
     def _once(self, runs: pl.DataFrame) -> pl.DataFrame:
-        """Runs without those that moved as another of their configuration and seed did."""
+        """Returns the runs without those that moved as another of their configuration and seed did."""
         keys = ["config", "seed", "sensors", self.drive_column]
         return runs.unique(keys, keep="first", maintain_order=True)
 
     def rate(self, column: str, config: str, weather: str | None = None) -> Rate | None:
-        """Events per run of a cell; None without finished runs."""
+        """Returns the events of `column` per run of a cell; None without finished runs."""
         return rate_by_seed(self.cell(config, weather), column)
 
     def rate_within(self, column: str, config: str, group: WeatherGroup) -> Rate | None:
-        """Events per run of a configuration in a group of weathers, each drive once."""
+        """Returns the events of `column` per run in a group of weathers, each drive once; or None."""
         return rate_by_seed(self.within(config, group), column)
 
     def mean(self, column: str, config: str, weather: str | None = None) -> float | None:
-        """Mean over the runs of a cell."""
+        """Returns the mean of `column` over the runs of a cell; None without values."""
         values = self.cell(config, weather)[column].drop_nulls()
         return float(values.mean()) if len(values) else None  # type: ignore[arg-type]
 
     @cached_property
     def seeds(self) -> int:
-        """How many seeds there are."""
+        """Returns the number of different seeds over all cells."""
         return self.results["seed"].n_unique()
 
     @cached_property
     def duration(self) -> float:
-        """Simulated seconds of the longest run."""
+        """Returns the simulated time of the longest finished run in s, 0 without one."""
         return max(self.finished["duration_s"].drop_nulls().to_list(), default=0.0)
 
     @property
     def subtitle(self) -> str:
-        """Says in a sentence or two what was driven."""
+        """Returns a sentence or two on what was driven."""
         levels = " and ".join(
             SENSOR_LEVELS.get(level, f"sensors as {level}")
             for level in sorted(self.results["sensors"].unique().to_list())
@@ -282,7 +285,10 @@ class Matrix(CampaignView[MatrixEntry]):
 
 
 def rate_by_seed(runs: pl.DataFrame, column: str) -> Rate | None:
-    """Events per run. Runs of one seed share their traffic, so seeds are what the interval is over."""
+    """Returns the events of `column` per run, null left out; None without runs.
+
+    Runs of one seed share their traffic, so seeds are what the interval is over.
+    """
     known = runs.drop_nulls(column)
     if not len(known):
         return None
@@ -291,7 +297,7 @@ def rate_by_seed(runs: pl.DataFrame, column: str) -> Rate | None:
 
 
 def load_matrix(folder: Path) -> Matrix:
-    """The campaign in a folder; FileError when it holds no results."""
+    """Returns the campaign in a folder; FileError when it holds no results."""
     found = Matrix(CampaignFolder(folder, MatrixEntry))
     assert len(found.results)
     return found
@@ -304,12 +310,12 @@ def _known_first(values: pl.Series, known: dict[str, str]) -> list[str]:
 
 
 def config_title(config: str) -> str:
-    """Name of a driver for people."""
+    """Returns the name of a driver for people; an unknown one's own."""
     return CONFIGS.get(config, config)
 
 
 def config_list(configs: Sequence[str]) -> str:
-    """`configuration 2`, `configurations 3 and 4`; other drivers by their names."""
+    """Returns text like "configuration 2" or "configurations 3 and 4"; other drivers by their names."""
     numbers = [c for c in configs if c in CONFIGS and c.isdigit()]
     names = [IN_SENTENCES.get(c, c) for c in configs if c not in numbers]
     if not numbers:
@@ -321,7 +327,7 @@ def config_list(configs: Sequence[str]) -> str:
 
 
 def functions_list(configs: Sequence[str]) -> str:
-    """`configuration 2 (ACC and lane centring)`: the configurations with what they consist of."""
+    """Returns text like "configuration 2 (ACC and lane centring)" for these configurations."""
     return list_text(
         [
             f"{config_list([c])} ({FUNCTIONS[c]})" if c in FUNCTIONS else config_list([c])
@@ -331,18 +337,18 @@ def functions_list(configs: Sequence[str]) -> str:
 
 
 def weather_title(weather: str) -> str:
-    """Name of a weather for people."""
+    """Returns the name of a weather for people; an unknown one's own."""
     return WEATHERS.get(weather, weather)
 
 
 @cache
 def published_cells() -> dict[tuple[str, str], dict[str, float | None]]:
-    """The published value of each column, by configuration and weather."""
+    """Returns the published value of each column, by configuration and weather."""
     return {(row["config"], row["weather"]): row for row in published_matrix().to_dicts()}
 
 
 def published_value(column: str, config: str, weather: str) -> float | None:
-    """The published value of one cell; None where there is none."""
+    """Returns the published value of one cell; None where there is none."""
     return published_cells().get((config, weather), {}).get(column)
 
 
@@ -356,7 +362,7 @@ PRELIMINARY = (
 
 
 def published_preliminary() -> list[tuple[str, float, float]]:
-    """(quantity, preliminary, final) as means over the runs that both published scripts share."""
+    """Returns (quantity, preliminary, final): means over the runs that both published scripts share."""
     means = (
         read_published(Source.PRELIMINARY).select(pl.selectors.numeric().mean()).row(0, named=True)
     )

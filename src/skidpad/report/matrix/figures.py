@@ -38,7 +38,7 @@ GREY = 5  # of the palette
 
 
 def collisions(matrix: Matrix) -> list[Block]:
-    """Draws crashes by weather and configuration, and by configuration."""
+    """Returns figures of crashes by weather and configuration, and by configuration."""
     label = f"{EVENTS} per run"
     by_weather = [
         _rates(
@@ -63,7 +63,7 @@ def collisions(matrix: Matrix) -> list[Block]:
 
 
 def others(matrix: Matrix) -> list[Block]:
-    """Dropout, dropout against interventions, variance, and one configuration in several metrics."""
+    """Returns figures of dropout, dropout against crashes, variance, and configuration 3's metrics."""
     groups = [g.short for g in matrix.weather_groups]
     dropout = [_means(matrix, c, "dropout_pct", short_title(c)) for c in matrix.comparison_configs]
     dropout = [one for one in dropout if any(v is not None for v in one.values)]
@@ -88,7 +88,7 @@ def others(matrix: Matrix) -> list[Block]:
 
 
 def speed_figure(matrix: Matrix) -> Figure:
-    """Interventions against mean speed, one point per configuration and weather."""
+    """Returns the figure of crashes per run against mean speed, a point per configuration and weather."""
     points = {}
     for config in matrix.comparison_configs:
         for group in matrix.weather_groups:
@@ -107,7 +107,7 @@ def speed_figure(matrix: Matrix) -> Figure:
 
 
 def run_figure(matrix: Matrix, column: str, label: str) -> str:
-    """Interventions against a column, one point per drive, marked by weather."""
+    """Returns an SVG of crashes against a column, one point per drive, marked by weather."""
     points = {}
     for config in matrix.comparison_configs:
         for group in matrix.weather_groups:
@@ -121,7 +121,7 @@ Points = dict[tuple[str, WeatherGroup], tuple[list[float], list[float]]]
 
 
 def _draw_marks(matrix: Matrix, points: Points, x_label: str) -> str:
-    """Clouds: the colour is the configuration, the mark the weather."""
+    """Returns an SVG of clouds of points: the colour is the configuration, the mark the weather."""
     marks = {g: MARKERS[k % len(MARKERS)] for k, g in enumerate(matrix.weather_groups)}
     clouds = [
         Curve(
@@ -139,7 +139,7 @@ def _draw_marks(matrix: Matrix, points: Points, x_label: str) -> str:
 
 
 def weather_marks(matrix: Matrix) -> list[Curve]:
-    """What a legend says of marks: each weather has its own."""
+    """Returns empty curves by which a legend says which mark each weather has."""
     return [
         Curve(group.title, [], [], colour=GREY, style=POINTS | {"marker": mark})
         for group, mark in zip(matrix.weather_groups, cycle(MARKERS), strict=False)
@@ -147,7 +147,7 @@ def weather_marks(matrix: Matrix) -> list[Curve]:
 
 
 def short_title(config: str) -> str:
-    """`configuration 2`; another driver by its name."""
+    """Returns "configuration 2" for a number; another driver by its name."""
     return (
         f"configuration {config}"
         if config.isdigit()

@@ -46,7 +46,7 @@ PER_100_KM = Format(".1f", ".1f", absent="no run")
 
 
 def headline_numbers(matrix: Matrix) -> Numbers:
-    """Totals over the compared configurations, every drive once."""
+    """Returns the head numbers: totals over the compared configurations, every drive once."""
     t = matrix.counted.filter(matrix.counted["config"].is_in(matrix.comparison_configs))
     km = float(t["distance_km"].sum())
     column, contacts, _ = SERIOUS if matrix.has_grades else STRUCK
@@ -74,19 +74,19 @@ def headline_numbers(matrix: Matrix) -> Numbers:
 
 
 def _meaning(put_back: int, first: int) -> str:
-    """What an intervention is, and how many followed on another one."""
+    """Returns a note on what an intervention is, and how many followed soon on another one."""
     followed = put_back - first
     again = f"; {followed:,} soon after another one" if followed else ""
     return f"the car was put back, after light contacts, too{again}"
 
 
 def headline_tables(matrix: Matrix) -> list[Table]:
-    """One row per configuration, every drive once: per run, and folded below it per 100 km."""
+    """Returns two tables by configuration, every drive once: per run, and folded per 100 km."""
     return [_per_run(matrix), _per_100_km(matrix)]
 
 
 def _per_run(matrix: Matrix) -> Table:
-    """Returns the table of events per run and the median time to the first intervention, by configuration."""
+    """Returns the table of events per run and median time to the first intervention."""
     *crashes, put_back = [
         Column[str](f"{title} per run", partial(_rate_per_run, matrix, name), meaning, format=RATE)
         for name, title, meaning in _event_kinds(matrix)
@@ -109,7 +109,7 @@ def _per_run(matrix: Matrix) -> Table:
 
 
 def _per_100_km(matrix: Matrix) -> Table:
-    """Returns the folded table of events per 100 km and distance in km, by compared configuration."""
+    """Returns the folded table of events per 100 km and distance in km."""
     columns = [
         Column[str]("configuration", config_title),
         Column[str]("distance", partial(_distance, matrix), "of all its drives", "km", DISTANCE),
@@ -127,7 +127,7 @@ def _per_100_km(matrix: Matrix) -> Table:
 
 
 def _event_kinds(matrix: Matrix) -> tuple[tuple[str, str, str], ...]:
-    """What is counted: column, title and meaning."""
+    """Returns column, title and meaning of what is counted; the last one are interventions."""
     return (SERIOUS if matrix.has_grades else STRUCK, LEFT, (EVENTS, EVENTS, "both"), PUT_BACK)
 
 
@@ -143,7 +143,7 @@ def _distance(matrix: Matrix, config: str) -> float:
 
 
 def _rate_per_run(matrix: Matrix, column: str, config: str) -> Quantity:
-    """Returns the events of `column` per run with their interval; no value where the rate is unknown."""
+    """Returns the events of `column` per run with their interval; no value for an unknown rate."""
     rate = matrix.rate(column, config)
     if rate is None:
         return Quantity(value=None)
@@ -152,7 +152,7 @@ def _rate_per_run(matrix: Matrix, column: str, config: str) -> Quantity:
 
 
 def _rate_per_100_km(matrix: Matrix, column: str, config: str) -> Quantity:
-    """Returns the events of `column` per 100 km with their interval; no value without rate or distance."""
+    """Returns the events of `column` per 100 km with their interval; no value without distance."""
     runs = matrix.cell(config).drop_nulls([column, "distance_km"])
     km = float(runs["distance_km"].sum())
     rate = rate_by_seed(runs, column)
@@ -166,14 +166,14 @@ def _rate_per_100_km(matrix: Matrix, column: str, config: str) -> Quantity:
 
 
 def _short_remark(rate: Rate) -> str:
-    """What stands beside a rate; without an interval only the bound, its counts are in the hint."""
+    """Returns what stands beside a rate; without an interval only its bound, its counts are in the hint."""
     if rate.interval is None and rate.runs > 1 and rate.most_runs < 1.0:
         return f"in at most {100.0 * rate.most_runs:.0f} % of seeds"
     return remark_on(rate)
 
 
 def _first(matrix: Matrix, config: str) -> Cell:
-    """Median time to the first intervention; beyond the end of runs it cannot be told."""
+    """Returns a cell with the median time to the first intervention, "> END" beyond the end of runs."""
     runs = matrix.cell(config).drop_nulls("duration_s")
     if not len(runs):
         return Cell("no run", kind="muted")
@@ -196,7 +196,10 @@ def _time(t: float, end: float) -> str:
 
 
 def baseline_text(matrix: Matrix) -> list[Block]:
-    """What configuration 0 is, and why it stands in no comparison (decision T-5)."""
+    """Returns a note on what configuration 0 is and why it stands in no comparison (T-5).
+
+    Empty where it is in the comparisons, or was not driven.
+    """
     if matrix.comparison_configs == matrix.configs:
         return []
     runs = matrix.cell(BASELINE).drop_nulls([INTERVENTIONS, "duration_s"])

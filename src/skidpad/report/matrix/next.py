@@ -25,7 +25,7 @@ QUESTION = "What should be looked at next?"
 def look_next(
     matrix: Matrix, judged: Sequence[Judgement], crashes: dict[Cell, list[Found]]
 ) -> Answer:
-    """The commonest kind of intervention, the hardest crash, and what these runs leave open."""
+    """Returns the answer on the commonest kind of crash, the hardest one, and what is left open."""
     runs = {c: matrix.cell(c) for c in matrix.comparison_configs}
     totals = {c: int(r[EVENTS].sum()) for c, r in runs.items()}
     worst = max(totals, key=lambda c: totals[c] / max(1, len(runs[c])))
@@ -42,7 +42,7 @@ def look_next(
 
 
 def _kinds_figure(matrix: Matrix) -> Figure:
-    """Kinds of crashes per run, a bar for every configuration in every climate."""
+    """Returns the figure of kinds of crashes per run, a bar per configuration and climate."""
     cells = {
         f"{config_title(c)}, {g.name}": matrix.within(c, g)
         for c in matrix.comparison_configs
@@ -63,7 +63,7 @@ def _kinds_figure(matrix: Matrix) -> Figure:
 
 
 def _next_most(totals: dict[str, int], runs: dict[str, pl.DataFrame], worst: str) -> str:
-    """The configuration that comes next, so that a reader sees how close it is."""
+    """Returns a clause on the configuration that comes next, which shows how close it is; "" without one."""
     others = [c for c in totals if c != worst and len(runs[c])]
     if not others:
         return ""
@@ -72,7 +72,7 @@ def _next_most(totals: dict[str, int], runs: dict[str, pl.DataFrame], worst: str
 
 
 def _commonest(matrix: Matrix, total: int) -> str:
-    """The kind that most crashes were of, and the climate in which most of these happened."""
+    """Returns a sentence on the kind that most crashes were of, and the climate with most of these."""
     compared = [matrix.cell(c) for c in matrix.comparison_configs]
     kinds = {k: sum(count(k, r) for r in compared) for k in kinds_of(matrix.has_grades)}
     most = max(kinds, key=lambda kind: kinds[kind])
@@ -92,7 +92,7 @@ def _commonest(matrix: Matrix, total: int) -> str:
 
 
 def _claims(matrix: Matrix, judged: Sequence[Judgement]) -> list[str]:
-    """What became of the sources' claims; those that were decided are named."""
+    """Returns lines on what became of the sources' claims; DECIDED_MAX that were decided are named."""
     if matrix.seeds == 1:
         return [unjudged_text(judged)]
     decided = [j for verdict in DECIDED for j in judged if j.verdict is verdict]
@@ -105,7 +105,7 @@ def _claims(matrix: Matrix, judged: Sequence[Judgement]) -> list[str]:
 
 
 def _by_cases(judged: Judgement) -> str:
-    """Says of a claim that cases decide that these runs are all that is known."""
+    """Returns words for a supported claim that cases decide: these runs are all that is known; else ""."""
     return (
         " by every case of these runs"
         if judged.is_counted and judged.verdict is Verdict.SUPPORTED
@@ -114,7 +114,7 @@ def _by_cases(judged: Judgement) -> str:
 
 
 def _hardest(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[str]:
-    """The hardest crash of all compared configurations."""
+    """Returns a line on the hardest crash of all compared configurations; empty without a log of one."""
     found = [(cell, items[0]) for cell, items in crashes.items() if cell[0] != BASELINE and items]
     if not found:
         return []
@@ -125,7 +125,7 @@ def _hardest(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[str]:
 
 
 def _as_fragment(headline_text: str) -> str:
-    """A headline within a sentence."""
+    """Returns a headline as part of a sentence, its first letter small."""
     return headline_text[:1].lower() + headline_text[1:]
 
 
@@ -162,11 +162,11 @@ DEPARTURES = (
 
 
 def kinds_of(graded: bool) -> tuple[Kind, ...]:
-    """The kinds that add up to all crashes; results of older versions have no grades of contacts."""
+    """Returns the kinds that add up to all crashes; graded: False for results of older versions."""
     return (*(CONTACTS if graded else UNGRADED), *DEPARTURES)
 
 
 def count(kind: Kind, runs: pl.DataFrame) -> int:
-    """How many of a kind there were in these runs."""
+    """Returns how many crashes of a kind there were in these runs, at least 0."""
     total = sum(int(runs[c].sum() or 0) for c in kind.plus)
     return max(0, total - sum(int(runs[c].sum() or 0) for c in kind.minus))

@@ -59,7 +59,7 @@ def write_report(folder: Path) -> Path:
 
 
 def build_page(matrix: Matrix) -> Page:
-    """All sections in the order in which a reader asks."""
+    """Returns the report page of a campaign; writes the pages of crashes beside it."""
     claims = [f for f in CLAIMS if not f.study]
     judged = judge(claims, [matrix.results] * len(claims), astray(matrix.results))
     crashes = found_crashes(matrix)
@@ -104,7 +104,7 @@ def build_page(matrix: Matrix) -> Page:
 def _first(
     matrix: Matrix, judged: Sequence[Judgement], crashes: dict[Cell, list[Found]]
 ) -> list[Block]:
-    """What is read first: answers, headline numbers, the worst crashes, and how to read the rest."""
+    """Returns what is read first: answers, headline numbers, the worst crashes, how to read the rest."""
     return [
         *matrix.missing(),
         Text(GRADED if matrix.has_grades else UNGRADED),
@@ -120,7 +120,7 @@ def _first(
 
 
 def _processor_time(matrix: Matrix, parity: Parity | None) -> list[tuple[str, str]]:
-    """What each part of the campaign took, in processor minutes."""
+    """Returns the fact on processor minutes of each part of the campaign; empty where none are known."""
     told = [f"{matrix.processor_minutes:.1f} min"] if matrix.processor_minutes > 0.0 else []
     if parity and parity.pixels.processor_minutes > 0.0:
         minutes = parity.pixels.processor_minutes
@@ -129,7 +129,7 @@ def _processor_time(matrix: Matrix, parity: Parity | None) -> list[tuple[str, st
 
 
 def _alike(matrix: Matrix) -> list[Block]:
-    """Returns a note on the weathers in which drives moved alike, beside the known groups; empty if none."""
+    """Returns a note on drives that moved alike in weathers beyond the known groups; or nothing."""
     groups = {tuple(g.weathers) for g in matrix.weather_groups}
     others = [(c, w) for c, w in matrix.same_weather if tuple(w) not in groups]
     if not others:
@@ -140,7 +140,7 @@ def _alike(matrix: Matrix) -> list[Block]:
 
 
 def _verdicts(matrix: Matrix, judged: Sequence[Judgement]) -> list[Block]:
-    """Returns the verdicts with their introduction; one sentence instead where there is a single seed."""
+    """Returns the verdicts with their introduction; one sentence instead for a single seed."""
     if matrix.seeds == 1:
         return [Text(unjudged_text(judged))]
     intro = Text(
@@ -172,7 +172,7 @@ def factors(matrix: Matrix) -> list[Block]:
 
 
 def _known_runs(matrix: Matrix) -> pl.DataFrame:
-    """Runs of our own stack, each drive once."""
+    """Returns the runs of our own stack, each drive once."""
     return matrix.counted.filter(pl.col("cruise_kmh").is_not_null())
 
 
@@ -210,7 +210,7 @@ def _mean(matrix: Matrix, level: Level) -> Quantity:
 
 
 def _figure(matrix: Matrix, levels: list[Level]) -> list[Block]:
-    """Returns a figure of crashes per run over cruise target, a curve per set of functions; or nothing."""
+    """Returns a figure of crashes per run over cruise target, a curve per set of functions; or none."""
     found = []
     for functions in sorted({functions for functions, _ in levels}):
         targets = [cruise for f, cruise in levels if f == functions]

@@ -23,7 +23,7 @@ COLUMNS = (
 
 
 def reading_blocks(matrix: Matrix) -> list[Block]:
-    """Returns one table from the first run of each cell; nothing where no sensor was recorded."""
+    """Returns a table of mean, least and most per reading, of the first seed of each cell; or nothing."""
     rows: list[list[Cell]] = []
     first = matrix.results.sort("seed").unique(["config", "weather"], keep="first")
     first = first.sort("config", "weather")
@@ -45,7 +45,7 @@ def reading_blocks(matrix: Matrix) -> list[Block]:
 
 
 def envelope_blocks(matrix: Matrix) -> list[Block]:
-    """Returns one table over all seeds; nothing where no stack was governed."""
+    """Returns a table of what limits governed stacks, over all seeds; empty where none was governed."""
     found: dict[tuple[str, str], list[pl.DataFrame]] = {}
     names: dict[int, str] = {}
     runs = matrix.results.sort("config", "weather", "seed")

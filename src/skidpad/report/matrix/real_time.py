@@ -17,7 +17,7 @@ KINDS = {"value": "", "upper_bound": "less than ", "target": "aim "}
 
 
 def real_time_blocks(matrix: Matrix) -> list[Block]:
-    """A table by weather; nothing where the campaign kept no clocks."""
+    """Returns tables of real-time factors by weather, ours and published; empty without our clocks."""
     times = matrix.folder.timing
     if not {"rtf", "rtf_below_0_9_pct", "weather"} <= set(times.columns):
         return []
@@ -54,7 +54,7 @@ def real_time_blocks(matrix: Matrix) -> list[Block]:
 
 
 def _published_table() -> Block:
-    """The published factors and shares of slow ticks, each by where it was measured."""
+    """Returns the table of published factors and shares of slow ticks, by where they were measured."""
     rows = read_published(Source.REAL_TIME).filter(
         pl.col("quantity").is_in(["mean_rtf", SLOW])
         & pl.col("stage").is_in(["preliminary", "final"])

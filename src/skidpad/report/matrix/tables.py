@@ -110,7 +110,7 @@ BACKGROUND_NOTE = (
 
 
 def collisions(matrix: Matrix) -> list[Block]:
-    """Crashes, interventions, and what they were."""
+    """Returns tables of crashes, interventions, and what they were."""
     return [
         count_table(matrix, EVENTS, crash_caption(matrix)),
         *(
@@ -130,14 +130,14 @@ def collisions(matrix: Matrix) -> list[Block]:
 
 
 def crash_caption(matrix: Matrix) -> str:
-    """What a crash is in these results."""
+    """Returns the caption that says what a crash is in these results."""
     if matrix.has_grades:
         return "Crashes per run: serious contacts and departures"
     return "Crashes per run: interventions, as these results grade no contact"
 
 
 def others(matrix: Matrix) -> list[Block]:
-    """Lane invasions, dropouts and radar errors."""
+    """Returns tables of lane invasions, dropouts and radar errors."""
     return [
         count_table(matrix, "lane_invasions", "Solid markings crossed per run"),
         *(mean_table(matrix, column, caption) for column, caption in MEANS),
@@ -151,8 +151,9 @@ def by_weather(
     caption: str,
     note: str,
 ) -> Table:
-    """One row per configuration, one column per weather, and one in which each drive counts once.
+    """Returns a table with a row per configuration, a column per weather, and one over all weathers.
 
+    of: the quantity of a group of weathers (None: all, each drive once) and a configuration.
     Weathers that every configuration drove alike are one column.
     """
     columns = [
@@ -167,7 +168,7 @@ def by_weather(
 
 
 def count_table(matrix: Matrix, column: str, caption: str) -> Table:
-    """Events per run with intervals."""
+    """Returns the table of events of `column` per run with intervals, shaded by the rate."""
     rates = {
         (c, g): rate_by_seed(matrix.within(c, g), column)
         for c in matrix.configs
@@ -190,7 +191,7 @@ def count_table(matrix: Matrix, column: str, caption: str) -> Table:
 
 
 def rate_quantity(rate: Rate | None, top: float | None = None) -> Quantity:
-    """Events per run; shaded against the rate `top`."""
+    """Returns events per run as a quantity, shaded against the rate `top`; no value for None."""
     if rate is None:
         return Quantity(value=None)
     return Quantity(
@@ -203,25 +204,25 @@ def rate_quantity(rate: Rate | None, top: float | None = None) -> Quantity:
 
 
 def remark_on(rate: Rate) -> str:
-    """What stands beside a rate; of a single seed nothing, the table's note says it once."""
+    """Returns what stands beside a rate; "" of a single seed, as the table's note says it once."""
     return rate_remark(rate, "seed") if rate.runs > 1 else ""
 
 
 def few_seeds_note(matrix: Matrix) -> str:
-    """The sentence that stands once below a table, in place of limits that so few seeds cannot give."""
+    """Returns the sentence below a table in place of limits that so few seeds cannot give; else ""."""
     if matrix.seeds >= UNITS_FROM:
         return ""
     return f" {no_limits_text(matrix.seeds, 'seed')}."
 
 
 def rate_hint(rate: Rate) -> str:
-    """What a rate rests on."""
+    """Returns the numbers of events and seeds that a rate rests on, as text."""
     events, seeds = count_text(rate.events, "event"), count_text(rate.runs, "seed")
     return f"{events}, {seeds}"
 
 
 def mean_table(matrix: Matrix, column: str, caption: str) -> Table:
-    """Means over seeds with intervals."""
+    """Returns the table of means of `column` over seeds with intervals."""
 
     def of(group: WeatherGroup | None, config: str) -> Quantity:
         runs = matrix.cell(config) if group is None else matrix.within(config, group)
@@ -232,7 +233,7 @@ def mean_table(matrix: Matrix, column: str, caption: str) -> Table:
 
 
 def metric_quantity(runs: pl.DataFrame, column: str) -> Quantity:
-    """The mean of a metric over seeds; of events their rate, with the interval it has everywhere."""
+    """Returns a metric's mean over seeds, of a column of COUNTS the events per run, with 95 % limits."""
     return (
         rate_quantity(rate_by_seed(runs, column))
         if column in COUNTS
@@ -241,7 +242,7 @@ def metric_quantity(runs: pl.DataFrame, column: str) -> Quantity:
 
 
 def mean_quantity(runs: pl.DataFrame, column: str) -> Quantity:
-    """Mean over seeds, of each the mean of its runs; one seed has no interval."""
+    """Returns the mean over seeds, of each the mean of its runs; one seed has no interval."""
     known = per_seed(runs.drop_nulls(column), pl.col(column).cast(pl.Float64)).to_numpy()
     limits = mean_limits(known)
     return Quantity(
@@ -255,22 +256,24 @@ def mean_quantity(runs: pl.DataFrame, column: str) -> Quantity:
 
 
 def _without_limits(known: int, seeds: int) -> str:
-    """Why a mean has no limits; of so few seeds in all the table's note says it once."""
+    """Returns why a mean has no limits; "" of so few seeds, as the table's note says it once."""
     if seeds < UNITS_FROM:
         return ""
     return no_limits_text(known, "seed") if known >= UNITS_FROM else f"{known} of {seeds} seeds"
 
 
 def possible_part(limits: Interval, column: str, least: float) -> Interval:
-    """The part of an interval in which the quantity can lie: no metric of a run is negative, and no
-    share above 100 %. least: the least value seen."""
+    """Returns the part of an interval in which the quantity can lie.
+
+    No metric of a run is negative, and no share above 100 %. least: the least value seen.
+    """
     low, high = limits
     most = 100.0 if "_pct" in column else float("inf")
     return Interval(max(low, min(0.0, least)), min(high, most))
 
 
 def kinds_table(matrix: Matrix) -> Table:
-    """What put the car back, as counts of each configuration; roll-overs where there were any."""
+    """Returns counts of what put the car back by configuration; roll-overs where there were any."""
     titles = {} if matrix.has_grades else UNGRADED_TITLES
     rolled = any(matrix.cell(config)["roll_overs"].sum() for config in matrix.configs)
     kinds = [
@@ -282,7 +285,7 @@ def kinds_table(matrix: Matrix) -> Table:
 
 
 def grades_table(matrix: Matrix) -> Table:
-    """How hard the contacts were."""
+    """Returns counts of how hard the contacts were by configuration, without grades in older results."""
     grades = GRADES if matrix.has_grades else ()
     note = GRADES_NOTE if grades else ""
     caption = "What the contacts were: counts, every drive once"
@@ -310,7 +313,7 @@ def _counts(
 
 
 def background_table(matrix: Matrix) -> Table:
-    """How whole the background stayed in each weather, over the compared configurations."""
+    """Returns contacts among background vehicles by weather, over the compared configurations."""
 
     def total(column: str, group: WeatherGroup) -> float:
         return float(sum(matrix.within(c, group)[column].sum() for c in matrix.comparison_configs))
@@ -338,7 +341,7 @@ def background_table(matrix: Matrix) -> Table:
 
 
 def per_weather(matrix: Matrix) -> list[Block]:
-    """Every metric of every cell, one table per configuration (A-256)."""
+    """Returns every metric of every cell, one folded table per configuration (A-256)."""
     return [_metrics_table(matrix, config) for config in matrix.configs]
 
 

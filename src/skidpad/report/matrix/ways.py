@@ -26,7 +26,7 @@ GREY = 5  # of the palette
 
 
 def way_blocks(matrix: Matrix, crashes: Mapping[Cell, Sequence[Found]]) -> list[Block]:
-    """One map; nothing where no log was kept."""
+    """Returns a figure of first ways and places of crashes on the map; empty where no log was kept."""
     ways = {config: way for config in matrix.comparison_configs for way in _ways(matrix, config)}
     if not ways:
         return []
@@ -51,7 +51,7 @@ def way_blocks(matrix: Matrix, crashes: Mapping[Cell, Sequence[Found]]) -> list[
 
 
 def _ways(matrix: Matrix, config: str) -> list[tuple[Floats, RoadMap]]:
-    """The way of a configuration's first seed in the first weathers, with its map; none without a log."""
+    """Returns the way of a configuration's first seed in the first weathers, with its map; or nothing."""
     runs = matrix.within(config, matrix.weather_groups[0]).sort("seed").head(1)
     for name in matrix.names(runs):
         folder = None if name is None else matrix.folder.log(name)
@@ -63,14 +63,14 @@ def _ways(matrix: Matrix, config: str) -> list[tuple[Floats, RoadMap]]:
 
 
 def broken_way(x: NDArray[np.floating], y: NDArray[np.floating]) -> Floats:
-    """Points (n, 2) of a way, thinned, with a gap (NaN) wherever the car was put somewhere else."""
+    """Returns (n, 2) points of a way in m, every THINNED-th, with nan wherever the car was put elsewhere."""
     points = np.column_stack([x[::THINNED], y[::THINNED]]).astype(np.float64)
     far = np.flatnonzero(np.hypot(*np.diff(points, axis=0).T) > JUMP) + 1
     return np.insert(points, far, np.nan, axis=0)
 
 
 def _centre_lines(road_map: RoadMap) -> tuple[Floats, Floats]:
-    """x and y of the middle of all driving lanes, parted by NaN."""
+    """Returns x and y in m of the middle of all driving lanes, parted by nan."""
     samples, lanes = road_map.samples, road_map.lanes
     driven = np.isin(lanes.kind, (LaneKind.DRIVING, LaneKind.RAMP))
     spans = zip(lanes.first[driven], lanes.size[driven], strict=True)
@@ -81,7 +81,7 @@ def _centre_lines(road_map: RoadMap) -> tuple[Floats, Floats]:
 
 
 def _marks(matrix: Matrix, crashes: Mapping[Cell, Sequence[Found]]) -> list[Curve]:
-    """A cloud of places per configuration and weather."""
+    """Returns a cloud of places of crashes per configuration and weather."""
     found = []
     for (config, weather), items in crashes.items():
         if config not in matrix.comparison_configs or not items:

@@ -96,7 +96,7 @@ def _unit(value: float | None, unit: str) -> str | None:
 
 
 def chart(run: PlayRun, log: RunLog) -> Figure:
-    """Return speeds, gaps, times to collision and events over time."""
+    """Return a figure of speeds, gaps, times to collision and events over time."""
     strips = [_speed(log, EGO, "speed of the ego")]
     for other in _choose_counterparts(run):
         strips += _of_other(log, other)
@@ -119,7 +119,7 @@ def chart(run: PlayRun, log: RunLog) -> Figure:
 
 
 def _choose_counterparts(run: PlayRun) -> list[Counterpart]:
-    """Return the counterparts that matter: those hit, then partners, then the nearest."""
+    """Returns the OTHERS counterparts that matter most: those hit, then partners, then the nearest."""
     order = sorted(
         run.others,
         key=lambda c: (
@@ -176,7 +176,7 @@ def _strip(
 
 
 def _events(path: Path, t: Floats) -> Iterator[Strip]:
-    """One strip per event that began, high while it runs."""
+    """Yields one strip per event that began, 1 while it runs; t: (n,) s of the log."""
     spans: dict[str, list[list[float]]] = {}
     for row in csv.DictReader(path.read_text(encoding="utf-8").splitlines()):
         levels = row["element"].split("::")

@@ -96,14 +96,14 @@ MEANINGS = [
 
 
 def write_play_report(out: Path) -> tuple[Played, Path]:
-    """Judge the runs of a folder, write results.csv and report.html; returns them and the page."""
+    """Judges the runs of a folder and writes results.csv and report.html; returns runs and page's path."""
     played = load_played(out)
     write_results_csv(played)
     return played, write_report_page(build_page(played), out)
 
 
 def build_page(played: Played) -> Page:
-    """Return all sections in the order in which a reader asks."""
+    """Returns the page of judged runs; writes pages of the runs beyond INLINE beside it."""
     runs = in_order(played.runs)
     title = runs[0].scenario if len(runs) == 1 else f"{count_text(len(runs), 'run')} of scenarios"
     links = _links(played, runs)
@@ -119,7 +119,7 @@ def build_page(played: Played) -> Page:
 
 
 def in_order(runs: Iterable[PlayRun]) -> list[PlayRun]:
-    """Return runs that need a look first."""
+    """Returns the runs by verdict as in ORDER, those that need a look first, then by name."""
     return sorted(runs, key=lambda run: (ORDER.index(run.verdict), run.name))
 
 
@@ -165,7 +165,7 @@ def _answers(played: Played) -> Answers:
 
 
 def _links(played: Played, runs: Sequence[PlayRun]) -> dict[str, str]:
-    """Return where the card of each run stands; further ones have pages of their own."""
+    """Writes a page of its own for each run beyond INLINE; returns where the card of each run stands."""
     links = {run.name: f"#{run_anchor(run)}" for run in runs[:INLINE]}
     for run in runs[INLINE:]:
         name = f"{run_anchor(run)}.html"
@@ -177,7 +177,7 @@ def _links(played: Played, runs: Sequence[PlayRun]) -> dict[str, str]:
 
 
 def _cards(played: Played, runs: Sequence[PlayRun]) -> list[Block]:
-    """Return the cards of the first INLINE runs, open where the verdict is not good or the run is alone."""
+    """Returns the cards of the first INLINE runs, open for a bad verdict or a run alone."""
     blocks: list[Block] = []
     if len(runs) > INLINE:
         text = f"The {INLINE} runs that need a look most. The others are linked from the table."
@@ -190,7 +190,7 @@ def _cards(played: Played, runs: Sequence[PlayRun]) -> list[Block]:
 
 
 def _matrix(runs: Sequence[PlayRun], links: dict[str, str]) -> list[Block]:
-    """Return scenario by weather, where there is more than one run; the worst seed speaks."""
+    """Returns the table of scenario by weather, the worst seed in each cell; empty for a single run."""
     columns = list(dict.fromkeys(_outside(run) for run in runs if run.weather))
     if len(runs) < 2 or not columns:
         return []
@@ -212,7 +212,7 @@ def _seeds(runs: Sequence[PlayRun]) -> int:
 
 
 def _outside(run: PlayRun) -> str:
-    """Return the run's weather, with its friction unless that is the original."""
+    """Returns the run's weather, with its friction where that is "original"."""
     return f"{run.weather}, {run.friction} friction" if run.friction == "original" else run.weather
 
 
@@ -254,7 +254,7 @@ def _plain_verdict(run: PlayRun) -> Cell:
 
 
 def _format_bounded(value: float | None, spec: str) -> Cell:
-    """Return a number as a cell, where a large one says no more than that it is large."""
+    """Returns a number as a cell, one from LARGE on as ">99"; a dash for None."""
     if value is None:
         return Cell("-", kind="muted")
     return Cell(format(value, spec) if value < LARGE else f">{LARGE}", sort=value)
@@ -314,7 +314,7 @@ COUNTERPARTS: list[Column[Of]] = [
 
 
 def _crashes(played: Played, runs: Sequence[PlayRun]) -> list[Block]:
-    """Return the hardest crashes of the ego, each with what was seen of it and when."""
+    """Returns cards of the ego's hardest crashes; empty without contacts."""
     found: list[Found] = []
     for run in runs:
         if run.contact is not None and run.folder is not None:

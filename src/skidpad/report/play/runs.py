@@ -60,12 +60,12 @@ class PlayRun:
         return self.judged.verdict
 
     def least(self, name: str) -> float | None:
-        """Return the least of a column of pairs over all counterparts."""
+        """Returns the least of a column of pairs over all counterparts; None where none has a value."""
         known = [v for c in self.others if (v := getattr(c.pair, name)) is not None]
         return min(known, default=None)
 
     def most(self, name: str) -> float | None:
-        """Return the largest of a column of pairs over all counterparts."""
+        """Returns the largest of a column of pairs over all counterparts; None where none has a value."""
         known = [v for c in self.others if (v := getattr(c.pair, name)) is not None]
         return max(known, default=None)
 
@@ -80,12 +80,15 @@ class Played:
 
     @property
     def bad(self) -> list[PlayRun]:
-        """Runs that are failed, void or in error."""
+        """Returns the runs that are failed, void or in error."""
         return [run for run in self.runs if not run.verdict.is_good]
 
 
 def load_played(out: Path) -> Played:
-    """Return the judged runs of a folder, of one run or many; files that cannot be played are errors."""
+    """Returns the judged runs of a folder, of one run or many; files that cannot be played are errors.
+
+    Nothing is written.
+    """
     judging = read_judging(out)
     rules = [parse_expectation(text) for text in judging.expect]
     runs = [*_runs(out, rules)]
@@ -109,7 +112,7 @@ def _runs(out: Path, rules: Sequence[Expectation]) -> Iterator[PlayRun]:
 
 
 def _run(out: Path, folder: Path, rules: Sequence[Expectation], entry: GripEntry | None) -> PlayRun:
-    """Judge the run in `folder`; entry: what the ledger says of it, where there is one."""
+    """Returns the judged run in `folder`; entry: what the ledger says of it, None without a ledger."""
     name = folder.resolve().name
     words = _words(folder, None if entry is None else entry.key)
     metrics = {} if entry is None or entry.metrics is None else asdict(entry.metrics)
@@ -145,14 +148,14 @@ def _of_file(out: Path, log: RunLog, staging: Staging) -> list[Any]:
 
 
 def find_road(out: Path, header: LogHeader) -> RoadMap:
-    """Return the map of a run in `out`, which keeps it, or the campaign that `out` is a run of."""
+    """Returns the map of a run, which `out` keeps, or the campaign of which `out` is a run."""
     above = out.resolve().parents[1:2]
     folder = next((f for f in (out, *above) if (f / KEPT).is_dir()), out)
     return kept_map(folder, header.map, header.map_hash)
 
 
 def _contact(log: RunLog) -> tuple[float, str, float] | None:
-    """Return time in s, what was hit, and closing speed in m/s of the first contact; None without one."""
+    """Returns time in s, what was hit and closing speed in m/s of the first contact; None without."""
     first = next(iter(log.contacts), None)
     if first is None:
         return None
@@ -167,7 +170,7 @@ def _last_line(path: Path) -> list[str]:
 
 
 def _words(folder: Path, key: GripKey | None) -> dict[str, Any]:
-    """Return what is known of scenario, weather, friction and seed of a run."""
+    """Returns scenario, weather, friction and seed of a run, by its set-up, else by its ledger's key."""
     path = folder / CONFIG
     if not path.is_file():
         if key is None:
@@ -194,7 +197,7 @@ def results_table(played: Played) -> pl.DataFrame:
 
 
 def write_results_csv(played: Played) -> Path:
-    """Write results.csv into the folder."""
+    """Writes results.csv into the folder and returns its path."""
     path = played.out / CSV
     write_csv(path, results_table(played))
     return path

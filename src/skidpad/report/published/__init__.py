@@ -46,13 +46,13 @@ def read_published(source: Source) -> pl.DataFrame:
 
 @cache
 def published_rows(source: Source, *keys: str) -> dict[Any, dict[str, Any]]:
-    """Rows of a table by the values of these columns: a tuple, or one value for one column."""
+    """Returns the rows of a table by the values of these columns: a tuple, or one value for one column."""
     rows = read_published(source).to_dicts()
     return {tuple(r[k] for k in keys) if len(keys) > 1 else r[keys[0]]: r for r in rows}
 
 
 def published_matrix() -> pl.DataFrame:
-    """The 30 cells with the column names of results.parquet; null where nothing was published."""
+    """Returns the 30 published cells with columns named as results.parquet; null where unpublished."""
     cells = _cells(read_published(Source.MATRIX)).drop("config_features", "source")
     speeds = read_published(Source.SPEEDS).filter(
         pl.col("source").is_in(["Table 15", "section 6.1.1"])

@@ -102,7 +102,7 @@ class _Evaluation(msgspec.Struct):
 
 
 def _read(source: Path) -> Row:
-    """InputError when it cannot be shown."""
+    """Returns evaluation.json as plain data; InputError when it has not what the page shows."""
     data = read_bytes(source, "an evaluation")
     evaluation: Row = decode_json(data, str(source), dict[str, Any])
     convert_plain(evaluation, _Evaluation, str(source))
@@ -110,7 +110,7 @@ def _read(source: Path) -> Row:
 
 
 def evaluation_page(evaluation: Row, folder: Path) -> Page:
-    """All sections in the order in which a reader asks."""
+    """Returns the report page of an evaluation; folder: of the drives, for outcomes and ways."""
     judged = _read_judgements(evaluation)
     truths = sorted({r["truth"] for r in evaluation["results"]}, key=list(TRUTHS).index)
     return Page(
@@ -144,7 +144,7 @@ def evaluation_page(evaluation: Row, folder: Path) -> Page:
 
 
 def _about_model(evaluation: Row) -> list[Block]:
-    """What the learned identifier was trained on, where there is one."""
+    """Returns a note on what the learned identifier was trained on; empty without a model."""
     model = evaluation.get("model")
     if not model:
         return []
@@ -161,7 +161,7 @@ def _about_model(evaluation: Row) -> list[Block]:
 
 
 def _answers(evaluation: Row, judged: Sequence[Judgement]) -> Answers:
-    """Returns which identifiers find hazards, and how sure that is."""
+    """Returns the answers to how good each deciding identifier is, what is missed, and how sure that is."""
     judged_by, of = _deciding(evaluation)
     items = []
     for result in judged_by:
@@ -179,7 +179,11 @@ def _answers(evaluation: Row, judged: Sequence[Judgement]) -> Answers:
 
 
 def _deciding(evaluation: Row) -> tuple[list[Row], str]:
-    """What identifiers came to by the truth that decides (C-3), and of what; not who is told of it."""
+    """Returns the headline results of identifiers against the truth that decides, and its name in words.
+
+    That is "sim" if any was judged by it, else "world" (C-3). The reference and the detector that is
+    told the truth are left out.
+    """
     rows = [r for r in headline(evaluation) if r["rules"] not in (REFERENCE, TOLD)]
     if any(r["truth"] == "sim" for r in rows):
         return [r for r in rows if r["truth"] == "sim"], "the hazards that were really there"
@@ -214,7 +218,7 @@ def _read_judgements(evaluation: Row) -> list[Judgement]:
 
 
 def verdicts(judged: Sequence[Judgement]) -> list[Block]:
-    """Each finding with its verdict, marked by what brings it about."""
+    """Returns an introduction and a block per finding with its verdict, marked by its cause."""
     intro = Text(
         "Practical rules against world-model truth. Claims, tests and margins were written before "
         "results were seen; that a margin comes before significance is a rule of all reports, "
@@ -225,7 +229,7 @@ def verdicts(judged: Sequence[Judgement]) -> list[Block]:
 
 
 def _curve(evaluation: Row) -> list[Block]:
-    """Precision and recall against the factor on one threshold (C-105)."""
+    """Returns a figure per truth of recall and false alarms against the factor on one threshold (C-105)."""
     return [
         Figure(
             _curve_figure(rows, evaluation["hours"]),
@@ -259,7 +263,10 @@ def _curve_figure(rows: Row, hours: float) -> str:
 
 
 def redundancy(folder: Path) -> list[Block]:
-    """Outcomes per driver, and each channel alone less the arbiter at equal seeds."""
+    """Returns outcomes per driver and their differences from the arbiter at equal seeds.
+
+    A note instead where fewer than two drivers share seeds below the folder.
+    """
     outcomes = read_outcomes([folder])
     drivers = compare_drivers(outcomes)
     if len(drivers) < 2 or not drivers[0].segments:

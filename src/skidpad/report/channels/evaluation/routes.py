@@ -22,7 +22,7 @@ MS = Format(".3f", absent="not measured")
 
 
 def route_blocks(evaluation: Mapping[str, Any]) -> list[Block]:
-    """Violations and times per route; nothing of what was not evaluated."""
+    """Returns tables of violations and times per route; empty for what was not evaluated."""
     segments = pl.DataFrame(evaluation["segment_table"], infer_schema_length=None)
     if "route" not in segments.columns or not len(segments):
         return []
@@ -55,7 +55,7 @@ HOURS, TOTAL = "hours driven", "total"
 def _by_indicator(
     routes: list[Row], names: list[str], caption: str, note: str = "", kind: str = ""
 ) -> Block:
-    """One row per indicator and their sum, one column per route."""
+    """Returns a table with a row per indicator and their sum, and a column per route; "" where unknown."""
 
     def cell(route: Row, name: str) -> Cell:
         if name == HOURS:
@@ -78,7 +78,7 @@ def _by_indicator(
 
 
 def _our_causes(segments: pl.DataFrame, names: list[str]) -> list[Block]:
-    """What was going on when our violations began, per route, with totals."""
+    """Returns the table of what was going on as our violations began, per route; empty without causes."""
     columns = [
         (name, cause, f"{CAUSE_PREFIX}{cause.name.lower()}_{name}")
         for name in names
@@ -103,7 +103,7 @@ def _our_causes(segments: pl.DataFrame, names: list[str]) -> list[Block]:
 
 
 def _town_rows() -> list[Row]:
-    """Rows of the published towns."""
+    """Returns a row per published town: violations by indicator, and the causes given."""
     towns: dict[int, Row] = {}
     for r in read_published(Source.VIOLATIONS_BY_TOWN).to_dicts():
         row = towns.setdefault(r["town"], {"route": f"town {r['town']}", "causes": {}})
@@ -113,7 +113,7 @@ def _town_rows() -> list[Row]:
 
 
 def _cause_table(names: list[str]) -> list[Block]:
-    """Which causes the source gives, with their violations over all towns."""
+    """Returns the table of causes that the source gives, with violations over all towns; or nothing."""
     known = read_published(Source.VIOLATIONS_BY_TOWN).drop_nulls("cause")
     known = known.filter(pl.col("spi").is_in(names))
     rows = (
@@ -132,7 +132,7 @@ def _cause_table(names: list[str]) -> list[Block]:
 
 
 def _times(segments: pl.DataFrame) -> list[Block]:
-    """Returns the table of module times in ms per route: means, 99.9 % and greatest of the total."""
+    """Returns tables of module times in ms per route; empty where no total was measured."""
     modules = [
         c.removesuffix(MEAN)
         for c, kind in segments.schema.items()
@@ -177,7 +177,7 @@ PUBLISHED_NAMES = {"total": "spi_and_hsi_total"}
 
 
 def _module_table(segments: pl.DataFrame, modules: list[str]) -> list[Block]:
-    """The table of C-233 of every module in every route, and the published."""
+    """Returns the table (C-233) of every module in every route, then the published; or nothing."""
     endings = (STD, GREATEST, LEAST, *(f"_{share}" for share in SHARES))
     measured = [m for m in modules if {m + e for e in endings} <= set(segments.columns)]
     rows: list[Row] = []
@@ -216,7 +216,7 @@ def _module_table(segments: pl.DataFrame, modules: list[str]) -> list[Block]:
 
 
 def _merge_segments(segments: pl.DataFrame, module: str) -> Row:
-    """Merges the figures of several segments into those of all their cycles."""
+    """Returns mean, std, min and max in ms and SHARES in % of a module over segments, weighted by hours."""
     hours, mean, std = (segments[c].to_numpy() for c in ("hours", module + MEAN, module + STD))
     weight = hours / hours.sum()
     centre = float(weight @ mean)
@@ -230,7 +230,7 @@ def _merge_segments(segments: pl.DataFrame, module: str) -> Row:
 
 
 def _published_times(modules: list[str]) -> list[Row]:
-    """The same of the published towns."""
+    """Returns a row of published times in ms per town and module, as those of `_merge_segments`."""
     known = read_published(Source.TIMING)
     rows: list[Row] = []
     for town in known["town"].unique().sort():
@@ -251,5 +251,5 @@ def _published_times(modules: list[str]) -> list[Row]:
 
 
 def _value(name: str, row: Row) -> float | None:
-    """Returns the named field of a row; None where it has none."""
+    """Returns the named field of a row, which may be None."""
     return row[name]  # type: ignore[no-any-return]

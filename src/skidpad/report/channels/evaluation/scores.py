@@ -29,22 +29,22 @@ TRUTHS = {
 
 
 def short(truth: str) -> str:
-    """Returns the short name of a truth."""
+    """Returns the name of a truth ("sim", "world", ...) in two words."""
     return TRUTHS[truth].split(":")[0]
 
 
 def headline(evaluation: Row) -> list[Row]:
-    """Results at the tolerance that counts."""
+    """Returns the results at the tolerance of HEADLINE_TOLERANCE s."""
     return [r for r in evaluation["results"] if r["tolerance_s"] == HEADLINE_TOLERANCE]
 
 
 def ratio_text(ratio: float | None) -> str:
-    """Writes a ratio in percent, without the sign."""
+    """Returns a ratio in percent as text, without the sign; "-" for None."""
     return "-" if ratio is None else percent(ratio)
 
 
 def ratio(name: str, row: Row) -> Cell:
-    """A precision or recall with its interval."""
+    """Returns a cell in % of a precision or recall with its interval, good from AIM on; None: not defined."""
     value, limits = row[name], row.get(f"{name}_interval")
     if value is None:
         return Cell("not defined", kind="muted")
@@ -58,7 +58,7 @@ def ratio(name: str, row: Row) -> Cell:
 
 
 def count(name: str, row: Row) -> float | None:
-    """Returns a number of events of a row."""
+    """Returns the number in a row's field `name`, None where it has none."""
     return row.get(name)
 
 
@@ -79,7 +79,7 @@ def _ratio(name: str, title: str, definition: str = "") -> Column[Row]:
 
 
 def results(evaluation: Row, truth: str) -> Table:
-    """Every identifier and hazard against one truth."""
+    """Returns the table of every identifier and hazard against one truth, with macro and micro means."""
     rows: list[Row] = []
     for result in (r for r in headline(evaluation) if r["truth"] == truth):
         name = {"identifier": words(result["rules"])}
@@ -148,7 +148,7 @@ def _published_hazards() -> dict[str, str]:
 
 
 def routes(evaluation: Row, truth: str) -> Table:
-    """Found, false and missed per route, and the published towns."""
+    """Returns the table of found / false / missed per route; for "world" the published towns, too."""
     judged = [r["rules"] for r in headline(evaluation) if r["truth"] == truth]
     by_route = {i: evaluation["by_route"][f"{i}/{truth}"] for i in judged}
     rows: list[Row] = [
@@ -196,7 +196,7 @@ CAUSE_COLUMNS: tuple[Column[Row], ...] = (
 
 
 def causes(evaluation: Row) -> Block:
-    """Draws why identifiers erred (C-215)."""
+    """Returns the table of why identifiers erred (C-215); a sentence where none did."""
     if not evaluation["causes"]:
         return Text("No identifier made a mistake.")
     return table(CAUSE_COLUMNS, evaluation["causes"], "Causes of mistakes, most frequent first")
@@ -217,7 +217,7 @@ AGREEMENT_COLUMNS: tuple[Column[Row], ...] = (
 
 
 def agreement(evaluation: Row) -> Table:
-    """World-model truth as if it were a detector of simulator truth (C-212)."""
+    """Returns a table that scores world-model truth as a detector of simulator truth (C-212)."""
     rows = [{"hazard": hazard, **row} for hazard, row in evaluation["truths_agree"].items()]
     caption = "World-model truth as if it were a detector of simulator truth"
     return table(AGREEMENT_COLUMNS, rows, caption)
@@ -236,6 +236,6 @@ SEGMENT_COLUMNS: tuple[Column[Row], ...] = (
 
 
 def segments(evaluation: Row) -> Table:
-    """Every segment, with the monitor's processor time."""
+    """Returns the table of every segment, with the monitor's processor time."""
     caption = "Every segment, with the monitor's processor time per cycle"
     return table(SEGMENT_COLUMNS, evaluation["segment_table"], caption)

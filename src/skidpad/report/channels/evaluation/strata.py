@@ -40,7 +40,7 @@ and the two are never added up. The effective size says how many equally weighte
 
 
 def strata(evaluation: Row) -> list[Block]:
-    """Recall in both strata; nothing when there is one."""
+    """Returns the table of recall in both strata; a note where no risky drivers were driven among."""
     parts = evaluation.get("strata", {})
     if "risky" not in parts:
         return [
@@ -85,7 +85,7 @@ def _size(row: Row) -> Cell:
 
 
 def precision_recall(evaluation: Row) -> list[Block]:
-    """A chart per stratum: each identifier over its limits, the reference with hindsight dashed."""
+    """Returns a chart per stratum of each identifier over its limits; a note without simulator truth."""
     parts = evaluation.get("strata", {}) or {"natural": evaluation}
     out: list[Block] = []
     for stratum, part in parts.items():
@@ -103,7 +103,7 @@ def precision_recall(evaluation: Row) -> list[Block]:
 
 
 def _chart(part: Row, drawn: Row) -> str:
-    """One pair of axes per hazard."""
+    """Returns an SVG with axes of precision against recall per hazard, a line per identifier."""
     names = list(drawn)
     charts = []
     for hazard in HAZARDS:
@@ -125,7 +125,10 @@ def _chart(part: Row, drawn: Row) -> str:
 
 
 def _line(points: list[list[float]]) -> tuple[list[float], list[float]]:
-    """Recall and precision at each limit that found something."""
+    """Returns recall and precision at each limit at which something was found and true.
+
+    points: limit, tp, fp, fn, weighted found, weighted true.
+    """
     known = [
         (found / true, tp / (tp + fp)) for _, tp, fp, _, found, true in points if tp + fp and true
     ]
@@ -142,7 +145,7 @@ def _at_truths_limits(part: Row, hazard: str) -> Iterator[tuple[float, float]]:
 
 
 def headline_of_risky(evaluation: Row) -> str:
-    """A sentence for the answers; empty without that stratum."""
+    """Returns a sentence on the recall of the tracked rules among risky drivers; "" without them."""
     part = evaluation.get("strata", {}).get("risky")
     if part is None:
         return ""

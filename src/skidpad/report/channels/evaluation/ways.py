@@ -26,7 +26,7 @@ DRIVEN = {"linewidth": 1.0, "alpha": 0.6}
 
 
 def draw_ways(folder: Path) -> list[Block]:
-    """A figure of each map with the ways of all drives below the folder."""
+    """Returns figures of the ways of all drives below the folder, by map; a note where none is kept."""
     ways: dict[str, list[Way]] = {}
     km: dict[str, float] = {}
     for record in read_records([folder]):
@@ -44,7 +44,7 @@ def draw_ways(folder: Path) -> list[Block]:
 
 
 def ways_figures(ways: Mapping[str, Sequence[Way]], folder: Path) -> list[str]:
-    """Charts of the maps by name, some beside each other: lanes grey, ways over them."""
+    """Returns an SVG per BESIDE maps, by name: lanes grey, the ways driven over them."""
     names = sorted(ways)
     rows = [names[k : k + BESIDE] for k in range(0, len(names), BESIDE)]
     return [
@@ -64,7 +64,7 @@ def _chart(name: str, ways: Sequence[Way], folder: Path) -> Chart:
 
 
 def lane_lines(map: RoadMap) -> Iterable[Floats]:
-    """(k, 2) points along each driving lane, its ends among them."""
+    """Yields (k, 2) points in m along each driving lane, every LANE_STEP-th sample and the last."""
     for lane in np.flatnonzero(map.lanes.kind == LaneKind.DRIVING).tolist():
         first, size = int(map.lanes.first[lane]), int(map.lanes.size[lane])
         rows = np.append(np.arange(first, first + size - 1, LANE_STEP), first + size - 1)
@@ -72,7 +72,7 @@ def lane_lines(map: RoadMap) -> Iterable[Floats]:
 
 
 def _join_lines(lines: Iterable[Floats]) -> tuple[Floats, Floats]:
-    """Lines as one, with a gap between them."""
+    """Returns x and y of (k, 2) lines as one line, with nan after each."""
     gap = np.full((1, 2), np.nan)
     whole = np.concatenate([part for line in lines for part in (line, gap)] or [gap])
     return whole[:, 0], whole[:, 1]

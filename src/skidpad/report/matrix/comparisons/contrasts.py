@@ -31,12 +31,15 @@ class Contrast:
 
     @property
     def is_sure(self) -> bool:
-        """Chance alone does not explain the difference."""
+        """Returns True when chance alone does not explain the difference: p below ALPHA, other drives."""
         return self.p < ALPHA and not self.identical
 
 
 def contrast(matrix: Matrix, more: pl.Expr, less: pl.Expr, by: Iterable[str]) -> Contrast | None:
-    """Interventions of one side minus the other, per seed; None where no pair was driven."""
+    """Returns the crashes (EVENTS) of one side minus the other, per seed; None where no pair was driven.
+
+    more, less: conditions on runs; by: columns that a pair shares.
+    """
     pairs, same = paired_runs(matrix.finished, more, less, tuple(by), EVENTS)
     if not len(pairs):
         return None
@@ -47,7 +50,10 @@ def contrast(matrix: Matrix, more: pl.Expr, less: pl.Expr, by: Iterable[str]) ->
 def by_configuration(
     matrix: Matrix, groups: Iterable[WeatherGroup]
 ) -> dict[tuple[WeatherGroup, str, str], Contrast]:
-    """Second minus first of every two compared configurations in every group, as one family."""
+    """Returns second minus first of every two compared configurations, by (group, first, second).
+
+    The p values are adjusted as one family.
+    """
     found = {}
     for group in groups:
         there = pl.col("weather").is_in(group.weathers)
@@ -59,7 +65,7 @@ def by_configuration(
 
 
 def by_weather(matrix: Matrix) -> dict[tuple[str, WeatherGroup], Contrast]:
-    """Every climate minus the first one, for each compared configuration, as one family."""
+    """Returns every climate minus the first one by (configuration, climate), p adjusted as one family."""
     first, *rest = matrix.climates
     found = {}
     for config in matrix.comparison_configs:
@@ -74,6 +80,6 @@ def by_weather(matrix: Matrix) -> dict[tuple[str, WeatherGroup], Contrast]:
 
 
 def _adjust_family(family: dict[K, Contrast]) -> dict[K, Contrast]:
-    """The same with p values adjusted for the family (Holm)."""
+    """Returns the contrasts with p values adjusted for the family (Holm)."""
     ps = holm([c.p for c in family.values()]) if family else []
     return {key: replace(c, p=p) for (key, c), p in zip(family.items(), ps, strict=True)}

@@ -42,15 +42,17 @@ class Twin(NamedTuple):
 
 
 class Parity:
-    """The runs of a campaign that were driven on pixels too."""
+    """Pairs the runs of a campaign with those that were driven on pixels too."""
 
     def __init__(self, matrix: Matrix, pixels: Matrix) -> None:
         self.matrix, self.pixels = matrix, pixels
 
     @cached_property
     def twins(self) -> list[Twin]:
-        """Every pair in the order of configurations and weathers; what moved alike at both levels in
-        several weathers is one pair (decision T-3)."""
+        """Returns every pair in the order of configurations and weathers.
+
+        What moved alike at both levels in several weathers is one pair (decision T-3).
+        """
         found: dict[tuple[object, ...], Twin] = {}
         for config in self.matrix.configs:
             for weather in self.matrix.weathers:
@@ -64,7 +66,7 @@ class Parity:
         return list(found.values())
 
     def _add(self, found: dict[tuple[object, ...], Twin], twin: Twin) -> None:
-        """Add a pair, or its weather to the pair that moved alike."""
+        """Adds a pair to `found`, or its weather to the pair that moved alike."""
         moved = (
             twin.pixels[self.pixels.drive_column],
             twin.objects[self.matrix.drive_column],
@@ -77,7 +79,7 @@ class Parity:
 
 
 def load_parity(matrix: Matrix) -> Parity | None:
-    """The pixel runs below a campaign's folder; None where there are none yet."""
+    """Reads the pixel runs below a campaign's folder; None where there are none yet."""
     folder: Path = matrix.folder.path / PIXELS
     try:
         pixels = Matrix(CampaignFolder(folder, MatrixEntry))
@@ -88,14 +90,14 @@ def load_parity(matrix: Matrix) -> Parity | None:
 
 
 def parity_section(parity: Parity | None) -> list[Block]:
-    """What the pixel level changes, in one sentence, a figure and a table."""
+    """Returns a text, a figure and a table on what the pixel level changes; empty without pairs."""
     if parity is None or not parity.twins:
         return []
     return [Text(parity_text(parity)), _figure(parity), _table(parity)]
 
 
 def parity_text(parity: Parity) -> str:
-    """Crashes at both levels over the compared configurations, and how many drives moved alike."""
+    """Returns a text on crashes at both levels, and on how many drives moved alike."""
     drives = _by_objects(parity)
     on_objects = sum(int(d[0].objects[EVENTS] or 0) for d in drives)  # type: ignore[call-overload]
     on_pixels = sum(sum(_number(t.pixels, EVENTS) or 0.0 for t in d) / len(d) for d in drives)
@@ -120,7 +122,7 @@ def parity_text(parity: Parity) -> str:
 
 
 def _by_objects(parity: Parity) -> list[list[Twin]]:
-    """Pairs of the compared configurations, those together that share their drive on objects."""
+    """Returns the pairs without the baseline, those together that share their drive on objects."""
     found: dict[tuple[object, ...], list[Twin]] = {}
     for twin in parity.twins:
         if twin.pixels["config"] == BASELINE:
@@ -144,7 +146,7 @@ def _number(row: dict[str, object], column: str) -> float | None:
 
 
 def _both(column: str, twin: Twin) -> Quantity:
-    """The value on pixels, below it that on objects."""
+    """Returns the value of `column` on pixels, with that on objects as a line below it."""
     there, here = (_number(row, column) for row in (twin.pixels, twin.objects))
     lines = () if here is None else (f"objects {here:.2f}",)
     return Quantity(value=there, lines=lines)

@@ -37,7 +37,7 @@ PUBLISHED = {  # column of results: what the published experiment had, in words
 
 
 def differences(matrix: Matrix) -> list[str]:
-    """Lists in what these runs differ from the published experiment; all have another simulator."""
+    """Returns in what these runs differ from the published experiment, besides the simulator; or nothing."""
     found = []
     for column, (values, words) in PUBLISHED.items():
         here = {str(v) for v in matrix.results[column].unique()}
@@ -47,7 +47,10 @@ def differences(matrix: Matrix) -> list[str]:
 
 
 def beside_published(matrix: Matrix) -> list[Block]:
-    """One table per published quantity, ours and theirs in each cell, and the figures with both."""
+    """Returns a table per published quantity, ours and theirs in each cell, and figures with both.
+
+    Empty where nothing was published of these configurations and weathers.
+    """
     configs = [c for c in matrix.configs if _has_published(matrix, c)]
     if not configs:
         return []
@@ -64,7 +67,7 @@ def _has_published(matrix: Matrix, config: str) -> bool:
 
 
 def _words(matrix: Matrix) -> Text:
-    """What the reader must know before comparing."""
+    """Returns what a reader must know before comparing; a warning where the experiment is another."""
     other = differences(matrix)
     text = (
         "The published numbers come from one run of 500 s per cell on CARLA; they have no interval. "
@@ -77,7 +80,7 @@ def _words(matrix: Matrix) -> Text:
 
 
 def _table(matrix: Matrix, configs: Sequence[str], column: str, caption: str, note: str) -> Block:
-    """Returns the table of our means of `column` beside the published ones, by configuration and weather."""
+    """Returns the table of our means of `column` beside the published, by configuration and weather."""
 
     def of(weather: str, config: str) -> Quantity:
         runs = matrix.cell(config, weather).drop_nulls(column)
@@ -98,7 +101,7 @@ def _table(matrix: Matrix, configs: Sequence[str], column: str, caption: str, no
 
 
 def _figures(matrix: Matrix, configs: Sequence[str]) -> list[Block]:
-    """Returns figures of interventions, dropout, and the published preliminary against final means."""
+    """Returns figures of interventions, dropout, and published preliminary against final means."""
     weathers = [w for w in matrix.weathers if w in WEATHERS]
     groups = [w.replace("-", "\n", 1) for w in weathers]
     figures: list[Block] = []

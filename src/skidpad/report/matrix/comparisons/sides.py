@@ -34,13 +34,13 @@ ROWS = (
 
 
 def side_blocks(matrix: Matrix) -> list[Block]:
-    """A table and a figure for each pair of which both were driven."""
+    """Returns a table and a figure for each pair of SIDES of which both were driven."""
     there = [pair for pair in SIDES if {*pair} <= {*matrix.configs}]
     return [block for pair in there for block in (_table(matrix, *pair), _figure(matrix, *pair))]
 
 
 def _table(matrix: Matrix, first: str, second: str) -> Block:
-    """Means over seeds of both, and the paired difference."""
+    """Returns the table of means over seeds of both configurations, and their paired difference."""
     columns = [
         Column[Metric]("metric", _name),
         *(
@@ -82,7 +82,7 @@ def _difference(matrix: Matrix, first: str, second: str, metric: Metric) -> Quan
 
 
 def _figure(matrix: Matrix, first: str, second: str) -> Figure:
-    """Crashes of both by weather."""
+    """Returns the figure of crashes per run of both configurations by weather."""
     series = [
         Series(
             config_title(config),

@@ -30,7 +30,10 @@ STEP_COLUMNS = (
 
 
 def step_blocks(matrix: Matrix) -> list[Block]:
-    """Neighbouring configurations, paired by weather and seed."""
+    """Returns the table of what each step of STEPS changes, paired by weather and seed; or nothing.
+
+    A sentence instead where EVER_SIGNIFICANT seeds are missing.
+    """
     if matrix.seeds < EVER_SIGNIFICANT:
         return [Text(few_seeds_text(matrix.seeds))]
     intro = Text(
@@ -62,7 +65,7 @@ def step_blocks(matrix: Matrix) -> list[Block]:
 
 
 def few_seeds_text(seeds: int) -> str:
-    """The line that stands in place of what so few seeds cannot fill."""
+    """Returns the sentence that stands in place of what so few seeds cannot fill."""
     return (
         f"{count_text(seeds, 'seed')} per cell cannot show what a step changes: fewer than "
         f"{EVER_SIGNIFICANT} pairs allow no test."
@@ -78,7 +81,10 @@ def _found_step(found: Differences, column: str, step: tuple[str, str]) -> Quant
 
 
 def step_differences(matrix: Matrix, steps: Sequence[tuple[str, str]]) -> Differences:
-    """The second configuration less the first, paired; a sign that is sure is marked better or worse."""
+    """Returns the second configuration less the first by column and step, p corrected over all (Holm).
+
+    A sign that is sure is marked better or worse, where more is worse.
+    """
     found = {}
     for column in STEP_COLUMNS:
         for step in steps:

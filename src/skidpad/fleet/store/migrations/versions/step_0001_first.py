@@ -12,7 +12,7 @@ down_revision = None
 
 
 def upgrade() -> None:
-    """Make the tables and protect them."""
+    """Makes the tables and the triggers that protect them."""
     bind = op.get_bind()
     metadata.create_all(bind)
     for statement in statements(bind.dialect.name, metadata.tables):

@@ -110,7 +110,7 @@ class Campaign(Generic[T, K, M]):
                 raise ConfigError("--distinct and --until-halfwidth exclude each other; pass one")
 
     def identity(self) -> dict[str, Any]:
-        """The resolved configuration, without workers and paths (decision M-18).
+        """Returns the resolved configuration, without workers and paths (decision M-18).
 
         What all runs have in common, what varies, and a hash over every run.
         """

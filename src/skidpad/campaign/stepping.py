@@ -112,7 +112,7 @@ class Scenario:
         self._conditions: dict[tuple[str, str], bool] = {}
 
     def _at_wheel(self, driver: StackAtWheel) -> _Wheel:
-        """Return the wheel that the caller's command turns, around the driver."""
+        """Returns the wheel that the caller's command turns, around the driver."""
         self._wheel = _Wheel(driver)
         self._wheel.command = self._command
         return self._wheel
@@ -261,7 +261,7 @@ class _SentCommands:
 
     @property
     def ended(self) -> bool:
-        """Whether the script has come to its end."""
+        """Returns True when the script has come to its end."""
         return self.inner.ended
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:

@@ -49,7 +49,10 @@ def carla_launcher(
 
 
 def translate_options(arguments: list[str]) -> list[str]:
-    """Options of `skidpad carla-server` for what the script passes on: ours first, then Unreal's."""
+    """Returns options of `skidpad carla-server`: those before UNREAL as they are, Unreal's translated.
+
+    Prints what is asked for and cannot be had.
+    """
     at = arguments.index(UNREAL) if UNREAL in arguments else 0
     own, given = arguments[:at], arguments[at + 1 :]
     if problem := find_refused(given):
@@ -58,7 +61,7 @@ def translate_options(arguments: list[str]) -> list[str]:
 
 
 def server_options(given: list[str]) -> list[str]:
-    """Options of our server for those of Unreal's; what is not understood has no meaning here."""
+    """Returns the options of our server for those of Unreal's; others mean nothing here."""
     found: list[str] = []
     for word in given:
         if port := PORT.fullmatch(word):
@@ -69,7 +72,7 @@ def server_options(given: list[str]) -> list[str]:
 
 
 def find_refused(given: list[str]) -> str:
-    """What is asked for and cannot be had; empty when all is well."""
+    """Returns a sentence on a streaming port that cannot be had, "" when all is well."""
     ports = [int(p[1]) for p in map(PORT.fullmatch, given) if p] or [2000]
     streams = [int(s[1]) for s in map(STREAMING.fullmatch, given) if s]
     if streams and streams[-1] not in (0, ports[-1] + 1):

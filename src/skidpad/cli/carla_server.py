@@ -50,7 +50,7 @@ def carla_server(options: ServerOptions) -> None:
 
 
 def command(arguments: list[str]) -> None:
-    """Run it with these arguments; help lists its options."""
+    """Runs `carla-server` with these arguments; --help lists its options."""
     app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
     app.command()(carla_server)
     app(arguments, prog_name="skidpad carla-server", standalone_mode=False)

@@ -162,9 +162,10 @@ def main() -> None:
 
 
 def run_guarded(command: Callable[[], object]) -> None:
-    """Run a command; input that cannot be used ends with one sentence and exit code 2.
+    """Runs a command; input that cannot be used ends with one sentence and exit code 2.
 
-    SIGTERM ends it as Ctrl-C does: what is under way is dropped, what is done is kept.
+    Other errors of ours end with 1. SIGTERM ends it as Ctrl-C does: what is under way is dropped,
+    what is done is kept.
     """
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGTERM, _on_termination)

@@ -175,7 +175,7 @@ class ChannelSource:
         return Curves(np.round(v * 3.6, 1).tolist(), [None] * len(v), ttc, *self._judged[::-1])
 
     def moment(self, k: int) -> Moment:
-        """Returns moment k, 0 <= k < ticks; its arrays are valid until the next call."""
+        """Returns moment k, 0 <= k < ticks; radar points are what the driving channel reports of others."""
         world, tick = self.worlds[k], self.tick(k)
         states = self._states(k)
         n = len(self._table)

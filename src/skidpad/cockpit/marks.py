@@ -98,7 +98,7 @@ def _before_camera(p: Floats) -> Floats:
 
 
 def _px(value: float) -> int:
-    """Return a pixel coordinate as a whole number, cut to +-PX_MOST."""
+    """Returns a pixel coordinate as a whole number, cut to +-PX_MOST."""
     return int(min(max(value, -PX_MOST), PX_MOST))
 
 
@@ -184,7 +184,7 @@ class LightAhead:
 
 
 def _frame(camera: CameraSpec, head: SignalHead, ego: Pose) -> tuple[int, int, int, int] | None:
-    """Return left, top, right, bottom in px around a light's head; None where it is out of sight."""
+    """Returns left, top, right, bottom in px around a light's head; None where it is out of sight."""
     ((u, v, depth),) = project(camera, np.array([[head.x, head.y, head.z]]), ego).tolist()
     if depth <= 0.5 or not (0 <= u < camera.width and 0 <= v < camera.height):
         return None

@@ -85,7 +85,7 @@ class RecordedRun:
 
     @property
     def table(self) -> ActorTable:
-        """The actors of the recorded run."""
+        """Returns the actors of the recorded run, the ego first."""
         return self.log.table
 
     @property

@@ -68,7 +68,7 @@ class Source(Protocol):
 
     @property
     def table(self) -> ActorTable:
-        """The actors of the source."""
+        """Returns the actors of the source, the ego first."""
         ...
 
     @property

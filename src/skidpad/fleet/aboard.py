@@ -102,12 +102,12 @@ class Aboard:
         return len(self._waiting)
 
     def start(self) -> None:
-        """Begin to ask and to tell."""
+        """Starts the threads that ask and tell."""
         for thread in self._threads:
             thread.start()
 
     def close(self) -> None:
-        """End both threads, and try a last time to tell what waits; safe to call twice."""
+        """Ends both threads, and tries a last time to tell what waits; safe to call twice."""
         for thread in self._threads:
             thread.close()
         self.tell()

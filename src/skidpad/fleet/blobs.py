@@ -38,7 +38,7 @@ class Blobs:
         return name
 
     def get(self, name: str) -> bytes:
-        """The whole blob; FileError when it is absent or not what its name says."""
+        """Returns the whole blob; FileError when it is absent or not what its name says."""
         content = self._read(name, None, None)
         if digest(content) != name:
             raise FileError(f"blob {name} is damaged")
@@ -64,7 +64,7 @@ class Blobs:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Make a rename durable, and the folder's own birth."""
+    """Makes a rename within a folder durable, and the folder itself in its parent."""
     for each in (folder, folder.parent):
         descriptor = os.open(each, os.O_RDONLY)
         try:

@@ -45,7 +45,7 @@ class Spool:
             raise OutputError(f"{folder}: cannot be written ({error.strerror})") from error
 
     def add_batch(self, kind: Kind, content: bytes, drive: str = "") -> str:
-        """Keeps a batch until it is acknowledged and returns its key; one kept or acknowledged before is one.
+        """Keeps a batch until it is acknowledged and returns its key; the same batch again adds nothing.
 
         Raises OutputError when more than SPOOL_MAX bytes would wait.
         """

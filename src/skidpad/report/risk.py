@@ -58,7 +58,7 @@ def write_risk_report(out: Path) -> str:
 
 
 def risk_page(asked: Risk, found: RiskFound, trials: Sequence[Trial]) -> Page:
-    """Return the page of a question and what came of it."""
+    """Returns the page of a question and what came of it."""
     run = asked.template
     title = f"Risk: {getattr(run.course, 'title', 'scenario')}"
     subtitle = f"{driver_text(run.driver)}, {count_text(len(trials), 'run')}"
@@ -72,7 +72,7 @@ def risk_page(asked: Risk, found: RiskFound, trials: Sequence[Trial]) -> Page:
 
 
 def answer(asked: Risk, found: RiskFound) -> str:
-    """Return the answer in one or two sentences."""
+    """Returns the answer in one or two sentences."""
     who = driver_text(asked.template.driver)
     given = "given this exposure model"
     if found.high is not None and found.p == 0.0:
@@ -103,13 +103,13 @@ def _advice(asked: Risk, found: RiskFound) -> str:
 
 
 def rate_lines(asked: Risk, found: RiskFound) -> list[str]:
-    """Return the answer per hour and per 100 km, where the exposure says how often encounters happen."""
+    """Returns the answer per hour and per 100 km, where the exposure says how often encounters happen."""
     rates = (("hour", asked.per_hour), ("100 km", asked.per_100km))
     return [_rate_text(unit, rate, found) for unit, rate in rates if rate is not None]
 
 
 def _rate_text(unit: str, rate: Rate, found: RiskFound) -> str:
-    """Return a sentence with the crashes per `unit` and their interval, at the rate of encounters."""
+    """Returns a sentence with the crashes per `unit` and their interval, at the rate of encounters."""
     high = "no end" if found.high is None else f"{found.high * rate.value:.2g}"
     return (
         f"Per {unit}, with {rate.value:g} encounters: {found.p * rate.value:.2g} crashes "
@@ -166,7 +166,7 @@ def _estimates(found: RiskFound) -> Figure | None:
 
 
 def _methods(found: RiskFound) -> list[Block]:
-    """Return the table of methods, and a text on subset simulation where it has levels."""
+    """Returns the table of methods, and a text on subset simulation where it has levels."""
     columns = [
         ("method", ""),
         ("probability", "per encounter"),
@@ -191,7 +191,7 @@ def _methods(found: RiskFound) -> list[Block]:
 
 
 def _method_row(e: Probability) -> list[Cell]:
-    """Return the cells of a method's row; the half-width is a dash without estimate or upper end."""
+    """Returns the cells of a method's row; the half-width is a dash without estimate or upper end."""
     high = "no end" if e.high is None else f"{e.high:.2g}"
     width = None if e.p == 0.0 or e.high is None else e.high / e.p - 1.0
     return [
@@ -235,7 +235,7 @@ def _inputs(asked: Risk, found: RiskFound) -> Table:
 
 
 def _influence_cells(one: Influence | None) -> list[Cell]:
-    """Return a cell per scale with the factor on the probability, a dash where it is unknown."""
+    """Returns a cell per scale with the factor on the probability, a dash where it is unknown."""
     if one is None:
         return [Cell("-") for _ in SCALES]
     return [
@@ -247,7 +247,7 @@ def _influence_cells(one: Influence | None) -> list[Cell]:
 
 
 def _limits(asked: Risk, found: RiskFound) -> str:
-    """Return the text on what the answer holds for and what it misses."""
+    """Returns the text on what the answer holds for and what it misses."""
     run = asked.template
     noise = (
         "Sensor noise is drawn anew in each run."

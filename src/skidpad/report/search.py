@@ -65,7 +65,7 @@ def write_search_report(out: Path) -> str:
 
 
 def search_page(out: Path, search: Search, trials: Sequence[Trial], findings: Findings) -> Page:
-    """Return the page of a search."""
+    """Returns the page of a search."""
     sections = [
         Section("Answer", [_answers(search, trials, findings)]),
         Section("Failures", _failures(out, search, trials, findings)),
@@ -104,7 +104,7 @@ def answer(search: Search, trials: Sequence[Trial], findings: Findings) -> str:
 
 
 def _value(value: float | str) -> str:
-    """Return a number with four digits as text; text stays as it is."""
+    """Returns a number with four digits as text; text stays as it is."""
     return value if isinstance(value, str) else f"{value:.4g}"
 
 
@@ -153,7 +153,7 @@ def _failures(
 
 
 def _failure_table(out: Path, search: Search, failures: Sequence[Trial], caption: str) -> Table:
-    """Return the table of the LISTED likeliest failures."""
+    """Returns the table of the LISTED likeliest failures; out: folder of the search, for links."""
     columns = [
         ("run", "number in the search; a link where the run is kept"),
         ("contact, km/h", "larger delta-v of the two, else closing speed"),
@@ -201,7 +201,7 @@ def _reference_cell(reference: Trial | None) -> Cell:
 
 
 def _number(value: float | None, spec: str) -> Cell:
-    """Return a cell with the number in the format `spec`, a dash for None."""
+    """Returns a cell with the number in the format `spec`, a dash for None."""
     return Cell("-") if value is None else Cell(f"{value:{spec}}", value)
 
 
@@ -244,7 +244,7 @@ def influence(search: Search, trials: Sequence[Trial]) -> dict[str, float]:
 
 
 def _coverage(search: Search, trials: Sequence[Trial]) -> list[Block]:
-    """Return the figure of all runs over the most influential variable and up to three others."""
+    """Returns the figure of all runs over the most influential variable and up to three others."""
     ranked = sorted(influence(search, trials).items(), key=lambda item: -item[1])
     names = [name for name, _ in ranked]
     pairs = [(names[0], n) for n in names[1:4]] or [(names[0], names[0])]
@@ -258,7 +258,7 @@ def _coverage(search: Search, trials: Sequence[Trial]) -> list[Block]:
 
 
 def _draw_pair(axis, search: Search, trials: Sequence[Trial], x: str, y: str) -> None:  # type: ignore[no-untyped-def]
-    """Draw all runs over two variables on one axis, failures apart from the others."""
+    """Draws all runs over two variables on one axis, failures apart from the others."""
     for bad, marker, colour, label in (
         (False, ".", PALETTE[5], "no failure"),
         (True, "x", PALETTE[1], "failure"),
@@ -279,7 +279,7 @@ def _draw_pair(axis, search: Search, trials: Sequence[Trial], x: str, y: str) ->
 
 
 def _variable(search: Search, name: str) -> Variable:
-    """Return the search's variable of this name; it must be there."""
+    """Returns the search's variable of this name; it must be there."""
     return next(v for v in search.space.variables if v.name == name)
 
 
@@ -290,7 +290,7 @@ def _place(search: Search, name: str, trial: Trial) -> float:
 
 
 def _variables(search: Search, trials: Sequence[Trial]) -> Table:
-    """Return the table of variables with distribution, source and influence from 0 to 1."""
+    """Returns the table of variables with distribution, source and influence from 0 to 1."""
     shares = influence(search, trials)
     columns = [
         ("variable", "parameter of the scenario, weather, or a field of the weather"),
@@ -311,7 +311,7 @@ def _variables(search: Search, trials: Sequence[Trial]) -> Table:
 
 
 def law_text(variable: Variable) -> str:
-    """Return the distribution of a variable in words."""
+    """Returns the distribution of a variable in words."""
     law = variable.law
     if isinstance(law, Choice):
         weights = law.weights or (1.0,) * len(law.words)
@@ -327,7 +327,7 @@ def law_text(variable: Variable) -> str:
 
 
 def _method(search: Search) -> str:
-    """Return the text on method, seeds and weather, and on what counts as a failure."""
+    """Returns the text on method, seeds and weather, and on what counts as a failure."""
     run = search.template
     return (
         f"Method {search.method}, objective {search.objective}, seed {search.seed}; "

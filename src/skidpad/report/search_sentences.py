@@ -10,7 +10,7 @@ from skidpad.recording.campaign.searches import Change, Group, Hazard, Trial
 
 
 def hazard_sentences(hazard: Hazard) -> list[str]:
-    """Return how near a hazard was, and what would have made it a crash, in two or three sentences."""
+    """Returns how near a hazard was, and what would have made it a crash, in two or three sentences."""
     first = (
         f"{hazard.title}: as recorded {_nearness(hazard.recorded)}; with the searched driver in the "
         f"ego's place {_nearness(hazard.driven)}."
@@ -30,7 +30,7 @@ def hazard_sentences(hazard: Hazard) -> list[str]:
 
 
 def _nearness(trial: Trial) -> str:
-    """Return how near a run came, in words."""
+    """Returns how near a run came, in words."""
     if trial.fault:
         return f"it could not be driven ({trial.fault})"
     if trial.contact_kmh is not None:
@@ -46,7 +46,7 @@ def _nearness(trial: Trial) -> str:
 
 
 def judges_text(failures: Sequence[Trial]) -> str:
-    """Return how many failures each of the two judges avoids, and how many neither does."""
+    """Returns how many failures each of the two judges avoids, and how many neither does."""
     reference = sum(t.is_avoided_by_reference for t in failures)
     bound = sum(t.bound != "" for t in failures)
     both = sum(t.is_avoided_by_reference and t.bound != "" for t in failures)
@@ -57,7 +57,7 @@ def judges_text(failures: Sequence[Trial]) -> str:
 
 
 def driver_text(driver: DriverSpec) -> str:
-    """Return the driver in words: our stack with its functions, or the label of another driver."""
+    """Returns the driver in words: our stack with its functions, or the label of another driver."""
     if isinstance(driver, AdasDriver):
         return (
             f"our stack ({', '.join(sorted(f.value for f in driver.functions)) or 'no function'})"
@@ -66,7 +66,7 @@ def driver_text(driver: DriverSpec) -> str:
 
 
 def group_sentence(group: Group) -> str:
-    """Return a group in one sentence: what, how often, and what would have been enough."""
+    """Returns a group in one sentence: what, how often, and what would have been enough."""
     worst = max(group.failures, key=lambda t: t.contact_kmh or 0.0)
     speed = "" if worst.contact_kmh is None else f", up to {worst.contact_kmh:.0f} km/h"
     text = f"{group.kind}: {count_text(len(group.failures), 'failure')}{speed}"
@@ -76,10 +76,10 @@ def group_sentence(group: Group) -> str:
 
 
 def change_text(change: Change) -> str:
-    """Return a change in words, as "LeadS 118.2 instead of 117.9"."""
+    """Returns a change in words, as "LeadS 118.2 instead of 117.9"."""
     return f"{change.name} {_precise(change.harmless)} instead of {_precise(change.failing)}"
 
 
 def _precise(value: float | str) -> str:
-    """Return a number with five digits as text; text stays as it is."""
+    """Returns a number with five digits as text; text stays as it is."""
     return value if isinstance(value, str) else f"{value:.5g}"

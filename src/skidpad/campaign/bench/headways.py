@@ -62,7 +62,7 @@ def field_sources() -> list[Source]:
 
 
 def _source(row: dict[str, str]) -> Source:
-    """Return the headways of a row of the CSV file; empty cells become None."""
+    """Returns the headways of a row of the CSV file; empty cells become None."""
     return Source(
         row["road"],
         row["role"],
@@ -78,7 +78,7 @@ def _source(row: dict[str, str]) -> Source:
 
 
 def _number(cell: str) -> float | None:
-    """Return a cell's number; None where it is empty."""
+    """Returns a cell's number; None where it is empty."""
     return float(cell) if cell else None
 
 

@@ -152,7 +152,7 @@ class Watch:
             self._note_causes(stands)
 
     def _note_causes(self, stands: NDArray[np.bool_]) -> None:
-        """Note for what each queue stands, and circles of vehicles that wait for each other."""
+        """Counts for what each queue stands, and keeps new circles of vehicles that wait for each other."""
         assert self.world.traffic is not None
         driver = self.world.traffic.drivers.state
         for i in np.flatnonzero(stands).tolist():
@@ -310,7 +310,7 @@ class Wait:
 
 
 def cause_name(cause: Held) -> str:
-    """The cause of standing in words."""
+    """Returns the cause of standing in words."""
     return cause.name.lower().replace("_", " ")
 
 

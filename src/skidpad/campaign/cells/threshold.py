@@ -141,7 +141,7 @@ class Task:
 
     @property
     def mode(self) -> ActorMode:
-        """How the lead is moved."""
+        """Returns how the lead is moved."""
         return scenario_of(self.run).actors
 
     def to_identity(self) -> dict[str, Any]:

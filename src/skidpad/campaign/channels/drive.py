@@ -86,7 +86,7 @@ class Crew:
 
     @property
     def cycle(self) -> int | None:
-        """Number of the cycle that the last tick began, negative in the warm-up; None: it began none."""
+        """Returns the number of the cycle that the last tick began, negative in the warm-up; None: no one."""
         cycle, rest = divmod(self.ticks - 1, PERIOD)
         return None if rest else cycle - WARM_UP_CYCLES
 
@@ -184,7 +184,7 @@ class Street:
 
     @property
     def ended(self) -> bool:
-        """Whether the recording takes no more messages."""
+        """Returns True when the recording takes no more messages."""
         return self.recording.ended
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:

@@ -42,7 +42,7 @@ class Referee:
         self._front = 0.0
 
     def observe(self, truth: WorldTruth, decision: Decision) -> None:
-        """Takes in one cycle of the true world; sets `over` when the ego stalled or left its route."""
+        """Takes in one cycle of the true world; sets `over` when the ego stalled, lost or ended its route."""
         s = truth.states
         x, y, v = float(s.x[0]), float(s.y[0]), hypot(float(s.vx[0]), float(s.vy[0]))
         if self._place is not None:

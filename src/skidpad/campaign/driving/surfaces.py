@@ -15,7 +15,7 @@ from skidpad.core.told import describe_value, on_a_line
 
 
 def read_surface(path: Path) -> tuple[SurfacePatch, ...]:
-    """Return the patches of a file; of an OpenCRG one (.crg), the puddles in its hollows.
+    """Returns the patches of a file; of an OpenCRG one (.crg), the puddles in its hollows.
 
         patches:
           - {name: puddle, water_mm: 2, circle: [12.0, -3.5, 4.0]}             # x, y, radius
@@ -39,7 +39,7 @@ def read_surface(path: Path) -> tuple[SurfacePatch, ...]:
 
 
 def _patch(plain: Any, where: str) -> SurfacePatch:
-    """Return a patch of a surface from plain data; raises ConfigError with `where`."""
+    """Returns a patch of a surface from plain data; raises ConfigError with `where`."""
     try:
         return msgspec.convert(plain, SurfacePatch)
     except (msgspec.ValidationError, ConfigError) as error:

@@ -92,7 +92,7 @@ def runs_of(
 
 
 def _in_weather(run: RunSpec, weather: Weather | None) -> RunSpec:
-    """Return the run in the weather; None: in that of its scenario file."""
+    """Returns the run in the weather; None: in that of its scenario file."""
     if weather is not None:
         return structs.replace(run, weather=weather)
     return in_weather_of_file(run, load_scenario(scenario_of(run)).start.environment)

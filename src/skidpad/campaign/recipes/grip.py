@@ -52,7 +52,7 @@ from skidpad.recording.files import write_parquet
 
 
 def warm_up() -> None:
-    """Compiles every kernel that a run may need, by driving two whole runs."""
+    """Compiles every kernel that a run may need, by driving a few whole runs."""
     from skidpad.campaign.runs.run import run
     from skidpad.physics.presets import preset
 

@@ -77,7 +77,7 @@ def adas(
 
 
 def answer(folder: Path) -> str:
-    """Write the report of a campaign; returns what it answers, its path, and the next command."""
+    """Writes the report of a campaign; returns what it answers, its path, and the next command."""
     from skidpad.report.matrix.answers import terminal_answer
     from skidpad.report.matrix.data import load_matrix
     from skidpad.report.matrix.page import write_report
@@ -137,7 +137,10 @@ def _reports() -> dict[str, Callable[[Path], object]]:
 
 
 def _report_run(run: Path) -> str:
-    """The page of one run: with its verdict where it plays a scenario, else its crash cards."""
+    """Writes the page of one run, with its verdict if it plays a scenario, else its crash cards.
+
+    Returns the text to print, also where there was no crash and so no page.
+    """
     from skidpad.cli.runs.show import open_run
     from skidpad.cli.scenarios.expected import played_report
     from skidpad.recording.run.staging import STAGING

@@ -23,7 +23,10 @@ from skidpad.simulation.world.actors import cast_of
 def plan(
     run: RunSpec, drivers: Sequence[DriverSpec], weathers: Sequence[Weather], seeds: int = 1
 ) -> list[RunSpec]:
-    """The runs of a campaign; ConfigError or FileError for what cannot be driven."""
+    """Returns the runs of a campaign, and says how many vehicles have no place on the map.
+
+    Raises ConfigError or FileError for what cannot be driven.
+    """
     roads = roads_of(run)
     roads = structs.replace(roads, map=map_of(roads.map, run.backend))
     load_map(road_file(roads))
@@ -34,7 +37,10 @@ def plan(
 
 
 def on_pixels(cells: list[RunSpec], seeds: int) -> list[RunSpec]:
-    """The runs of the first seeds once more, on pixels; ConfigError where they are on pixels."""
+    """Returns the runs of the first `seeds` seeds once more, on pixels.
+
+    Raises ConfigError where the runs are on pixels already or have fewer seeds.
+    """
     if seeds and any(c.sensors is SensorLevel.PIXELS for c in cells):
         raise ConfigError("--parity-seeds compares objects with pixels: pass --sensors objects too")
     chosen = sorted({c.seed for c in cells})[:seeds]
@@ -44,7 +50,7 @@ def on_pixels(cells: list[RunSpec], seeds: int) -> list[RunSpec]:
 
 
 def _say_missing(run: RunSpec) -> None:
-    """Say how many vehicles have no place on a map of the user's, before anything is driven."""
+    """Prints how many vehicles have no place on the map, before anything is driven; else nothing."""
     roads, stage = roads_of(run), stage_of(run)
     missing = missing_vehicles(roads, len(cast_of(stage.map, stage.setup, run.seed)))
     n = roads.vehicles - missing

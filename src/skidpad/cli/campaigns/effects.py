@@ -62,7 +62,7 @@ def effects(
 
 
 def difference_text(found: object) -> str:
-    """Returns the mean of differences with its interval."""
+    """Returns the mean difference with two digits and its interval, if it has one, as text."""
     from skidpad.evidence.statistics import Comparison, range_text
 
     assert isinstance(found, Comparison)

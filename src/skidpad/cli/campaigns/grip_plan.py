@@ -18,12 +18,15 @@ Choice = TypeVar("Choice", Friction, CutIn)
 
 
 def plan_grip(ask: GripCross, run: RunSpec, repeats: int) -> list[RunSpec]:
-    """The runs of a campaign; ConfigError or FileError for what cannot be driven."""
+    """Returns the runs of a friction campaign, `repeats` per cell from the run's seed on.
+
+    Raises ConfigError or FileError for what cannot be driven.
+    """
     return cross(run, _vary_run(ask, run), seeds(run.seed - 1, repeats))
 
 
 def with_model(run: RunSpec, tuned: Tuned, model: str, esc: str = "off") -> RunSpec:
-    """`run` with its settings written out, this model of reduced friction, and `esc` on or off."""
+    """Returns `run` with the options' settings, this model of reduced friction, and `esc` "on" or "off"."""
     return tuned.resolve(
         run,
         grip=require_choice("--model", model, ("statistical", "physical")),
@@ -59,7 +62,7 @@ def _vary_run(ask: GripCross, run: RunSpec) -> Cross:
 
 
 def split_words(text: str) -> list[str]:
-    """Different words parted by commas; ConfigError for the same twice, or none."""
+    """Returns the different words that commas part; ConfigError for the same twice, or none."""
     parts = [part.strip() for part in text.split(",") if part.strip()]
     if len(set(parts)) != len(parts) or not parts:
         raise ConfigError(f"need different names parted by commas, got {text!r}")
@@ -73,7 +76,7 @@ def _choices(option: str, text: str, kind: type[Choice]) -> list[Choice]:
 
 
 def grip_weathers(text: str) -> list[Weather]:
-    """`all` is the eleven published presets; else names or YAML files, parted by commas."""
+    """Returns the weathers of names or YAML files parted by commas; "all": the eleven published."""
     if text == "all":
         return [w for w in preset_groups()[GRIP].values() if w.name != SNOW]
     return [find_weather(part) for part in split_words(text)]

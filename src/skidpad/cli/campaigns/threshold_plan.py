@@ -29,7 +29,10 @@ WEATHER = "rain_0"  # of the study: dry, and every level looks like it
 def plan_map(
     ask: MapAsked, cross: GripCross, ego: EgoStack, run: RunSpec, repeats: int
 ) -> list[Task]:
-    """The runs of a map; ConfigError for what cannot be driven."""
+    """Returns the tasks of a threshold map; ConfigError for what cannot be driven.
+
+    repeats: runs per cell. Options that the map chooses itself must be left at their defaults.
+    """
     require_choice("--map-of", str(ask.map_of), MAPS)
     if cross != GripCross() or ego != EgoStack():
         raise ConfigError(

@@ -77,7 +77,7 @@ def drive(
 
 
 def totals(folder: Path) -> str:
-    """What a folder of driven segments came to, and the next command."""
+    """Writes the pages of monitored drives; returns what driven segments came to, and the next command."""
     import polars as pl
 
     from skidpad.core.wording import count_text
@@ -101,7 +101,7 @@ def totals(folder: Path) -> str:
 
 
 def _write_pages(folder: Path) -> None:
-    """The page of every drive whose monitor came to its end."""
+    """Writes the page of every drive whose monitor came to its end."""
     from skidpad.recording.channels.monitored import SUMMARY
 
     for summary in sorted(folder.glob(f"*/*.monitor/{SUMMARY}")):
@@ -111,7 +111,7 @@ def _write_pages(folder: Path) -> None:
 
 
 def _describe_monitor(folder: Path) -> str:
-    """What became of a monitor beside its drive, in one line."""
+    """Returns what became of a monitor beside its drive, in one line."""
     from skidpad.evidence.channels.timing import LIVE_TIMES, delay_sentence
     from skidpad.live.outcome import read_outcome
     from skidpad.recording.channels.monitored import read_timing

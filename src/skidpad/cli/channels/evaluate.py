@@ -121,7 +121,7 @@ class _Task:
     rows: bool = False  # keep what an identifier sees
 
     def made_by(self) -> dict[str, str]:
-        """What the findings hang on beside the model."""
+        """Returns what findings depend on besides the model, as words; other words make them void."""
         from skidpad.evidence.channels.judging.kept import code_hash
 
         about = self.path.stat()
@@ -135,9 +135,9 @@ class _Task:
 
 
 def judge_one(task: _Task) -> Segment:
-    """Judges one recording in a worker, or reads what the same code found of it before.
+    """Judges one recording, or reads what the same code found of it before; writes NAME.judged.
 
-    The file beside the recording (.judged) keeps what was found.
+    Without `task.rows` the rows that an identifier sees are left out of the result.
     """
     from dataclasses import replace
 
@@ -188,7 +188,10 @@ def _judge_task(task: _Task) -> Segment:
 
 
 def _segments(tasks: list[_Task], workers: int) -> list[Segment]:
-    """All recordings judged, in the order of their names; a failure is raised."""
+    """Returns all recordings judged, in the order of the tasks; prints each; a failure is raised.
+
+    workers: 0: one per core.
+    """
     import os
     from concurrent.futures import ProcessPoolExecutor
     from multiprocessing import get_context
@@ -201,7 +204,7 @@ def _segments(tasks: list[_Task], workers: int) -> list[Segment]:
 
 
 def _report_segments(segments: Iterable[Segment]) -> Iterator[Segment]:
-    """Yields the segments on, and prints the name and cycles of each."""
+    """Yields the segments unchanged, and prints the name and cycles of each."""
     for segment in segments:
         typer.echo(f"{segment.name}: {segment.t.size} cycles")
         yield segment
@@ -213,7 +216,7 @@ def _labels_of(path: Path, marked: dict[str, list[Span]]) -> tuple[Span, ...]:
 
 
 def _about_model(path: Path) -> dict[str, object]:
-    """What a reader must know of the learned identifier."""
+    """Returns what a reader must know of the learned identifier: file, training hours, recordings."""
     from skidpad.evidence.channels.identifier.model import load_model
 
     model = load_model(path)
@@ -226,7 +229,7 @@ def _about_model(path: Path) -> dict[str, object]:
 
 
 def _refuse_training_drives(path: Path, segments: list[Segment]) -> None:
-    """A model may not be judged by drives that it was trained on."""
+    """Raises ConfigError when the model was trained on any of the drives that it is judged by."""
     from skidpad.core.errors import ConfigError
     from skidpad.evidence.channels.identifier.model import load_model
 

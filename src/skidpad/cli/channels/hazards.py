@@ -38,7 +38,7 @@ def list_(
 
 
 def lines(rows: list[dict[str, Any]]) -> Iterator[str]:
-    """A line of text per row of an index."""
+    """Yields a line of text per row of an index; a sentence where there is none."""
     for row in rows:
         flags = f" [{', '.join(row['flags'])}]" if row["flags"] else ""
         yield (
@@ -88,7 +88,7 @@ def export(
 
 
 def _choose_ids(table: dict[str, T], ids: list[str] | None) -> list[T]:
-    """Returns the entries of these ids, of all where there are none; raises ConfigError if unknown."""
+    """Returns the entries of these ids, all for None or []; ConfigError for an unknown one."""
     from skidpad.core.errors import ConfigError
 
     unknown = [i for i in ids or [] if i not in table]

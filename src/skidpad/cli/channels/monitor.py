@@ -87,7 +87,7 @@ class Judged(Struct, frozen=True):
     ] = None
 
     def to_settings(self) -> MonitorSettings:
-        """Returns the monitor's settings, with the files that are named read."""
+        """Returns the monitor's settings; reads the files that are named, with their errors."""
         from skidpad.evidence.channels.hazards import Profile, default_form, load_rules
         from skidpad.evidence.channels.identifier.model import Identify, load_model
         from skidpad.evidence.channels.indicators.catalogue import load_thresholds
@@ -128,7 +128,10 @@ class Listening(Struct, frozen=True):
     ] = 60.0
 
     def open_source(self, file: Path | None) -> ChannelSource:
-        """Returns the recording, or the topics where no file is given."""
+        """Returns the recording `file`, or the topics to listen to where it is None.
+
+        Raises ConfigError unless exactly one is asked for, FileError for a missing file.
+        """
         from skidpad.core.errors import ConfigError, FileError
         from skidpad.recording.sources import open_channels
 
@@ -198,7 +201,7 @@ def monitor(
 
 
 def _rule(name: str) -> HazardType | AnyIndicator:
-    """Returns the hazard or indicator that --fail-if names; raises ConfigError for an unknown one."""
+    """Returns the hazard or indicator that --fail-if names, by name or label; ConfigError otherwise."""
     from skidpad.core.errors import ConfigError
     from skidpad.core.vocabulary import HazardType
     from skidpad.evidence.channels.indicators.catalogue import Indicator, load_thresholds
@@ -257,7 +260,7 @@ SHORT = {  # headings of the table of times, so that it fits a terminal
 
 
 def _print_table(table: pl.DataFrame, title: str) -> None:
-    """Print a table of numbers with three digits, its columns as wide as they must be."""
+    """Prints a table of numbers with three digits, its columns as wide as they must be."""
     heads = [SHORT.get(name, name) for name in table.columns]
     rows = [[f"{v:.3f}" if isinstance(v, float) else str(v) for v in row] for row in table.rows()]
     widths = [max(map(len, column)) for column in zip(heads, *rows, strict=True)]
@@ -270,7 +273,10 @@ def _print_table(table: pl.DataFrame, title: str) -> None:
 
 
 def _gate(counts: dict[str, int], junit: Path | None) -> None:
-    """Exit with 1 when anything that must not occur did."""
+    """Prints what must not occur and did, and exits with 1 then; `junit`: file to write, if any.
+
+    counts: how often each occurred, by name.
+    """
     from skidpad.cli.output.junit import write_junit
 
     wrong = {

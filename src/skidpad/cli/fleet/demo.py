@@ -69,7 +69,10 @@ class Job:
 
 
 def drive(job: Job) -> tuple[int, int]:
-    """Drives in a worker, monitors under the active rules, and counts errors under both."""
+    """Drives a job and monitors it under the active rules; returns errors under these and the others.
+
+    The recording is deleted, what the monitor wrote stays.
+    """
     from skidpad.campaign.channels.drive import drive_segment
     from skidpad.campaign.channels.routes import driven_routes
     from skidpad.fleet.loop.judging import errors_of
@@ -103,7 +106,7 @@ class Car:
 
 @dataclass(slots=True)
 class Demo:
-    """The fleet of the demo and everybody in it."""
+    """Holds the demo's fleet: its address, credentials, vehicles and payloads."""
 
     out: Path
     address: str
@@ -116,7 +119,7 @@ class Demo:
     payloads: dict[str, bytes] = field(default_factory=dict)  # by name, "": what cars come with
 
     def call(self, token: str, method: str, path: str, body: Any = None) -> Any:
-        """One request; BackendError unless it is granted."""
+        """Sends one request with a credential and returns the answer; BackendError unless it is 200."""
         import httpx
 
         answer = httpx.request(
@@ -128,7 +131,10 @@ class Demo:
         return answer
 
     def round(self, release: str = "") -> list[tuple[int, int]]:
-        """Vehicles drive once and report; with a release only those that run it. Errors by drive."""
+        """Lets vehicles install, drive once and report; returns (errors, errors before) by drive.
+
+        release: only vehicles that run it; "": all.
+        """
         jobs: list[tuple[Car, str, Job]] = []
         for k, car in enumerate(self.cars):
             told = self.call(car.token, "GET", "/api/v1/updates/assignment").json()
@@ -148,7 +154,7 @@ class Demo:
         return errors
 
     def install(self, car: Car, name: str) -> None:
-        """Fetch an update as a vehicle does: by the pinned root, checked."""
+        """Fetches an update as a vehicle does, checked by the pinned root; BackendError for another one."""
         import httpx
 
         from skidpad.fleet.updates.client import UpdateClient
@@ -163,7 +169,7 @@ class Demo:
             raise BackendError(f"{car.name} fetched another update than was signed")
 
     def report(self, car: Car, folder: Path, release: str, judged: tuple[int, int] | None) -> None:
-        """Spool and send what the monitor wrote."""
+        """Spools and sends what the monitor wrote; BackendError when a batch waits or is refused."""
         import httpx
 
         from skidpad.fleet.monitored import spool_folder
@@ -181,7 +187,11 @@ class Demo:
             raise BackendError(f"{car.name}: {sent.waiting} batches wait, {sent.refused} refused")
 
     def roll_out(self, title: str, content: bytes, hazards: Sequence[str]) -> dict[str, Any]:
-        """Propose, sign off line, release, drive on unseen seeds until the looks have decided."""
+        """Proposes, signs and releases a change, and drives on unseen seeds until the looks have decided.
+
+        content: rules; hazards: ids that led to it. Returns the release as it stands, after ROUNDS_MAX
+        rounds also undecided.
+        """
         import base64
 
         from skidpad.fleet.updates.payloads import PayloadKind, payload_name
@@ -215,13 +225,13 @@ class Demo:
         return state
 
     def look_at_release(self, release: str) -> dict[str, Any]:
-        """The release after a look; the service looks by itself too, and it may have ended meanwhile."""
+        """Looks at a release and returns it; the service looks by itself too, so it may have ended."""
         with suppress(BackendError):
             self.call(self.maker, "POST", f"/api/v1/releases/{release}/look")
         return next(r for r in self.releases() if r["release"] == release)
 
     def sign_list(self, content: bytes) -> bytes:
-        """Signs the list with the new update by two of the three keys, as off line."""
+        """Returns the list with the new update, signed by two of the three keys, as off line."""
         import time
 
         from skidpad.fleet.updates import signing
@@ -240,7 +250,7 @@ class Demo:
 
 @contextmanager
 def pool(workers: int) -> Iterator[Callable[[list[Job]], list[tuple[int, int]]]]:
-    """Drives jobs in processes of their own."""
+    """Yields a function that drives jobs in processes of their own and returns errors by job."""
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, mp_context=context) as running:
         yield lambda jobs: list(running.map(drive, jobs))
@@ -255,7 +265,7 @@ def _finding(f: dict[str, Any]) -> str:
 
 
 def enrol_fleet(out: Path, n: int) -> tuple[str, str, list[Car]]:
-    """Make the store, the off-line keys and n vehicles; credentials of maker and operator."""
+    """Makes the store, the off-line keys and n vehicles; returns credentials of maker, operator, cars."""
     import time
 
     from skidpad.fleet.service import Places, open_fleet
@@ -287,7 +297,7 @@ def enrol_fleet(out: Path, n: int) -> tuple[str, str, list[Car]]:
 
 @contextmanager
 def serving(data: Path, port: int) -> Iterator[str]:
-    """`skidpad fleet serve` as a process of its own; its address."""
+    """Runs `skidpad fleet serve` as a process of its own, which ends at exit; yields its address."""
     words = ["fleet", "serve", "--data", str(data), "--port", str(port)]
     with subprocess.Popen(
         [sys.executable, "-m", "skidpad", *words], stdout=subprocess.PIPE, text=True
@@ -304,7 +314,7 @@ def serving(data: Path, port: int) -> Iterator[str]:
 
 @contextmanager
 def open_recorded(out: Path, port: int, say: Callable[[str], None]) -> Iterator[str]:
-    """Serve the recorded fleet from a copy in `out`, and say what it is and where; its address."""
+    """Serves the recorded fleet from a copy in `out`; says what it is and where; yields its address."""
     import time
 
     from skidpad.fleet.recorded import unpack_recorded
@@ -330,7 +340,7 @@ def open_recorded(out: Path, port: int, say: Callable[[str], None]) -> Iterator[
 
 
 def play(demo: Demo) -> list[dict[str, Any]]:
-    """The whole story; the releases as they ended."""
+    """Plays the whole story of the demo; returns the releases as they ended."""
     rules = rule_sets()
     demo.payloads[""] = rules["published"]
     demo.say(f"{len(demo.cars)} vehicles drive {demo.seconds:g} s each under the published rules")

@@ -34,7 +34,7 @@ PATIENCE_S = 5.0  # with a request; an order that came later would have expired
 
 
 class Watch:
-    """A `Listener` that keeps what the first channel saw, and raises what the monitor tells."""
+    """Keeps what the first channel saw of a drive, and raises an alert for each alarm of the monitor."""
 
     def __init__(self, aboard: Aboard, alarms: Path) -> None:
         self.aboard, self.alarms = aboard, alarms
@@ -45,14 +45,14 @@ class Watch:
         self._stood = False
 
     def hear(self, channel: int | None, item: Item) -> None:
-        """Keep what a scene is made of."""
+        """Keeps the map's name and the first channel's frames, of which a scene is made."""
         if isinstance(item, Context):
             self.map = item.entries.get("map", self.map)
         elif channel == 0 and isinstance(item, ChannelFrame) and np.isfinite(item.ego).all():
             self._seen.append(item)
 
     def cycle_over(self, k: int, t: float) -> None:
-        """Raise what the monitor has found meanwhile, and that the vehicle stands by an order."""
+        """Raises what the monitor has found meanwhile, and once that the vehicle stands by an order."""
         self.look()
         if self._seen and not self._stood and not self.aboard.v_max:
             self._stood = hypot(*self._seen[-1].ego[3:]) < STANDS
@@ -60,11 +60,11 @@ class Watch:
                 self._raise(k, t, Kind.MINIMAL_RISK, "stands still as it was ordered")
 
     def close(self) -> None:
-        """Raise the last alarms: the monitor has ended."""
+        """Raises the last alarms, as the monitor has ended."""
         self.look()
 
     def look(self) -> None:
-        """Raise each alarm that was written in full since the last look."""
+        """Raises an alert for each alarm that was written in full since the last look."""
         try:
             with self.alarms.open("rb") as file:
                 file.seek(self._read)
@@ -77,7 +77,10 @@ class Watch:
             self._raise(row["cycle"], row["t"], Kind.HAZARD, row["hazard"].replace("_", " "))
 
     def _raise(self, k: int, t: float, kind: Kind, what: str) -> None:
-        """Raises an alert about cycle `k` at `t` s with the last known frame as its scene."""
+        """Raises an alert about cycle `k` at `t` s; its scene is the last frame known by then.
+
+        Without a frame it only says so.
+        """
         known = [frame for frame in self._seen if frame.t <= t + 1e-3] or list(self._seen)[:1]
         if not known:
             self.aboard.say(f"{what} at {t:.1f} s: no alert, as no pose was known")
@@ -88,7 +91,7 @@ class Watch:
 
 
 def scene_of(frame: ChannelFrame, map: str) -> Scene:
-    """What a channel saw around the vehicle, nearest objects first."""
+    """Returns what a channel saw around the vehicle, nearest objects first, OBJECTS_MAX at most."""
     x, y = frame.ego[:2]
     reach = np.hypot(frame.objects[:, 0] - x, frame.objects[:, 1] - y)
     near = [i for i in np.argsort(reach) if np.isfinite(frame.objects[i, :3]).all()][:OBJECTS_MAX]
@@ -102,7 +105,10 @@ def scene_of(frame: ChannelFrame, map: str) -> Scene:
 
 
 def _body(state: NDArray[np.float64], corners: NDArray[np.float64]) -> Body:
-    """corners: (n, 2) around the state's place, along its heading; without any: a usual car."""
+    """Returns the rectangle of a state (x, y, heading, ...); of a usual car where it has no shape.
+
+    corners: (n, 2) around the state's place, along its heading.
+    """
     x, y, heading = (float(v) for v in state[:3])
     if not len(corners) or not np.isfinite(corners).all():
         return Body(x, y, heading)
@@ -111,7 +117,10 @@ def _body(state: NDArray[np.float64], corners: NDArray[np.float64]) -> Body:
 
 
 def drive_aboard(spec: RunSpec, folder: Path, aboard: Aboard) -> tuple[DriveOutcome, LinkOutcome]:
-    """Drive at real time with the monitor beside it, as a vehicle of the fleet; what became of both."""
+    """Drives at real time as a vehicle of the fleet, its monitor beside; returns what became of both.
+
+    Starts and closes `aboard`.
+    """
     recording = folder / "drive.mcap"
     monitored = recording.with_suffix(MONITORED)
     watch = Watch(aboard, monitored / ALARMS)

@@ -114,7 +114,7 @@ def serve(
 
 
 def _check_exposure(host: str, certificate: Path | None, key: Path | None) -> None:
-    """ConfigError for a service that others could reach without HTTPS."""
+    """Raises ConfigError for a service that others could reach without HTTPS, or half a key pair."""
     from skidpad.core.errors import ConfigError
     from skidpad.pages.server import is_local
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def fleet_extra() -> Iterator[None]:
-    """One sentence when the optional part is not installed."""
+    """Turns a missing import within the block into MissingExtra, one sentence on the part `fleet`."""
     from skidpad.core.errors import MissingExtra
 
     try:
@@ -37,7 +37,7 @@ def fleet_extra() -> Iterator[None]:
 
 @contextmanager
 def committing(places: Places) -> Iterator[Connection]:
-    """The store of a fleet for one piece of work, which is kept whole or not at all."""
+    """Yields a connection to a fleet's store; its work is kept whole, or not at all on an error."""
     from skidpad.fleet.service import open_store
 
     engine = open_store(places)
@@ -72,7 +72,10 @@ def relays(
 
 
 def broker_of(mqtt: str, ca: Path | None, user: str | None, password: Path | None) -> Broker:
-    """ConfigError unless it reads HOST[:PORT]; password: a file that holds it."""
+    """Returns the broker at HOST[:PORT]; ConfigError for another form or half a log-in.
+
+    password: a file that holds it.
+    """
     from skidpad.core.errors import ConfigError
     from skidpad.fleet.broker import Broker
 
@@ -89,7 +92,7 @@ def broker_of(mqtt: str, ca: Path | None, user: str | None, password: Path | Non
 def posting(
     to: str | None, broker: Broker | None, token_file: Path, ca: Path | None
 ) -> Iterator[Post]:
-    """What sends a batch, by HTTPS or through a broker; ConfigError unless exactly one is told."""
+    """Yields a function that sends a batch, by HTTPS or a broker; ConfigError unless one is told."""
     from skidpad.core.errors import ConfigError
     from skidpad.fleet.uploader import mqtt_poster, poster
 
@@ -103,7 +106,11 @@ def posting(
 
 
 def client(to: str, token_file: Path, ca: Path | None) -> httpx.Client:
-    """A client with a credential; one sentence for an address or file that cannot be used."""
+    """Returns an HTTP client with the vehicle's credential, not connected yet.
+
+    Raises ConfigError for an address without https beyond this machine, FileError for a file that
+    cannot be read.
+    """
     import ssl
     from urllib.parse import urlsplit
 
@@ -129,7 +136,7 @@ def client(to: str, token_file: Path, ca: Path | None) -> httpx.Client:
 
 
 def token_of(file: Path) -> str:
-    """The credential in a file."""
+    """Returns the credential in a file; FileError when it cannot be read."""
     from skidpad.core.errors import FileError
 
     try:
@@ -139,9 +146,10 @@ def token_of(file: Path) -> str:
 
 
 def open_maps(folder: Path | None) -> Maps:
-    """Maps by name: those of the OpenDRIVE files in `folder`, else bundled ones; None for others.
+    """Returns a function from a name to its map: of an OpenDRIVE file in `folder`, else bundled.
 
-    FileError for what is no folder, InputError for a file in it that cannot be read.
+    It gives None for others. FileError for what is no folder, InputError for a file in it that cannot
+    be read.
     """
     from skidpad.core.errors import FileError
     from skidpad.roads.bundled import bundled_maps, load_map
@@ -160,7 +168,7 @@ def open_maps(folder: Path | None) -> Maps:
 
 
 def map_lines(maps: Maps) -> MapLines:
-    """Roads of a map by its name; none of a map that is not known."""
+    """Returns a function from a map's name to the lines of its roads, () for an unknown map."""
     known: dict[str, list[Line]] = {}
 
     def lines(name: str) -> Sequence[Line]:
@@ -175,7 +183,7 @@ def map_lines(maps: Maps) -> MapLines:
 
 
 def place_finder(maps: Maps) -> Locate:
-    """Which road, lane and junction a point of a map is at; None where the map is not known."""
+    """Returns a function from map, x, y (m) to road, lane and junction there; None for an unknown map."""
     from skidpad.roads.localities import Localities
 
     known: dict[str, Localities] = {}
@@ -192,7 +200,7 @@ def place_finder(maps: Maps) -> Locate:
 
 
 def _lines_of(map: RoadMap) -> list[Line]:
-    """Middles of its lanes, every third point."""
+    """Returns the middles of a map's lanes in m, every third point and the last."""
     found: list[Line] = []
     for first, size in zip(map.lanes.first.tolist(), map.lanes.size.tolist(), strict=True):
         rows = [*range(first, first + size, 3), first + size - 1]

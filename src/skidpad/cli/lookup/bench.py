@@ -63,7 +63,7 @@ def bench(
 
 
 def machine() -> str:
-    """The processor's name as the system tells it."""
+    """Returns the processor's name as the system tells it."""
     try:
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
             if line.startswith("model name"):
@@ -137,7 +137,7 @@ def _matrix(seconds: float, run: bool, quiet: bool) -> dict[str, Any]:
 
 
 def _describe_seen(seen: TrafficCounts) -> Iterator[str]:
-    """Headways in steady following, vehicles that stood long and for what, and circles of such."""
+    """Yields lines on headways in steady following, vehicles that stood long, and circles of such."""
     from skidpad.campaign.bench.headways import headways_of
     from skidpad.campaign.bench.traffic_watch import LONG
 

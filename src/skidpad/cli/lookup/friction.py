@@ -24,7 +24,7 @@ SHEET = "Ice of 2 mm is a sheet already: the physical model makes no difference 
 
 
 def _percent(text: str) -> float:
-    """A typer option between 0 and 100."""
+    """Returns a typer option between 0 and 100 with this help text."""
     option: float = typer.Option(min=0.0, max=100.0, help=f"{text}, percent.")
     return option
 
@@ -99,7 +99,7 @@ def friction(
 
 
 def _answer(weathers: Sequence[Weather], rows: Sequence[GripRow], mu: float) -> list[str]:
-    """How far to a stop, in a sentence, of one weather."""
+    """Returns lines on how far it is to a stop in the one weather; of several, a heading alone."""
     from skidpad.core.vocabulary import GripModel
     from skidpad.physics.grip import road_surface
     from skidpad.physics.stopping import SPEEDS_KMH
@@ -122,7 +122,7 @@ def _answer(weathers: Sequence[Weather], rows: Sequence[GripRow], mu: float) -> 
 
 
 def _table(weathers: Sequence[Weather], rows: Sequence[GripRow]) -> list[str]:
-    """Both models side by side, a line per weather, in 80 columns."""
+    """Returns lines of both models side by side, one per weather, in 80 columns, and notes."""
     from skidpad.core.vocabulary import GripModel
     from skidpad.physics.stopping import SPEEDS_KMH
 
@@ -152,7 +152,7 @@ def _table(weathers: Sequence[Weather], rows: Sequence[GripRow]) -> list[str]:
 
 
 def _cells(row: GripRow | None) -> list[str]:
-    """Ratio, friction and distances of one model; dashes where it is not defined."""
+    """Returns ratio, friction and distances in m of one model as text; dashes for None."""
     if row is None:
         return ["-"] * 5
     distances = [f"{stop.distance:.1f}" for stop in row.stops]

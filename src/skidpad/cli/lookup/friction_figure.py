@@ -48,7 +48,7 @@ def _over_deposits(axes: Any) -> None:
 
 
 def draw_surface(axes: Any) -> None:
-    """Draws the ratio in rain over wetness and deposits."""
+    """Draws the statistical grip ratio in rain over wetness and deposits in %, on 3-D axes."""
     coarse = PERCENT[::5]
     w, p = np.meshgrid(coarse, coarse)
     axes.plot_surface(w, p, np.vectorize(_rain)(w, p), cmap="viridis", linewidth=0)
@@ -72,7 +72,7 @@ def _speeds(axes: Any, mu_ref: float) -> None:
 
 
 def friction_figure(mu_ref: float) -> Any:
-    """The four panels; the caller closes the figure."""
+    """Returns the figure of four panels; the caller closes it. mu_ref: friction of the dry road."""
     from matplotlib import pyplot as plt
 
     figure = plt.figure(figsize=(14.0, 8.6), layout="constrained")
@@ -84,7 +84,7 @@ def friction_figure(mu_ref: float) -> Any:
 
 
 def draw(path: Path, mu_ref: float) -> None:
-    """Write the figure; the suffix chooses the format."""
+    """Writes the figure of both models; the suffix of `path` chooses the format."""
     format_of(path)
     mpl.use("Agg")
     from matplotlib import pyplot as plt

@@ -78,7 +78,7 @@ def diff(a: str, b: str) -> None:
 
 
 def _text(value: Any) -> str:
-    """Returns a value as `--set` takes it."""
+    """Returns a value as `--set` takes it: none, on, off, a number or text."""
     if value is None:
         return "none"
     if isinstance(value, bool):

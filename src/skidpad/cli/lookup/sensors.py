@@ -31,12 +31,12 @@ class SensorRow(NamedTuple):
 
 
 def sensor_rows() -> list[SensorRow]:
-    """All sensors that have a place and a field of view, in the published order."""
+    """Returns the rows of all cameras and radars, in the published order."""
     return [row(spec) for spec in twelve_sensors() if isinstance(spec, (CameraSpec, RadarSpec))]
 
 
 def row(spec: CameraSpec | RadarSpec) -> SensorRow:
-    """The row of one sensor."""
+    """Returns the row of one sensor, angles in deg."""
     m = spec.mount
     x, y, z, yaw, pitch = (
         round(v, 9) + 0.0 for v in (m.x, m.y, m.z, degrees(m.yaw), degrees(m.pitch))
@@ -50,7 +50,7 @@ def row(spec: CameraSpec | RadarSpec) -> SensorRow:
 
 
 def sensor_table() -> str:
-    """The rows as text that fits 80 columns."""
+    """Returns the rows as text that fits 80 columns."""
     lines = [
         f"{'sensor':<18}{'x m':>7}{'y m':>7}{'z m':>7}{'yaw':>6}{'pitch':>7}{'fov':>6}  covers"
     ]
@@ -63,7 +63,7 @@ def sensor_table() -> str:
 
 
 def draw_layout(axes: Any) -> None:
-    """The car from above with every sensor and its field of view; the radar's reaches out of it."""
+    """Draws the car from above with every sensor and its field of view, CAMERA_REACH m long."""
     length, width = EGO
     axes.plot(
         np.array([-1, 1, 1, -1, -1]) * length / 2, np.array([-1, -1, 1, 1, -1]) * width / 2, "k-"
@@ -86,7 +86,7 @@ def draw_layout(axes: Any) -> None:
 
 
 def _names_by_place() -> dict[tuple[float, float], list[str]]:
-    """The sensors at each place, seen from above."""
+    """Returns the names of the sensors by x, y in m, as seen from above."""
     found: dict[tuple[float, float], list[str]] = {}
     for r in sensor_rows():
         found.setdefault((r.x, r.y), []).append(r.name)
@@ -94,7 +94,7 @@ def _names_by_place() -> dict[tuple[float, float], list[str]]:
 
 
 def write_layout(path: Path) -> None:
-    """Write the layout; the suffix chooses the format."""
+    """Writes the picture of the layout; the suffix of `path` chooses the format."""
     format_of(path)
     import matplotlib as mpl
 

@@ -55,7 +55,10 @@ class Drivers(Struct, frozen=True):
     stack_set: StackSettings = ()
 
     def find_drivers(self) -> list[DriverSpec]:
-        """The drivers; ConfigError or FileError for what is not there."""
+        """Returns the drivers that the options name, by default configurations 0 to 4 and the reference.
+
+        Raises ConfigError or FileError for what is not there, or options that exclude each other.
+        """
         from skidpad.campaign.cells.matrix import (
             cruising,
             drivers_with,
@@ -93,7 +96,7 @@ class EgoStack(Struct, frozen=True):
     stack_set: StackSettings = ()
 
     def find_driver(self) -> DriverSpec:
-        """The driver; ConfigError or FileError for one that is not there."""
+        """Returns the driver, found and loaded; ConfigError or FileError for one that is not there."""
         from skidpad.campaign.driving.drivers import STACK, find_driver
 
         return find_driver(self.stack, read_stack_settings(self.stack_set), label=STACK)
@@ -117,7 +120,7 @@ def read_stack_settings(words: Iterable[str]) -> dict[str, bool | float | str | 
 
 
 def _plain_value(text: str) -> bool | float | str | None:
-    """Returns true, false, none and finite numbers in the text as values, any other text as it is."""
+    """Returns true, false, none and finite numbers in the text as values, other text as it is."""
     words = {"true": True, "false": False, "none": None}
     if text.lower() in words:
         return words[text.lower()]
@@ -142,7 +145,10 @@ class Climate(Struct, frozen=True):
     ] = None
 
     def find_weathers(self) -> list[Weather]:
-        """The weathers; `all` is the six published presets."""
+        """Returns the weathers, `all` the six published presets, with `sweep` a copy for each value.
+
+        Raises ConfigError or FileError for what is not there or out of range.
+        """
         from skidpad.campaign.cells.matrix import sweep
         from skidpad.physics.presets import MATRIX, find_weather, preset_groups
 
@@ -175,7 +181,10 @@ class Tuned(Struct, frozen=True):
     ] = None
 
     def resolve(self, run: RunSpec, **more: str | None) -> RunSpec:
-        """Returns `run` with these settings. more: settings given by name, None: not given."""
+        """Returns `run` with the profile's settings and surface; ConfigError or FileError if wrong.
+
+        more: settings given by name, None: not given.
+        """
         from msgspec import structs
 
         from skidpad.campaign.driving.surfaces import read_surface
@@ -201,7 +210,7 @@ class PlayCross(Struct, frozen=True):
     param: Annotated[tuple[str, ...], Meta(description="A parameter of the file: NAME=VALUE.")] = ()
 
     def parameters(self) -> dict[str, float | str]:
-        """Returns the values of scenario parameters by name."""
+        """Returns the values of scenario parameters by name, as text; ConfigError without "="."""
         values: dict[str, float | str] = {}
         for text in self.param:
             name, equals, value = text.partition("=")
@@ -211,7 +220,10 @@ class PlayCross(Struct, frozen=True):
         return values
 
     def frictions(self) -> tuple[list[Friction], str]:
-        """Returns the chosen frictions, with or without the weather's grip, and the model of the latter."""
+        """Returns the frictions, ORIGINAL for "none", else REDUCED, and the grip model of the latter.
+
+        The model is "none" where none is named. Raises ConfigError for two models.
+        """
         allowed = [model.value for model in GripModel]
         words = [require_choice("--grip", word.strip(), allowed) for word in self.grip.split(",")]
         models = [word for word in words if word != GripModel.NONE.value]

@@ -45,7 +45,7 @@ class CampaignOptions(Driving, frozen=True, kw_only=True):
 
     @property
     def folder(self) -> Path | None:
-        """Where an earlier part of the campaign may lie."""
+        """Returns the folder in which an earlier part of the campaign may lie."""
         return self.out
 
     def __call__(
@@ -54,9 +54,10 @@ class CampaignOptions(Driving, frozen=True, kw_only=True):
         report: Callable[[Path], object],
         parts: Mapping[str, Campaign[Any, Any, Any]] = MappingProxyType({}),
     ) -> Summary:
-        """Drive it under a progress bar and print what `report` says of its folder.
+        """Drives the campaign under a progress bar and prints what `report` says of its folder.
 
-        parts: further campaigns by the folder below its own, driven after it.
+        parts: further campaigns by the folder below its own, driven after it. Returns the summary of the
+        campaign itself.
         """
         from dataclasses import replace
 
@@ -72,7 +73,10 @@ class CampaignOptions(Driving, frozen=True, kw_only=True):
         return summary
 
     def _run(self, campaign: Campaign[Any, Any, Any], folder: Path, out: Path) -> Summary:
-        """Drive one campaign into its folder; `out` is what the user asked for."""
+        """Drives one campaign into its folder and prints warnings; returns its summary.
+
+        out: the folder that the user asked for, for the sentence after Ctrl-C.
+        """
         from skidpad.cli.output.progress import Shown, console, interruptible
 
         with self._runner(campaign) as runner, Shown(campaign) as shown, interruptible(out):
@@ -90,7 +94,10 @@ class CampaignOptions(Driving, frozen=True, kw_only=True):
 
     @contextmanager
     def _runner(self, campaign: Campaign[Any, Any, Any]) -> Iterator[Runner]:
-        """Yields the runner of the campaign: on this machine, or on the cluster where one is named."""
+        """Yields the runner of the campaign: on this machine, or on the cluster where one is named.
+
+        Raises ConfigError for a cluster with a CARLA server.
+        """
         from skidpad.campaign.workers.cluster import runner_of
         from skidpad.campaign.workers.pool import local
         from skidpad.core.errors import ConfigError
@@ -120,7 +127,7 @@ class Estimate(Struct, frozen=True, kw_only=True):
         report: Callable[[Path], object],
         parts: Mapping[str, Campaign[Any, Any, Any]] = MappingProxyType({}),
     ) -> None:
-        """Drive a few of its runs and print one sentence, and one for each part."""
+        """Drives a few runs of the campaign and prints one sentence, and one for each part."""
         del report
         self._print(campaign, "")
         for name, part in parts.items():
@@ -143,7 +150,7 @@ How = CampaignOptions | Estimate
 
 
 def next_folder(out: Path, identities: Mapping[str, dict[str, Any]]) -> Path:
-    """`out`, or the first of out-2, out-3, ... that is empty or holds these campaigns (M-18).
+    """Returns `out`, or the first of out-2, out-3, ... that is empty or holds these campaigns (M-18).
 
     identities: of each campaign, by its folder below.
     """

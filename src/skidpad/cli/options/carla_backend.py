@@ -14,7 +14,10 @@ from skidpad.roads.map_files import bundled_maps, is_made_map
 
 
 def check_backend(choice: BackendChoice) -> BackendChoice:
-    """The choice, if it can be driven on: a CARLA server that runs already must answer now."""
+    """Returns the choice, if it can be driven on; ConfigError or BackendError otherwise.
+
+    A CARLA server that is not started by us must answer now.
+    """
     BACKENDS.get(choice.backend)
     if choice.backend != BackendKind.CARLA:
         return BackendChoice(backend=choice.backend)
@@ -31,7 +34,10 @@ def check_backend(choice: BackendChoice) -> BackendChoice:
 
 
 def map_of(map: str, choice: BackendChoice) -> str:
-    """A bundled map or a file as it is; a CARLA server's own map is fetched and kept as a file."""
+    """Returns a bundled map or a file as it is; a CARLA server's own map is fetched to a file.
+
+    Raises BackendError when that fails.
+    """
     named = map in bundled_maps() or is_made_map(map) or is_file(Path(map)) or Path(map).suffix
     if choice.backend != BackendKind.CARLA or named:
         return map
@@ -51,7 +57,7 @@ def map_of(map: str, choice: BackendChoice) -> str:
 
 
 def _fetch(choice: BackendChoice, map: str, folder: Path) -> None:
-    """Fetches the map from the CARLA server into the folder; ends the command with 1 if that fails."""
+    """Fetches the map from the CARLA server into the folder; ends the process with 1 if that fails."""
     from skidpad.campaign.driving.backends import carla_options, keep_server
     from skidpad.simulation.carla.mapping import fetch_map
 
@@ -64,5 +70,5 @@ def _fetch(choice: BackendChoice, map: str, folder: Path) -> None:
 
 
 def drives_alone(choice: BackendChoice) -> bool:
-    """A CARLA server drives one run at a time."""
+    """Returns True for a CARLA server, which drives one run at a time."""
     return choice.backend == BackendKind.CARLA

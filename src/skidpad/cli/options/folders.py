@@ -11,7 +11,7 @@ TICKS = "ticks.parquet"  # recording.run.log_files.TICKS, which loads the librar
 
 
 def require_run(path: Path, *others: str) -> None:
-    """Raise FileError unless a run lies at `path`, or what one of `others` names.
+    """Raises FileError unless a run lies at `path`, or what one of `others` names.
 
     others: endings of files that the command takes as well, or names in a folder that it takes.
     """
@@ -26,7 +26,10 @@ def require_run(path: Path, *others: str) -> None:
 
 
 def require_campaigns_or_runs(*folders: Path) -> bool:
-    """Whether all folders are of runs; FileError unless they are, or all hold results of a campaign."""
+    """Returns True when all folders are of runs, False when all hold results of a campaign.
+
+    Raises FileError otherwise.
+    """
     if all((folder / TICKS).is_file() for folder in folders):
         return True
     for folder in folders:

@@ -76,7 +76,7 @@ OPTIONS = {
 
 
 def arrange_help(app: typer.Typer) -> None:
-    """Give every command of the program its panel and its example."""
+    """Sets the panel and the example of every command that COMMANDS names."""
     places = {name: (panel, text) for panel, of in COMMANDS.items() for name, text in of.items()}
     commands: list[CommandInfo | TyperInfo] = [*app.registered_commands, *app.registered_groups]
     for info in commands:

@@ -32,9 +32,9 @@ Command = Callable[..., Any]
 def spread_fields(
     kinds: Mapping[str, type[Struct]] | None = None, **defaults: Any
 ) -> Callable[[Command], Command]:
-    """Spread the command's Struct parameters into options, with these defaults over the fields'.
+    """Returns a decorator that spreads a command's Struct parameters into options.
 
-    kinds: what a parameter is, by name, whose hint leaves it open.
+    kinds: what a parameter is, by name, whose hint leaves it open. defaults: over those of fields.
     """
 
     def decorate(command: Command) -> Command:
@@ -79,7 +79,7 @@ def _describe_fields(kind: type[Struct]) -> dict[str, Described]:
 def describe_parameters(
     kind: type[Struct], defaults: dict[str, Any], panel: str | None = None
 ) -> list[inspect.Parameter]:
-    """A parameter for every field of `kind` that has a description; panel: its heading in help."""
+    """Returns a parameter for every field of `kind` that has a description; panel: heading in help."""
     return [
         inspect.Parameter(
             field.name,
@@ -92,7 +92,7 @@ def describe_parameters(
 
 
 def _format_default(default: Any, meta: Meta) -> Any:
-    """A default as typer takes it."""
+    """Returns a default as typer takes it: enums by value, tuples as a list or with commas."""
     if isinstance(default, Enum):
         return default.value
     if not isinstance(default, tuple):
@@ -101,7 +101,7 @@ def _format_default(default: Any, meta: Meta) -> Any:
 
 
 def _option(field: Described, panel: str | None) -> Any:
-    """How typer takes it: as plain as it can be, since `_read` is who judges the value."""
+    """Returns a field's annotation for typer, as plain as it can be, since `_read` checks the value."""
     name, kind, meta, _ = field
     flags = [_flag(name)] if kind is bool else []  # without a --no-...
     words = _words(kind)
@@ -120,14 +120,14 @@ def _flag(name: str) -> str:
 
 
 def _words(kind: Any) -> list[str]:
-    """The values of an enum, none of any other type."""
+    """Returns the values of an enum, [] for any other type."""
     return [m.value for m in kind] if isinstance(kind, type) and issubclass(kind, Enum) else []
 
 
 def _gathering(
     command: Command, groups: dict[str, type[Struct]], parameters: list[inspect.Parameter]
 ) -> Command:
-    """The command with these parameters, which gathers them into its Structs again."""
+    """Returns the command with these parameters, which gathers them into its Structs again."""
     fields = {name: _describe_fields(kind) for name, kind in groups.items()}
 
     def call(**values: Any) -> Any:
@@ -145,7 +145,7 @@ def _gathering(
 
 
 def _read(field: Described, value: Any) -> Any:
-    """An option's value as the field holds it; ConfigError for one that the field does not allow."""
+    """Returns an option's value as the field holds it; ConfigError for one that it does not allow."""
     name, wanted, meta, _ = field
     if wanted == tuple[str, ...]:
         words = value.split(",") if isinstance(value, str) else value

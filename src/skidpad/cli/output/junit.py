@@ -19,7 +19,7 @@ TAGS = {
 
 
 def write_junit(path: Path, suite: str, failures: Mapping[str, Sequence[str]]) -> None:
-    """Writes one case per name, with a sentence for everything that is wrong in it."""
+    """Writes a JUnit file with one case per name, and a failure for everything that is wrong in it."""
     cases = [(name, [("failure", said) for said in by]) for name, by in failures.items()]
     _write(path, suite, cases)
 
@@ -27,7 +27,10 @@ def write_junit(path: Path, suite: str, failures: Mapping[str, Sequence[str]]) -
 def write_verdicts(
     path: Path, suite: str, runs: Iterable[PlayRun], rules: Sequence[str] = ()
 ) -> None:
-    """Write one case per run and rule; rules: those of the user, else each run names its own."""
+    """Writes a JUnit file with one case per run and rule that it was judged by.
+
+    rules: those of the user, for runs that were judged by none.
+    """
     _write(path, suite, [case for run in runs for case in _cases(run, rules)])
 
 

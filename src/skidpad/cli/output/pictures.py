@@ -12,14 +12,14 @@ FORMATS = ("png", "svg", "pdf", "jpg", "webp")
 
 
 def format_of(path: Path) -> str:
-    """The format that the ending of a picture's name asks for; ConfigError for no such format."""
+    """Returns the format that the ending of a picture's name asks for; ConfigError for an unknown one."""
     return require_choice("ending of a picture", path.suffix.removeprefix(".").lower(), FORMATS)
 
 
 def write_picture(path: Path, draw: Callable[[Path, str], None]) -> None:
-    """Let `draw` write the file it is given, in the format it is given, and put it in place.
+    """Calls `draw` with a file and a format and puts the file in place at `path`.
 
-    The folder must be there: a picture is no reason to make one.
+    OutputError where the folder is missing: a picture is no reason to make one.
     """
     kind = format_of(path)
     if not path.parent.is_dir():

@@ -21,7 +21,10 @@ console = Console(stderr=True)
 
 @contextmanager
 def interruptible(out: Path) -> Iterator[None]:
-    """Let Ctrl-C end the command with code 130 and the way to go on; `out` is what the user asked for."""
+    """Lets Ctrl-C end the command with code 130 and a sentence on how to go on.
+
+    out: the folder that the user asked for.
+    """
     try:
         yield
     except KeyboardInterrupt:
@@ -30,7 +33,7 @@ def interruptible(out: Path) -> Iterator[None]:
 
 
 class Shown(Progress):
-    """A progress bar that is told of each run."""
+    """Shows a progress bar of a campaign, and a line when a cell is done or looked at."""
 
     def __init__(self, campaign: Campaign[Any, Any, Any]) -> None:
         super().__init__(
@@ -47,11 +50,11 @@ class Shown(Progress):
         self.bar = self.add_task("driving", total=len(campaign.tasks))
 
     def planned_runs(self, total: int) -> None:
-        """The number of runs, once it is known that some need not be driven."""
+        """Sets the number of runs, once it is known that some need not be driven."""
         self.update(self.bar, total=total)
 
     def note_end(self, entry: Entry[Any, Any]) -> None:
-        """Adds a run that has ended to the bars and the lines."""
+        """Adds a run that has ended to the bar; prints a line when its cell is done or looked at."""
         cell = cell_of(entry.run)
         runs = self.runs[cell]
         runs.append(entry)

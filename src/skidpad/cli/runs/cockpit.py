@@ -109,7 +109,10 @@ def drive(
 
 
 def require_place(spec: RunSpec) -> None:
-    """Refuse a file or map that cannot be driven, before a page is opened; a server has its own."""
+    """Raises an error for a file or map that cannot be driven, before a page is opened.
+
+    A CARLA server's map is not checked.
+    """
     from skidpad.campaign.driving.run_setup import load_scenario
     from skidpad.campaign.user_files import road_file
     from skidpad.roads.bundled import load_map
@@ -121,7 +124,10 @@ def require_place(spec: RunSpec) -> None:
 
 
 def with_reserve(roads: Roads, backend: BackendChoice, more: int | None) -> Roads:
-    """The course with vehicles to call in; a CARLA server is asked for none."""
+    """Returns the course with `more` vehicles to call in, None: up to RESERVE; none on a CARLA server.
+
+    Raises ConfigError for more than fit, or any on a CARLA server.
+    """
     room = VEHICLES_MAX - roads.vehicles
     if more is not None and more > room:
         raise ConfigError(
@@ -231,7 +237,7 @@ def place_of(pages: Pages) -> Place:
 
 
 def next_free(folder: Path) -> Path:
-    """`folder`, or the first of folder-2, folder-3, ... where nothing is yet."""
+    """Returns `folder`, or the first of folder-2, folder-3, ... where nothing is yet."""
     from itertools import count
 
     names = (folder if n == 1 else folder.with_name(f"{folder.name}-{n}") for n in count(1))

@@ -110,7 +110,7 @@ class Gate(NamedTuple):
 
 
 def _read_rules(texts: list[str]) -> list[Rule]:
-    """The rules; one that cannot be read is said before the tests load."""
+    """Returns the rules of these texts; one that cannot be read is refused before the tests load."""
     from skidpad.evidence.comparisons import parse_comparison
     from skidpad.recording.campaign.matrix import Metrics
     from skidpad.recording.campaign.results import definitions_of
@@ -123,7 +123,7 @@ def _read_rules(texts: list[str]) -> list[Rule]:
 
 
 def _compare(a: Path, b: Path, rules: list[Rule], gate: Gate) -> dict[str, list[str]]:
-    """Print what changed and what the rules say of it; returns what fails, by rule."""
+    """Prints what changed and what the rules say of it; returns what fails, by rule and flaw of data."""
     from skidpad.evidence.compare import compare_campaigns, flaws, judge_rules
     from skidpad.recording.campaign.matrix import MATRIX
     from skidpad.recording.campaign.results import read_results
@@ -148,7 +148,7 @@ def _compare(a: Path, b: Path, rules: list[Rule], gate: Gate) -> dict[str, list[
 
 
 def _places(results: pl.DataFrame) -> set[str]:
-    """Fingerprints of the rows; none where some row has none."""
+    """Returns the machines' fingerprints of the rows; empty where some row has none."""
     from skidpad.recording.campaign.results import FINGERPRINT
 
     if FINGERPRINT not in results.columns or results[FINGERPRINT].has_nulls():
@@ -157,7 +157,7 @@ def _places(results: pl.DataFrame) -> set[str]:
 
 
 def _against(rule: Rule, judged: list[RuleJudgement], undecided: Undecided) -> list[RuleJudgement]:
-    """The judgements for which a rule fails the gate."""
+    """Returns the judgements for which a rule fails the gate: fired, or undecided if that fails."""
     from skidpad.evidence.compare import Answer
 
     bad = {Answer.FIRED} | ({Answer.UNDECIDED} if undecided is Undecided.fail else set())
@@ -173,7 +173,7 @@ def _say(rule: Rule, judged: list[RuleJudgement], undecided: Undecided) -> None:
 
 
 def _print(changes: list[Change]) -> None:
-    """The table of all changes; what so few seeds cannot tell stands once below it."""
+    """Prints the table of all changes; what so few seeds cannot tell stands once below it."""
     from rich.table import Table
 
     from skidpad.cli.output.tables import table_console

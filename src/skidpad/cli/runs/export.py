@@ -62,7 +62,7 @@ def export(
 
 
 def _environment(run: Path) -> Environment | None:
-    """Weather and road of the run, where its description is there."""
+    """Returns the weather of the run for a file; None where its description is not there."""
     from skidpad.campaign.driving.outdoors import environment_of
     from skidpad.campaign.runs.stored import read_run
     from skidpad.core.errors import InputError
@@ -74,7 +74,7 @@ def _environment(run: Path) -> Environment | None:
 
 
 def _world(run: Path, log: RunLog) -> World:
-    """Projection, lights and rain of the run, as far as road and description are there."""
+    """Returns projection, lights and rain of the run, as far as road and description are there."""
     from skidpad.campaign.runs.road import road_files
     from skidpad.campaign.runs.stored import read_run
     from skidpad.core.errors import InputError

@@ -60,7 +60,7 @@ def rerun(
 
 
 def require_backend(run: Path, name: str) -> None:
-    """ConfigError where a run's backend is of a package that is not installed."""
+    """Raises ConfigError where a run's backend is of a package that is not installed."""
     from skidpad.core.errors import ConfigError
     from skidpad.core.simulator import BACKENDS
 

@@ -68,7 +68,7 @@ def shadow(
 
 
 def channel_lines(recording: Path, channel: str | None) -> list[str]:
-    """What the channels of a recording that did not drive had planned to brake for."""
+    """Returns lines on how the plans of channels differ from the driving one's; None: of each channel."""
     from skidpad.core.errors import require_choice
     from skidpad.evidence.channels.shadow import plans_of
     from skidpad.evidence.shadow import partings, share_apart
@@ -87,13 +87,16 @@ def channel_lines(recording: Path, channel: str | None) -> list[str]:
 
 
 def lines(found: Shadowed, driver: str, shadow: str) -> list[str]:
-    """What both did, first before contacts, then in order of time."""
+    """Returns lines on what both did, first before contacts, then in order of time."""
     head, *rest = story(driver, shadow, found.share_apart, found.partings)
     return [head, *(_before(event, driver, shadow) for event in found.contacts), *rest]
 
 
 def story(driver: str, shadow: str, share: float, partings: Sequence[Parting]) -> list[str]:
-    """How long one braked without the other, and the first stretches of it."""
+    """Returns lines on how long one braked without the other, and the first MOST stretches of it.
+
+    share: of time, 0 to 1.
+    """
     alone = f"one braked without the other {100.0 * share:.1f} % of the time"
     told = [f"{shadow} in the shadow of {driver}: {alone}"]
     for one in partings[:MOST]:
@@ -111,7 +114,7 @@ def _before(event: Foresight, driver: str, shadow: str) -> str:
 
 
 def _ahead(seconds: float | None) -> str:
-    """Returns how many s before the contact it braked; None: not at all."""
+    """Returns how many s before the contact it braked, as words; None: not at all."""
     if seconds is None:
         return "did not brake"
     return f"braked {'at least ' if seconds > LONGEST else ''}{seconds:.2f} s before"

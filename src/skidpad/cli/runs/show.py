@@ -34,13 +34,16 @@ from skidpad.roads.queries import RoadMap
 
 
 def open_run(run: Path) -> tuple[RunLog, RoadMap]:
-    """The log of a run's folder, and the map that it was driven on."""
+    """Returns the log of a run's folder, and the map that it was driven on, or today's of that name."""
     log = read_log(run)
     return log, load_road(run, log.header)
 
 
 def compare_runs(a: Path, b: Path) -> None:
-    """Print the metrics of two runs, of a campaign or driven by hand, and B - A."""
+    """Prints the metrics of two runs, of a campaign or driven by hand, and B - A.
+
+    Raises FileError where the map has changed since.
+    """
     found = []
     for run in (a, b):
         log, road_map = open_run(run)
@@ -58,7 +61,7 @@ def compare_runs(a: Path, b: Path) -> None:
 
 
 def show(run: Path) -> None:
-    """Prints a run's log as tables."""
+    """Prints a run: metrics, crashes, contacts, readings, and tyre friction of each vehicle."""
     log, road_map = open_run(run)
     console = table_console()
     console.print(f"[bold]{run.name}[/] on {log.header.map}, {len(log) * log.header.dt:g} s")
@@ -106,7 +109,7 @@ def show(run: Path) -> None:
 
 
 def show_readings(run: Path) -> None:
-    """Print mean, least and largest value of what the stack's further sensors recorded."""
+    """Prints mean, least and largest value of recorded further sensors; nothing without any."""
     readings = read_readings(run)
     if readings is None:
         return
@@ -119,9 +122,9 @@ def show_readings(run: Path) -> None:
 
 
 def vehicle_grips(run: Path, log: RunLog) -> list[tuple[str, ...]]:
-    """What the weather left of each vehicle's tyre friction: own, ratio, result, weather (B-068).
+    """Returns name, type, own friction, ratio, result and weather of each vehicle as text (B-068).
 
-    Nothing where the folder does not describe its run, or a CARLA server drove it, whose log says it.
+    Empty where the folder does not describe its run, or a CARLA server drove it, whose log says it.
     """
     if not (run / CONFIG).is_file():
         return []

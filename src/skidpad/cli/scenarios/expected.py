@@ -24,14 +24,17 @@ class Expected(Struct, frozen=True):
     junit: Annotated[Path | None, Meta(description="Write all verdicts as JUnit XML.")] = None
 
     def check(self) -> None:
-        """Raise ConfigError for a rule that cannot be read, before anything is driven."""
+        """Raises ConfigError for a rule that cannot be read, before anything is driven."""
         from skidpad.evidence.expectations import parse_expectation
 
         for text in self.expect:
             parse_expectation(text)
 
     def conclude(self, out: Path, left_out: Sequence[LeftOut] = ()) -> tuple[Played, str]:
-        """Judge the runs of a folder, write page, results.csv and JUnit; returns also what to print."""
+        """Judges the runs of a folder, writes page, results.csv and JUnit; returns runs and text to print.
+
+        left_out: files that could not be played, which count as errors.
+        """
         from skidpad.recording.run.staging import Judging, write_judging
 
         write_judging(out, Judging(expect=self.expect, left_out=tuple(left_out)))
@@ -44,7 +47,7 @@ class Expected(Struct, frozen=True):
 
 
 def write_played_page(out: Path) -> tuple[Played, str]:
-    """Write the page of a folder that `play` wrote; returns its runs and the text to print."""
+    """Writes the page of a folder that `play` wrote; returns its runs and the text to print."""
     from skidpad.cli.scenarios.played_table import played_text
     from skidpad.report.play.page import write_play_report
 
@@ -53,11 +56,11 @@ def write_played_page(out: Path) -> tuple[Played, str]:
 
 
 def played_report(out: Path) -> str:
-    """Write the page again, for `skidpad report`; returns the text to print."""
+    """Writes the page again, for `skidpad report`; returns the text to print."""
     return write_played_page(out)[1]
 
 
 def exit_by_verdicts(played: Played) -> None:
-    """End with exit code 1 where a run is failed, void or in error."""
+    """Ends the command with exit code 1 where a run is failed, void or in error; else nothing."""
     if played.bad:
         raise typer.Exit(1)

@@ -104,7 +104,7 @@ def _drive_all(
     seeds: int,
     expected: Expected,
 ) -> None:
-    """Drive the campaign of a folder; its end says what became of its runs."""
+    """Drives the campaign of a folder, prints its verdicts, and exits with 1 for a bad one."""
     left_out: list[LeftOut] = []
     campaign = _campaign(template, cross, file, seeds, left_out)
     ends: list[Played] = []
@@ -126,7 +126,7 @@ def play_template(
     tuned: Tuned,
     backend: BackendChoice,
 ) -> RunSpec:
-    """Return the run that the options describe; file, weather and seed are chosen by `play_runs`."""
+    """Returns the run that the options describe; `play_runs` chooses file, weather and seed."""
     from skidpad.cli.options.carla_backend import check_backend
     from skidpad.physics.presets import find_weather
 
@@ -142,7 +142,7 @@ def play_template(
 def _campaign(
     template: RunSpec, cross: PlayCross, folder: Path, seeds: int, left_out: list[LeftOut]
 ) -> Campaign[RunSpec, GripKey, GripMetrics]:
-    """Returns the campaign of all files that can be played; the others are added to `left_out`."""
+    """Returns the campaign of all files that can be played; adds the others to `left_out`."""
     from skidpad.campaign.campaign import Campaign
     from skidpad.campaign.recipes.files import RECIPE, scenario_files
     from skidpad.cli.options.carla_backend import drives_alone
@@ -163,7 +163,10 @@ def play_runs(
     seeds: int,
     below: Path | None = None,
 ) -> list[RunSpec]:
-    """Return the runs of files in every weather, grip and seed that is asked for."""
+    """Returns the runs of files in every weather, grip and seed that is asked for.
+
+    below: the folder by which files are named where two have the same name.
+    """
     from skidpad.campaign.recipes.files import runs_of
     from skidpad.physics.presets import find_weather
 
@@ -174,7 +177,7 @@ def play_runs(
 
 
 def _hindrance(file: Path, template: RunSpec) -> str:
-    """Return what keeps a file from being played, "" where nothing does; prints it."""
+    """Returns what keeps a file from being played, and prints it; "" where nothing does."""
     from skidpad.campaign.cells.grip import scenario_of
     from skidpad.campaign.driving.run_setup import load_scenario
     from skidpad.campaign.recipes.files import courses_of
@@ -190,7 +193,7 @@ def _hindrance(file: Path, template: RunSpec) -> str:
 
 
 def _check(path: Path, course: Scenario) -> None:
-    """Say of a file, or of each in a folder, everything that is wrong or unknown in it."""
+    """Prints of a file, or of each in a folder, all that is wrong or unknown; exits with 2 if any is."""
     from skidpad.campaign.recipes.files import scenario_files
 
     files = scenario_files(path) if path.is_dir() else [path]
@@ -200,7 +203,7 @@ def _check(path: Path, course: Scenario) -> None:
 
 
 def _is_clean(file: Path, course: Scenario) -> bool:
-    """Prints all that is found in a file or its choices; returns whether everything can be played."""
+    """Prints all that is found in a file or its choices; returns True when all can be played."""
     from skidpad.campaign.driving.run_setup import check_scenario
     from skidpad.campaign.recipes.files import courses_of
     from skidpad.core.errors import FileError

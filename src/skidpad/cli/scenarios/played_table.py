@@ -20,7 +20,7 @@ ROWS, REASONS = 60, 10  # shown at most
 
 
 def played_text(played: Played, page: Path) -> str:
-    """Return the text for the terminal."""
+    """Returns the text for the terminal: table, reasons, criterion, answer and next command."""
     runs = in_order(played.runs)
     lines = [_line(HEADS), _line(UNITS), *(_line(_cells(run)) for run in runs[:ROWS])]
     if len(runs) > ROWS:
@@ -32,14 +32,14 @@ def played_text(played: Played, page: Path) -> str:
 
 
 def _line(cells: Sequence[str]) -> str:
-    """Return a row of the table as text, names fitted and numbers to the right."""
+    """Returns a row of the table as text, names fitted and numbers to the right."""
     names = [_pad_text(cell, width) for cell, width in zip(cells[:3], WIDTHS, strict=False)]
     numbers = [f"{cell:>{width}}" for cell, width in zip(cells[3:], WIDTHS[3:], strict=True)]
     return " ".join([*names, *numbers]).rstrip()
 
 
 def _pad_text(text: str, width: int) -> str:
-    """Pad to the width; what is too long loses its middle, as names differ at their ends."""
+    """Returns text padded to the width; what is too long loses its middle, as names differ at their ends."""
     if len(text) > width:
         half = (width - 2) // 2
         text = f"{text[: width - 2 - half]}..{text[-half:]}"
@@ -47,7 +47,7 @@ def _pad_text(text: str, width: int) -> str:
 
 
 def _cells(run: PlayRun) -> list[str]:
-    """Return the cells of a run: scenario, weather, verdict, gap in m, TTC in s, m/s², km/h."""
+    """Returns the cells of a run: scenario, weather, verdict, gap in m, TTC in s, m/s², km/h."""
     hit = None if run.contact is None else kmh_from_mps(run.contact[2])
     numbers = [
         (run.least("min_gap_m"), ".1f"),
@@ -61,12 +61,12 @@ def _cells(run: PlayRun) -> list[str]:
 
 
 def _number(value: float, spec: str) -> str:
-    """Return a number in the format, ">BIG" from BIG on."""
+    """Returns a number in the format, ">BIG" from BIG on."""
     return format(value, spec) if value < BIG else f">{BIG}"
 
 
 def _reasons(runs: Sequence[PlayRun]) -> list[str]:
-    """Return the reasons of the first REASONS runs that have any, and how many more have."""
+    """Returns the reasons of the first REASONS runs that have any, and how many more have."""
     told = [
         f"{run.verdict.value}: {run.scenario}: {'; '.join(run.judged.reasons)}"
         for run in runs
@@ -77,7 +77,7 @@ def _reasons(runs: Sequence[PlayRun]) -> list[str]:
 
 
 def _next_command(runs: Sequence[PlayRun]) -> str:
-    """Return what shows most of the worst run."""
+    """Returns the command that shows most of the worst run; "" where no run has a folder."""
     first = next((run for run in runs if run.folder is not None), None)
     if first is None:
         return ""

@@ -114,7 +114,10 @@ def search(
 
 
 def _tell_monitor(out: Path, folder: Path, id: str) -> None:
-    """Add what was found to the page of the hazard, where the monitor's folder has one."""
+    """Adds what was found to the records and the page of the hazard in a monitor's folder.
+
+    id: of the hazard. Without a summary there, no page is written.
+    """
     from skidpad.recording.campaign.searches import read_hazard
     from skidpad.recording.channels.monitored import SUMMARY
     from skidpad.recording.hazards.searched import add_search
@@ -131,7 +134,10 @@ def _tell_monitor(out: Path, folder: Path, id: str) -> None:
 def _drive(
     found: Search, how: Batches, known: Sequence[Trial], scene: Scene | None, *, has_exposure: bool
 ) -> None:
-    """Searches on from the known trials, with progress shown, and writes the findings."""
+    """Searches on from the known trials, with progress shown, and writes the findings.
+
+    scene: of a hazard, which is judged as well; None: of no hazard.
+    """
     from skidpad.search.failures import look_at_failures, write_findings, write_hazard
     from skidpad.search.loop import search as drive_search
 

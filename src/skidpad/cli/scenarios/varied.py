@@ -50,7 +50,7 @@ class Batches(Struct, frozen=True, kw_only=True):
 
     @contextmanager
     def drive(self) -> Iterator[tuple[Runner, Progress]]:
-        """Yield what drives batches, and a bar that is shown in a terminal; Ctrl-C says how to go on."""
+        """Yields a runner of batches, and a bar that is shown in a terminal; Ctrl-C says how to go on."""
         from rich.progress import Progress
 
         from skidpad.campaign.workers import cluster
@@ -74,7 +74,7 @@ def vary_scenario(
     scenario: Scenario,
     tuned: Tuned,
 ) -> tuple[RunSpec, Space]:
-    """Return the run that a scenario makes with these options, and what varies in it.
+    """Returns the run that a scenario makes with these options, and what varies in it.
 
     `--vary` comes over `below`, and that over what a file of distributions says.
 
@@ -96,7 +96,10 @@ def vary_scenario(
 
 
 def _read_varied(file: Path) -> tuple[Path, tuple[Variable, ...]]:
-    """Return the scenario that a file is or names, and what the file itself says that varies."""
+    """Returns the scenario that a file is or names, and what the file itself says that varies.
+
+    Raises FileError for a folder.
+    """
     from skidpad.core.errors import FileError
     from skidpad.scenarios.reading.distributions import is_distribution
     from skidpad.scenarios.shipped import find_scenario
@@ -119,7 +122,7 @@ def _template(
     scenario: Scenario,
     tuned: Tuned,
 ) -> RunSpec:
-    """Return the one run that a search varies; raises ConfigError for several weathers or grips."""
+    """Returns the one run that a search varies; raises ConfigError for several weathers or grips."""
     from skidpad.cli.scenarios.play import play_runs, play_template
     from skidpad.core.errors import ConfigError
 
@@ -133,7 +136,7 @@ def _template(
 
 
 def _require_parameters(template: RunSpec, space: Space) -> None:
-    """Raise FileError where the file declares no parameter of a name that varies."""
+    """Raises FileError where the file cannot be played or declares no parameter of a varied name."""
     from skidpad.campaign.cells.grip import scenario_of
     from skidpad.campaign.driving.run_setup import load_scenario
     from skidpad.search.space import apply_values

@@ -17,7 +17,7 @@ class Hub:
         self._lock = Lock()
 
     def tell(self, topic: str) -> None:
-        """Counts one more event of a topic and wakes its listeners."""
+        """Counts one more event of a topic, which waiting listeners see within STEP_S s."""
         with self._lock:
             self._counts[topic] += 1
 

@@ -85,7 +85,7 @@ class Alert:
 
     @property
     def is_closed(self) -> bool:
-        """Whether a person has closed the alert."""
+        """Returns True when a person has closed the alert."""
         return any(e.what == What.CLOSED.value for e in self.events)
 
     @property
@@ -149,7 +149,7 @@ def keep_alert(
 
 
 def alert_of(connection: Connection, who: Principal, alert: str) -> Alert:
-    """One alert; Refused (404) when there is none that `who` may see."""
+    """Returns one alert; Refused (404) when there is none that `who` may see."""
     row = connection.execute(
         select(alerts).where(alerts.c.id == alert, visible(who, alerts))
     ).first()
@@ -159,13 +159,13 @@ def alert_of(connection: Connection, who: Principal, alert: str) -> Alert:
 
 
 def newest_alerts(connection: Connection, who: Principal) -> list[Alert]:
-    """The newest alerts that `who` may see, at most a page of them."""
+    """Returns the newest alerts that `who` may see, at most PAGE."""
     query = select(alerts).where(visible(who, alerts)).order_by(alerts.c.at.desc(), alerts.c.id)
     return _with_events(connection, connection.execute(query.limit(PAGE)).all())
 
 
 def alerts_since(connection: Connection, at: float) -> list[Alert]:
-    """All alerts since `at` (s), oldest first; for the service itself."""
+    """Returns all alerts of all tenants since `at` s, oldest first; for the service itself."""
     query = select(alerts).where(alerts.c.at >= at).order_by(alerts.c.at, alerts.c.id)
     return _with_events(connection, connection.execute(query).all())
 

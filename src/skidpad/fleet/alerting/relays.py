@@ -27,7 +27,7 @@ class Relay(Protocol):
         """Returns True when it takes alerts of that operator."""
 
     def send(self, alert: dict[str, Any]) -> None:
-        """Relay one alert; BackendError when it was not taken."""
+        """Relays one alert; BackendError when it was not taken."""
 
 
 class Webhook:
@@ -49,7 +49,7 @@ class Webhook:
         self.name = f"webhook {host} {digest(url.encode())[:8]}"  # a host may have several
 
     def wants(self, operator: str) -> bool:
-        """Whether an operator's alerts go this way: its own operator's only."""
+        """Returns True for the alerts of its own operator only."""
         return operator == self.operator
 
     def send(self, alert: dict[str, Any]) -> None:

@@ -89,7 +89,7 @@ def close(request: Request, who: Answerer, alert: str) -> dict[str, Any]:
 
 
 def keep_answer(fleet: Fleet, who: Principal, alert: str, what: What) -> dict[str, Any]:
-    """Keep an answer to an alert and tell whoever waits; the alert as it is now."""
+    """Keeps an answer to an alert, wakes pages and relays, and returns the alert as it is now."""
     with fleet.engine.begin() as connection:
         answer(connection, alert_of(connection, who, alert), what, who, fleet.clock())
     with fleet.engine.connect() as connection:
@@ -101,7 +101,7 @@ def keep_answer(fleet: Fleet, who: Principal, alert: str, what: What) -> dict[st
 
 @router.post("/{alert}/order/{to}")
 def order(request: Request, who: Teleoperator, alert: str, to: Order, key: Key) -> dict[str, Any]:
-    """Order the vehicle to stop, slow down or go on; void unless it is fetched within 2 s."""
+    """Orders the vehicle to stop, slow down or go on; void unless it is fetched within 2 s."""
     return keep_order(fleet_of(request), who, alert, (to, key))
 
 

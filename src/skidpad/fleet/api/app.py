@@ -35,21 +35,21 @@ ROUTES = [route for router in ROUTERS for route in router.routes]
 
 
 def make_app(fleet: Fleet) -> FastAPI:
-    """The HTTP interface of `fleet` alone; `DESCRIPTION` is where it is described."""
+    """Returns the HTTP interface of `fleet` alone; it is described at DESCRIPTION."""
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     add_api(app, fleet)
     return app
 
 
 def add_api(app: FastAPI, fleet: Fleet) -> None:
-    """Add the interface below /api/v1 to an application."""
+    """Adds the interface below /api/v1 to an application."""
     app.state.fleet, app.state.guard = fleet, Guard(fleet)
     for router in ROUTERS:
         app.include_router(router)
 
     @app.get(DESCRIPTION, include_in_schema=False)
     def description() -> dict[str, Any]:
-        """What can be asked, as OpenAPI; it holds no record and needs no credential."""
+        """Answers with the interface as OpenAPI; it holds no record and needs no credential."""
         return get_openapi(title="Skidpad fleet", version=skidpad.__version__, routes=ROUTES)
 
     app.add_exception_handler(Refused, _answer_refusal)

@@ -109,7 +109,7 @@ async def evaluate(request: Request, who: Changer, change: str) -> list[dict[str
 
 @router.get("/update-list", response_class=Response)
 def update_list(request: Request, who: Changer) -> Response:
-    """The current list of updates, to be extended and signed off line."""
+    """Answers with the current list of updates, to be extended and signed off line."""
     content = fleet_of(request).repository(who.tenant).targets()
     return Response(content, media_type="application/json")
 
@@ -126,7 +126,7 @@ async def new_release(request: Request, who: Changer) -> dict[str, str]:
 
 @router.get("/releases")
 def list_releases(request: Request, who: Reader) -> list[dict[str, Any]]:
-    """All releases of one's own, oldest first."""
+    """Answers with all releases of one's own, oldest first."""
     with fleet_of(request).engine.connect() as connection:
         return [one.plain() for one in rollouts(connection, who.tenant)]
 

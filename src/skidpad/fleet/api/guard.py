@@ -66,6 +66,6 @@ class Needs:
 
 
 def fleet_of(request: Request) -> Fleet:
-    """The fleet that a request is answered from."""
+    """Returns the fleet that a request is answered from."""
     fleet: Fleet = request.app.state.fleet
     return fleet

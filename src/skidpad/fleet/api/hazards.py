@@ -33,7 +33,7 @@ def list_hazards(
     since: Seconds = None,
     before: Seconds = None,
 ) -> list[dict[str, Any]]:
-    """The newest hazards of own vehicles, at most 200; `before` pages on."""
+    """Answers with the newest hazards of own vehicles, at most 200; `before` pages on."""
     with fleet_of(request).engine.connect() as connection:
         return hazard_rows(connection, who, Wanted(type, vehicle, since, before))
 
@@ -56,7 +56,7 @@ def record(request: Request, who: Reader, hazard: str) -> str:
 
 @router.post("/{hazard}/scenario", response_class=Response)
 def scenario(request: Request, who: Exporting, hazard: str) -> Response:
-    """OpenSCENARIO and OpenDRIVE of a hazard as .zip; that it was asked for is kept."""
+    """Answers with OpenSCENARIO and OpenDRIVE of a hazard as .zip, and keeps that it was asked for."""
     content = export_scenario(fleet_of(request), who, hazard)
     name = f"attachment; filename={hazard}.zip"
     return Response(content, media_type="application/zip", headers={"Content-Disposition": name})
@@ -80,7 +80,7 @@ def export_scenario(fleet: Fleet, who: Principal, hazard: str) -> bytes:
 
 
 def _zip_files(files: tuple[Path, Path]) -> bytes:
-    """Return a .zip of the files under their names, compressed and with one fixed date."""
+    """Returns a .zip of the files under their names, compressed and with one fixed date."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for file in files:

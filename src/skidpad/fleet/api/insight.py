@@ -43,14 +43,14 @@ def read_places(request: Request, who: PlaceReader) -> list[dict[str, Any]]:
 
 @router.get("/places.html", response_class=HTMLResponse)
 def places_page(request: Request, who: PlaceReader) -> str:
-    """The report of places as a page."""
+    """Answers with the report of places as an HTML page."""
     with fleet_of(request).engine.connect() as connection:
         return by_place.html(by_place.places(connection, who))
 
 
 @router.get("/places.pdf", response_class=Response)
 def places_pdf(request: Request, who: PlaceReader) -> Response:
-    """The report of places as PDF."""
+    """Answers with the report of places as PDF."""
     with fleet_of(request).engine.connect() as connection:
         rows = by_place.places(connection, who)
     return Response(by_place.pdf(rows), media_type="application/pdf")
@@ -65,7 +65,7 @@ def research(request: Request, who: Researcher) -> list[dict[str, Any]]:
 
 @router.get("/safety-case")
 def case(request: Request, who: CaseReader) -> list[dict[str, Any]]:
-    """The safety case with current evidence."""
+    """Answers with the safety case and its current evidence."""
     return [asdict(claim) for claim in claims(trends(fleet_of(request), who))]
 
 

@@ -29,13 +29,13 @@ def start_analysis(request: Request, who: Analyst) -> dict[str, Any]:
 
 @router.get("/clusters")
 def list_clusters(request: Request, who: Reader) -> list[dict[str, Any]]:
-    """The clusters of the newest analysis, largest first."""
+    """Answers with the clusters of the newest analysis, largest first; empty before one."""
     with fleet_of(request).engine.connect() as connection:
         return newest_clusters(connection, who)
 
 
 @router.get("/clusters/{cluster}")
 def one_cluster(request: Request, who: Reader, cluster: str) -> dict[str, Any]:
-    """One cluster with its members; the representative's record and scenario are the hazard's."""
+    """Answers with one cluster and its members; record and scenario are the representative's."""
     with fleet_of(request).engine.connect() as connection:
         return cluster_row(connection, who, cluster)

@@ -36,19 +36,19 @@ class TriageText(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def work_list(fleet: Fleet, who: Principal, wanted: WorkFilter) -> list[Work]:
-    """Return the recurring hazards of the newest analysis, ranked."""
+    """Returns the recurring hazards of the newest analysis, ranked."""
     with fleet.engine.connect() as connection:
         return rank_work(connection, who, newest_clusters(connection, who), wanted, fleet.locate)
 
 
 def require_subject(fleet: Fleet, who: Principal, subject: str) -> None:
-    """Raise Refused (404) when no recurring hazard of that id is visible to `who`."""
+    """Raises Refused (404) when no recurring hazard of that id is visible to `who`."""
     if subject not in {one.subject for one in work_list(fleet, who, WorkFilter())}:
         raise absent()
 
 
 def triage(fleet: Fleet, who: Principal, subject: str, text: TriageText) -> dict[str, Any]:
-    """Set the state of a recurring hazard; Refused (404) unless it is visible."""
+    """Sets the state of a recurring hazard; Refused: 404 unless it is visible, 422 for a wrong state."""
     require_subject(fleet, who, subject)
     standing = Standing(text.state, text.owner, text.release, fleet.clock(), who.id)
     with fleet.engine.begin() as connection:
@@ -71,7 +71,7 @@ def list_work(
     since: Seconds = None,
     before: Seconds = None,
 ) -> list[dict[str, Any]]:
-    """The recurring hazards of the newest analysis, most likely true risk first."""
+    """Answers with the recurring hazards of the newest analysis, most likely true risk first."""
     wanted = WorkFilter(
         state=state, owner=owner, map=map, weather=weather, release=release,
         severity=severity, road=road, since=since, before=before,
@@ -102,7 +102,7 @@ def list_events(request: Request, who: Reader, subject: str) -> list[dict[str, A
 
 
 def _plain(one: Work) -> dict[str, Any]:
-    """Return an entry of the work list as plain data; None where place or precision is unknown."""
+    """Returns an entry of the work list as plain data; None where place or precision is unknown."""
     risk, precision = one.mean_risk, one.precision
     return {
         "subject": one.subject,

@@ -24,7 +24,7 @@ def _repository(request: Request, who: Principal) -> Repository:
 
 @router.get("/assignment")
 def what_to_run(request: Request, who: Receiving) -> dict[str, str]:
-    """Answers with the release and payload that this vehicle is to run, "" for its standing one."""
+    """Answers with the payload that this vehicle is to run and its release, "" for what stands."""
     fleet, vehicle = fleet_of(request), str(who.vehicle)
     with fleet.engine.connect() as connection:
         return assignment(connection, owners_of(fleet, vehicle)[1], vehicle)

@@ -26,7 +26,7 @@ router = APIRouter(prefix="/api/v1", tags=["vehicle"])
 
 @router.get("/vehicle")
 async def who_i_am(who: Receiving) -> dict[str, str]:
-    """The vehicle of this credential, as orders name it."""
+    """Answers with the vehicle of this credential, as orders name it."""
     return {"vehicle": str(who.vehicle)}
 
 

@@ -21,7 +21,7 @@ class Precision(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def share(self) -> float:
-        """Share of the alarms that were true, 0 to 1."""
+        """Returns the share of the alarms that were true, 0 to 1."""
         return self.true / (self.true + self.false)
 
     def describe(self) -> str:

@@ -41,14 +41,14 @@ class Standing:
 
 
 def subject_key(who: Principal, subject: str) -> str:
-    """Return the subject of events: each organisation triages for itself, as a maker or as an operator."""
+    """Returns the subject of events, which has organisation and role in it: each triages for itself."""
     return f"{who.tenant} {who.role.value} {subject}"
 
 
 def read_standings(
     connection: Connection, who: Principal, subjects: Iterable[str]
 ) -> dict[str, Standing]:
-    """Return the standing of each subject that has events of this organisation; the others are new."""
+    """Returns the standing of each subject that has events of this organisation; others are new."""
     by_key, found = {subject_key(who, s): s for s in subjects}, {}
     keys = list(by_key)
     for start in range(0, len(keys), CHUNK):
@@ -63,7 +63,7 @@ def read_standings(
 def set_standing(
     connection: Connection, who: Principal, subject: str, standing: Standing, note: str = ""
 ) -> None:
-    """Keep a new standing of a recurring hazard as an event at `standing.at`.
+    """Keeps a new standing of a recurring hazard as an event at `standing.at`, which must be set.
 
     Raises:
         Refused: 422 for a state that only alarms can cause, a fix without its release, an open
@@ -97,6 +97,6 @@ def reopen(
 def _record_standing(
     connection: Connection, key: str, standing: Standing, by: tuple[str, float], note: str
 ) -> None:
-    """Add an event with a recurring hazard's new state, owner, release and note."""
+    """Adds an event with a recurring hazard's new state, owner, release and note."""
     detail = {"owner": standing.owner, "release": standing.release, "note": note}
     add_event(connection, (KIND, key), standing.state.value, by, **detail)

@@ -72,7 +72,7 @@ def work_of(fleet: Fleet, who: Principal, request: Request) -> WorkPage:
 
 
 def _words(values: Any) -> list[str]:
-    """Return the different values that are not empty, sorted."""
+    """Returns the different values that are not empty, sorted."""
     return sorted({v for v in values if v})
 
 
@@ -102,7 +102,7 @@ def _navigate(ui: Any, chosen: dict[str, str], name: str) -> Callable[[Any], Non
 
 
 def _card(ui: Any, found: WorkPage, rank: int, one: Work) -> None:
-    """Add the card of a recurring hazard to the page, with what the principal may do."""
+    """Adds the card of a recurring hazard to the page, with what the principal may do."""
     with ui.element("div").classes("card"):
         ui.label(f"{rank}. {work_title(one)}")
         ui.label(work_text(one)).classes("dim")
@@ -131,7 +131,7 @@ def _export(ui: Any, found: WorkPage, hazard: str) -> Callable[[], Any]:
 
 
 def _triage(ui: Any, found: WorkPage, one: Work) -> None:
-    """Add the fields for state, owner and release of a recurring hazard to the page."""
+    """Adds the fields for state, owner and release of a recurring hazard to the page."""
     with ui.element("nav"):
         state = ui.select([s.value for s in SETTABLE], value=State.OPEN.value, label="new state")
         state.style("min-width:120px")
@@ -149,7 +149,7 @@ def _triage(ui: Any, found: WorkPage, one: Work) -> None:
 
 
 def work_title(one: Work) -> str:
-    """Return how many alarms of which kind there are, of how many vehicles, and where."""
+    """Returns how many alarms of which kind there are, of how many vehicles, and where."""
     c, n = one.cluster, len(one.alarms)
     vehicles = f"{c['vehicles']} vehicle{'' if c['vehicles'] == 1 else 's'}"
     point = f"x {c['x']:.0f} m, y {c['y']:.0f} m"
@@ -158,7 +158,7 @@ def work_title(one: Work) -> str:
 
 
 def work_text(one: Work) -> str:
-    """Return the risk, how many alarms are likely true, the period (UTC) and the trend."""
+    """Returns the risk, how many alarms are likely true, the period (UTC) and the trend."""
     measured, risk = one.precision, one.mean_risk
     likely = (
         "precision not measured"
@@ -177,7 +177,7 @@ def work_text(one: Work) -> str:
 
 
 def standing_text(one: Work) -> str:
-    """Return state, owner and release in words."""
+    """Returns state, owner, release and since when (UTC) in words; unknown ones are left out."""
     standing = one.standing
     parts = [f"state {standing.state.value}"]
     if standing.owner:

@@ -117,7 +117,7 @@ class _Summary(msgspec.Struct):
 
 
 def load_drive(folder: Path) -> MonitoredDrive:
-    """Read the output folder of `skidpad monitor`; InputError when it is none that can be shown."""
+    """Reads the output folder of `skidpad monitor`; InputError when it is none that can be shown."""
     summary = read_summary(folder)
     convert_plain(summary, _Summary, str(folder / SUMMARY))
     return MonitoredDrive(

@@ -50,7 +50,7 @@ MEANING = {
 
 
 def write_drive_report(folder: Path) -> Path:
-    """Write report.html into a monitor's output folder; returns its path."""
+    """Writes report.html into a monitor's output folder; returns its path."""
     return write_report_page(drive_page(load_drive(folder)), folder)
 
 

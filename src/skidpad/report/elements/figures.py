@@ -154,8 +154,8 @@ def _mark_cut_bars(axes: Axes, series: Sequence[Series], groups: int, width: flo
 def interval_reach(series: Sequence[Series], least: float = 0.0) -> float:
     """Returns how far an axis may go for the sake of intervals: WIDEST times the largest value.
 
-    At least `least`; inf where all values are 0. A few wide intervals would press all estimates into
-    one place.
+    At least `least`; inf where both are 0. A few wide intervals would press all estimates into one
+    place.
     """
     values = [abs(v) for one in series for v in (*one.values, *one.published) if v is not None]
     return max(WIDEST * max(values, default=0.0), least) or float("inf")

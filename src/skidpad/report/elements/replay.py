@@ -128,7 +128,7 @@ def _near(points: Floats, way: Floats) -> NDArray[np.bool_]:
 
 
 def _place(log: RunLog, k: int, i: int, centre: Floats) -> list[int | None]:
-    """Return actor `i` at tick `k`: x, y in UNIT from `centre`, yaw in mrad; None each if absent."""
+    """Returns actor `i` at tick `k`: x, y in UNIT from `centre`, yaw in mrad; None each if absent."""
     if not log.present[k, i]:
         return [None, None, None]
     a = log.actors
@@ -136,7 +136,7 @@ def _place(log: RunLog, k: int, i: int, centre: Floats) -> list[int | None]:
 
 
 def _whole(points: Floats) -> list[int]:
-    """Return points in m flattened to whole multiples of UNIT."""
+    """Returns points in m flattened to whole multiples of UNIT."""
     whole: list[int] = np.round(points.ravel() / UNIT).astype(int).tolist()
     return whole
 
@@ -176,7 +176,7 @@ def barriers(road_map: RoadMap, way: Floats) -> list[list[int]]:
 
 
 def patches(road_map: RoadMap, surface: Sequence[SurfacePatch], way: Floats) -> dict[str, Any]:
-    """Return what lies on the road within reach of a way (n, 3); nothing without a surface.
+    """Returns what lies on the road within reach of a way (n, 3); nothing without a surface.
 
     `patches` holds [kind, [x, y, ...]] of each polygon, from the way's first place.
     """

@@ -57,7 +57,7 @@ rain at 0.27, below packed snow (0.34) and far below what braking tests measure 
 
 
 def write_grip_report(folder: Path) -> Path:
-    """Write report.html into a campaign's folder; returns its path."""
+    """Writes report.html into a campaign's folder; returns its path."""
     return write_report_page(build_page(load_grip(folder)), folder)
 
 

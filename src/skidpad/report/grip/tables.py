@@ -210,7 +210,7 @@ def change_tables(campaign: GripCampaign) -> list[Block]:
 
 
 def control_lost_cell(column: str, pair: Pair) -> Cell:
-    """Returns a cell with the shares out of control in %, original and reduced; bad from 5 more on."""
+    """Returns a cell with the shares out of control in %, original and reduced; bad beyond 5 more."""
     before, after = (
         100.0 * float(side[column].mean() or 0.0)  # type: ignore[arg-type]
         for side in (pair.original, pair.reduced)

@@ -89,7 +89,7 @@ def load_threshold(folder: Path) -> ThresholdMap:
 
 
 def write_threshold_report(folder: Path) -> Path:
-    """Write report.html into a campaign's folder; returns its path."""
+    """Writes report.html into a campaign's folder; returns its path."""
     return write_report_page(build_page(load_threshold(folder)), folder)
 
 

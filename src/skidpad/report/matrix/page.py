@@ -54,7 +54,7 @@ had an event, the largest share of seeds that have one stands instead: it holds 
 
 
 def write_report(folder: Path) -> Path:
-    """Write report.html into a campaign's folder; returns its path."""
+    """Writes report.html into a campaign's folder; returns its path."""
     return write_report_page(build_page(load_matrix(folder)), folder)
 
 

@@ -32,7 +32,7 @@ LABEL = 34  # characters
 
 
 def run_card(run: PlayRun, out: Path) -> Card:
-    """Return the card of one run of the folder `out`."""
+    """Returns the card of one run of the folder `out`."""
     if run.folder is None:
         return Card(run.name, chain=list(run.judged.reasons), id=run_anchor(run))
     log = read_log(run.folder)
@@ -62,12 +62,12 @@ def run_card(run: PlayRun, out: Path) -> Card:
 
 
 def run_anchor(run: PlayRun) -> str:
-    """Return the name of the card's place in the page."""
+    """Returns the name of the card's place in the page."""
     return "run-" + anchor(run.name)
 
 
 def run_title(run: PlayRun) -> str:
-    """Return scenario, weather and verdict in one line."""
+    """Returns scenario, weather and verdict in one line."""
     where = f" in {run.weather}" if run.weather else ""
     if run.weather == OF_FILE:
         where = " in the weather of its file"
@@ -75,7 +75,7 @@ def run_title(run: PlayRun) -> str:
 
 
 def facts(run: PlayRun) -> list[tuple[str, str]]:
-    """Return the numbers of a run and its criterion; what was not there is left out."""
+    """Returns the numbers of a run and its criterion; what was not there is left out."""
     rows = [
         ("criterion", run.judged.criterion or None),
         ("least gap", _unit(run.least("min_gap_m"), "m")),
@@ -91,12 +91,12 @@ def facts(run: PlayRun) -> list[tuple[str, str]]:
 
 
 def _unit(value: float | None, unit: str) -> str | None:
-    """Return a value with two digits and its unit as text; None stays None."""
+    """Returns a value with two digits and its unit as text; None stays None."""
     return None if value is None else f"{value:.2f} {unit}"
 
 
 def chart(run: PlayRun, log: RunLog) -> Figure:
-    """Return a figure of speeds, gaps, times to collision and events over time."""
+    """Returns a figure of speeds, gaps, times to collision and events over time."""
     strips = [_speed(log, EGO, "speed of the ego")]
     for other in _choose_counterparts(run):
         strips += _of_other(log, other)
@@ -133,7 +133,7 @@ def _choose_counterparts(run: PlayRun) -> list[Counterpart]:
 
 
 def _speed(log: RunLog, i: int, label: str) -> Strip:
-    """Return the strip of actor `i`'s speed in km/h over time."""
+    """Returns the strip of actor `i`'s speed in km/h over time."""
     a = log.actors
     v = np.where(log.present[:, i], kmh_from_mps(1.0) * np.hypot(a.vx[:, i], a.vy[:, i]), np.nan)
     top = float(np.nanmax(v, initial=0.0))
@@ -141,7 +141,7 @@ def _speed(log: RunLog, i: int, label: str) -> Strip:
 
 
 def _of_other(log: RunLog, other: Counterpart) -> list[Strip]:
-    """Return three strips: the counterpart's speed in km/h, its gap in m and TTC in s with the ego."""
+    """Returns three strips: the counterpart's speed in km/h, its gap in m and TTC in s with the ego."""
     i = log.table.names.index(other.name)
     both = together(log, EGO, i)
     one, two = body(log, EGO), body(log, i)
@@ -161,14 +161,14 @@ def _of_other(log: RunLog, other: Counterpart) -> list[Strip]:
 
 
 def _least(value: float | None, unit: str) -> str:
-    """Return "least" with the value and unit as text, "no conflict" for None."""
+    """Returns "least" with the value and unit as text, "no conflict" for None."""
     return "no conflict" if value is None else f"least {value:.2f} {unit}"
 
 
 def _strip(
     log: RunLog, label: str, value: Floats, high: float, note: str, threshold: float | None = None
 ) -> Strip:
-    """Return a strip from 0 to `high`, in alarm where the value is below the threshold; None: never."""
+    """Returns a strip from 0 to `high`, in alarm where the value is below the threshold; None: never."""
     value = np.asarray(value, np.float64)
     with np.errstate(invalid="ignore"):
         alarm = value < threshold if threshold is not None else np.zeros(len(log), bool)
@@ -196,5 +196,5 @@ def _events(path: Path, t: Floats) -> Iterator[Strip]:
 
 
 def _short(text: str) -> str:
-    """Return the text cut to LABEL characters, with an ellipsis where it was longer."""
+    """Returns the text cut to LABEL characters, with an ellipsis where it was longer."""
     return text if len(text) <= LABEL else text[: LABEL - 1] + "…"

@@ -124,7 +124,7 @@ def in_order(runs: Iterable[PlayRun]) -> list[PlayRun]:
 
 
 def answer(played: Played) -> str:
-    """Return how many runs passed, in one sentence."""
+    """Returns how many runs passed, in one sentence."""
     counts = Counter(run.verdict for run in played.runs)
     n = len(played.runs)
     if n == 1:
@@ -135,12 +135,12 @@ def answer(played: Played) -> str:
 
 
 def _word(verdict: PlayVerdict) -> str:
-    """Return a verdict as the word for a sentence."""
+    """Returns a verdict as the word for a sentence."""
     return "in error" if verdict is PlayVerdict.ERROR else verdict.value
 
 
 def criterion(played: Played) -> str:
-    """Return by what the runs were judged, in one sentence."""
+    """Returns by what the runs were judged, in one sentence."""
     known = list(dict.fromkeys(r.judged.criterion for r in played.runs if r.judged.criterion))
     if not known:
         return "No run came to its end, so none was judged."
@@ -150,7 +150,7 @@ def criterion(played: Played) -> str:
 
 
 def _answers(played: Played) -> Answers:
-    """Return the answers at the head of the page; what went wrong is told where a run is bad."""
+    """Returns the answers at the head of the page; what went wrong is told where a run is bad."""
     items = [
         Answer("Did it pass?", answer(played)),
         Answer("By which criterion?", criterion(played)),
@@ -207,7 +207,7 @@ def _matrix(runs: Sequence[PlayRun], links: dict[str, str]) -> list[Block]:
 
 
 def _seeds(runs: Sequence[PlayRun]) -> int:
-    """Return the number of different known seeds."""
+    """Returns the number of different known seeds."""
     return len({run.seed for run in runs if run.seed is not None})
 
 
@@ -217,7 +217,7 @@ def _outside(run: PlayRun) -> str:
 
 
 def _verdict_cell(run: PlayRun | None, links: dict[str, str]) -> Cell:
-    """Return a cell with a run's verdict, least TTC in s and gap in m; "not driven" for None."""
+    """Returns a cell with a run's verdict, least TTC in s and gap in m; "not driven" for None."""
     if run is None:
         return Cell("not driven", kind="muted")
     numbers = []
@@ -232,7 +232,7 @@ def _verdict_cell(run: PlayRun | None, links: dict[str, str]) -> Cell:
 
 
 def _runs_table(runs: Sequence[PlayRun], links: dict[str, str]) -> Table:
-    """Return the table of runs, in the order given, with a column of seeds where there are several."""
+    """Returns the table of runs, in the order given, with a column of seeds where there are several."""
     columns: list[Column[PlayRun]] = [
         Column("scenario", lambda r: Cell(r.scenario, href=links[r.name])),
         Column("weather", _outside),
@@ -249,7 +249,7 @@ def _runs_table(runs: Sequence[PlayRun], links: dict[str, str]) -> Table:
 
 
 def _plain_verdict(run: PlayRun) -> Cell:
-    """Return a cell with the run's verdict, its reasons as hint."""
+    """Returns a cell with the run's verdict, its reasons as hint."""
     return Cell(run.verdict.value, kind=KINDS[run.verdict], hint="; ".join(run.judged.reasons))
 
 
@@ -261,7 +261,7 @@ def _format_bounded(value: float | None, spec: str) -> Cell:
 
 
 def _contact_speed(run: PlayRun) -> float | None:
-    """Return the closing speed at the first contact in km/h; None without a contact."""
+    """Returns the closing speed at the first contact in km/h; None without a contact."""
     return None if run.contact is None else kmh_from_mps(run.contact[2])
 
 
@@ -278,7 +278,7 @@ Of = tuple[PlayRun, Counterpart]
 
 
 def _counterparts(runs: Sequence[PlayRun]) -> list[Block]:
-    """Return the table of the ego and each other actor; empty where no run has another."""
+    """Returns the table of the ego and each other actor; empty where no run has another."""
     rows = [(run, other) for run in runs for other in run.others]
     if not rows:
         return []
@@ -290,7 +290,7 @@ def _counterparts(runs: Sequence[PlayRun]) -> list[Block]:
 
 
 def _speed_of_contact(of: Of) -> float | None:
-    """Return the counterpart's speed at the contact in km/h; None without a contact."""
+    """Returns the counterpart's speed at the contact in km/h; None without a contact."""
     v = of[1].contact_v
     return None if v is None else kmh_from_mps(v)
 

@@ -56,7 +56,7 @@ class PlayRun:
 
     @property
     def verdict(self) -> PlayVerdict:
-        """Verdict of the run."""
+        """Returns the verdict of the run."""
         return self.judged.verdict
 
     def least(self, name: str) -> float | None:
@@ -103,7 +103,7 @@ def load_played(out: Path) -> Played:
 
 
 def _runs(out: Path, rules: Sequence[Expectation]) -> Iterator[PlayRun]:
-    """Yield the runs in a folder by its ledger; the folder itself as one run where it has none."""
+    """Yields the runs in a folder by its ledger; the folder itself as one run where it has none."""
     if not (out / LEDGER).is_file():
         yield _run(out, out, rules, None)
         return
@@ -141,7 +141,7 @@ def _run(out: Path, folder: Path, rules: Sequence[Expectation], entry: GripEntry
 
 
 def _of_file(out: Path, log: RunLog, staging: Staging) -> list[Any]:
-    """Return the judged criteria of the scenario file; empty where it has none."""
+    """Returns the judged criteria of the scenario file; empty where it has none."""
     if not staging.criteria:
         return []
     return judge_criteria(prepare(log, find_road(out, log.header)), staging.criteria)
@@ -164,7 +164,7 @@ def _contact(log: RunLog) -> tuple[float, str, float] | None:
 
 
 def _last_line(path: Path) -> list[str]:
-    """Return the last line of a text file, alone in a list; empty for an empty file."""
+    """Returns the last line of a text file, alone in a list; empty for an empty file."""
     text = path.read_text(encoding="utf-8", errors="replace").strip()
     return [text.rpartition("\n")[2]] if text else []
 
@@ -191,7 +191,7 @@ def _words(folder: Path, key: GripKey | None) -> dict[str, Any]:
 
 
 def results_table(played: Played) -> pl.DataFrame:
-    """Return one row per run and counterpart; a run without any has one row."""
+    """Returns one row per run and counterpart; a run without any has one row."""
     rows = [_row(run, other) for run in played.runs for other in run.others or (None,)]
     return pl.DataFrame(rows, infer_schema_length=None)
 
@@ -204,7 +204,7 @@ def write_results_csv(played: Played) -> Path:
 
 
 def _row(run: PlayRun, other: Counterpart | None) -> dict[str, Any]:
-    """Return a row of the results table; None for `other` leaves the counterpart's fields empty."""
+    """Returns a row of the results table; None for `other` leaves the counterpart's fields empty."""
     row: dict[str, Any] = {
         "run": run.name, "scenario": run.scenario, "weather": run.weather,
         "friction": run.friction, "seed": run.seed, "verdict": run.verdict.value,
@@ -232,5 +232,5 @@ def _row(run: PlayRun, other: Counterpart | None) -> dict[str, Any]:
 
 
 def _kmh(v: float | None) -> float | None:
-    """Return m/s in km/h; None stays None."""
+    """Returns m/s in km/h; None stays None."""
     return None if v is None else kmh_from_mps(v)

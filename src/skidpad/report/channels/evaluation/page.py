@@ -73,7 +73,7 @@ Published numbers (8 h, other simulator, other channels, one human annotator) st
 
 
 def write_evaluation_report(folder: Path) -> Path:
-    """Write report.html beside evaluation.json; returns its path."""
+    """Writes report.html beside evaluation.json; returns its path."""
     return write_report_page(evaluation_page(_read(folder / EVALUATION), folder), folder)
 
 
@@ -181,8 +181,8 @@ def _answers(evaluation: Row, judged: Sequence[Judgement]) -> Answers:
 def _deciding(evaluation: Row) -> tuple[list[Row], str]:
     """Returns the headline results of identifiers against the truth that decides, and its name in words.
 
-    That is "sim" if any was judged by it, else "world" (C-3). The reference and the detector that is
-    told the truth are left out.
+    That is "sim" if any was judged by it, else "world" (C-3). The reference and the rules that are
+    told the grip are left out.
     """
     rows = [r for r in headline(evaluation) if r["rules"] not in (REFERENCE, TOLD)]
     if any(r["truth"] == "sim" for r in rows):

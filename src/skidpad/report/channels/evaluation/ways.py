@@ -79,7 +79,7 @@ def _join_lines(lines: Iterable[Floats]) -> tuple[Floats, Floats]:
 
 
 def _known_map(name: str, folder: Path) -> RoadMap | None:
-    """The map of that name that the folder keeps, else a bundled one; None where there is none."""
+    """Returns the map of that name that the folder keeps, else a bundled one; None where there is none."""
     try:
         return kept_map(folder, name, "")
     except SkidpadError:

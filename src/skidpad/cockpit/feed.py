@@ -73,7 +73,10 @@ class Feed:
         return int(self._state[TAKEN])
 
     def write_picture(self, told: bytes, views: dict[str, Array]) -> int:
-        """Writes the next picture and returns its number; ValueError when it is larger than a slot."""
+        """Writes the next picture and returns its number; ValueError when it is larger than a slot.
+
+        told: JSON beside it; views: images by name.
+        """
         number = self.last + 1
         planes = tuple(Plane(n, a.dtype.name, a.shape) for n, a in views.items())
         head = msgspec.json.encode(Head(number, msgspec.Raw(told), planes))

@@ -29,7 +29,10 @@ class MessageHead:
 
 
 def check_batch(fleet: Fleet, who: Principal, told: MessageHead, body: bytes) -> Batch:
-    """Returns the batch of a vehicle, unpacked and read by its kind; Refused when any of it is wrong."""
+    """Returns the batch of a vehicle, unpacked and read by its kind; Refused when any of it is wrong.
+
+    told: what stands beside the body.
+    """
     content = unpack(body, fleet.limits)
     operator, manufacturer = owners_of(fleet, str(who.vehicle))
     readers: dict[Kind, Callable[[], dict[str, Any]]] = {

@@ -72,7 +72,7 @@ def risk_page(asked: Risk, found: RiskFound, trials: Sequence[Trial]) -> Page:
 
 
 def answer(asked: Risk, found: RiskFound) -> str:
-    """Returns the answer in one or two sentences."""
+    """Returns the answer to the question `asked` from what was `found`, in one or two sentences."""
     who = driver_text(asked.template.driver)
     given = "given this exposure model"
     if found.high is not None and found.p == 0.0:
@@ -138,9 +138,10 @@ def _answers(asked: Risk, found: RiskFound, trials: Sequence[Trial]) -> Answers:
 
 
 def brute_force_runs(found: RiskFound) -> float | None:
-    """Returns how many independent draws would give as narrow an interval; None without an interval.
+    """Returns how many independent draws would give an interval as narrow as the one found.
 
-    By the normal approximation of a share: n = (1 - p) / p (1.96 / w)^2 with the relative half-width w.
+    None without an upper end or a crash. By the normal approximation of a share:
+    n = (1 - p) / p (1.96 / w)^2 with the relative half-width w.
     """
     if not found.high or found.p <= 0.0:
         return None

@@ -95,12 +95,18 @@ def measure(seconds: float = SECONDS, repeats: int = REPEATS) -> list[ScenarioCo
 
 
 def _fast(what: str, once: Callable[[], float], repeats: int) -> ScenarioCost:
-    """Returns the median speed of a play, in multiples of real time, beside its target."""
+    """Returns the median speed of a play, in multiples of real time, beside its target.
+
+    what: the name of the figure; once: plays once and returns the speed.
+    """
     return ScenarioCost(what, _median(once, repeats), "times real time", PLAYED_TARGET, most=False)
 
 
 def _short(what: str, once: Callable[[], float], repeats: int, target: float) -> ScenarioCost:
-    """Returns the median of a duration in s beside its upper target."""
+    """Returns the median of a duration in s beside its upper target.
+
+    what: the name of the figure; once: measures once and returns the duration.
+    """
     return ScenarioCost(what, _median(once, repeats), "s", target, most=True)
 
 

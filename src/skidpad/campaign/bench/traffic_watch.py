@@ -165,7 +165,7 @@ class Watch:
         self._circles = circles
 
     def _close_stand(self, i: int) -> None:
-        """Ends a vehicle's standing and keeps it with its commonest cause if it was LONG."""
+        """Ends the standing of vehicle `i` and keeps it with its commonest cause if it was over LONG s."""
         if self._stood[i] > LONG:
             cause = cause_name(Held(int(self._causes[i].argmax())))
             x, y = float(self._before.x[i]), float(self._before.y[i])
@@ -207,7 +207,7 @@ class Watch:
         return bool(held and wanted >= HELD_UP * v[j])
 
     def _note_follower(self, i: int, j: int, headway: float, fast: bool) -> None:
-        """Keeps a follower's headway in s; on fast roads also that from front to front."""
+        """Keeps the headway in s of vehicle i behind j; on `fast` roads also that from front to front."""
         if not fast:
             self.seen.followers_slow.append(headway)
             return

@@ -119,7 +119,10 @@ def give_order(
 def hand_out(
     connection: Connection, signer: Signer, vehicle: str, challenge: str, at: float
 ) -> list[dict[str, str]]:
-    """Returns the unexpired orders that wait for `vehicle`, signed with its challenge; each only once."""
+    """Returns the orders that wait for `vehicle` at `at` s, signed with its challenge; each only once.
+
+    Expired ones are left out.
+    """
     rows = connection.execute(
         select(orders)
         .outerjoin(deliveries, deliveries.c.order == orders.c.id)

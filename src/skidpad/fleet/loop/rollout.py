@@ -197,7 +197,10 @@ def _conclude(
 
 
 def _driven_differences(connection: Connection, one: Rollout) -> tuple[list[float], float]:
-    """Returns the differences of errors of drives under a release, of chosen vehicles, and their hours."""
+    """Returns the differences (errors, update less before) of drives under a release, and their hours.
+
+    Of the vehicles that are chosen for its stage.
+    """
     rows = connection.execute(
         select(drives.c.vehicle, drives.c.seconds, drives.c.summary)
         .where(drives.c.release == one.row.id, drives.c.manufacturer == one.row.tenant)

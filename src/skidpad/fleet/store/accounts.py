@@ -131,7 +131,10 @@ def _principal(connection: Connection, which: ColumnElement[bool], at: float) ->
 
 
 def end_credentials(connection: Connection, principal: str, by: str, at: float) -> int:
-    """Ends every credential of a principal; returns how many there are, ended ones among them."""
+    """Adds an event that ends it to every credential of a principal; returns how many there are.
+
+    Those that ended before are among them. by: actor; at: s.
+    """
     rows = connection.execute(
         select(credentials.c.id).where(credentials.c.principal == principal)
     ).all()

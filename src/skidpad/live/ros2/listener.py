@@ -160,7 +160,7 @@ class _Merge:
         return self.count > 0
 
     def add(self, topic: str, t: float, content: Any) -> None:
-        """Adds a message with its time stamp."""
+        """Adds a topic's message, whose time stamp is `t` s."""
         self.count += 1
         self.newest[topic] = max(self.newest[topic], t)
         heapq.heappush(self.waiting, (t, self.rank[topic], topic, self.count, content))

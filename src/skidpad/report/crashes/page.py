@@ -30,7 +30,10 @@ def find_contacts(log: RunLog, road: RoadMap, run: Path) -> list[Found]:
 
 
 def contact_cards(found: Sequence[Found]) -> Cards:
-    """Returns the SHOWN hardest crashes as cards, hardest first; drives that moved alike count once (T-3)."""
+    """Returns the SHOWN hardest of the crashes `found` as cards, hardest first.
+
+    Drives that moved alike count once (T-3).
+    """
     found = list({(motion_hash(f[1].log), f[0].tick, f[0].other): f for f in found[::-1]}.values())
     hardest = sorted(found, key=lambda item: severity(item[0]), reverse=True)[:SHOWN]
     title = f"{len(found)} crashes" if len(found) > 1 else "One crash"

@@ -122,7 +122,10 @@ def find_published(pair: Pair, friction: str, column: str) -> dict[str, Any]:
 
 
 def share(found: Share, kind: str = "", **more: Any) -> Quantity:
-    """Returns a share in percent with its interval and n; `more`: further fields of Quantity."""
+    """Returns a share as a quantity in percent with its interval and n, without value for an unknown one.
+
+    more: further fields of Quantity.
+    """
     if found.value is None:
         return Quantity(value=None, **more)
     limits = Interval(*(100.0 * end for end in found.interval))

@@ -152,7 +152,10 @@ def _crashes(matrix: Matrix, name: str) -> Iterator[Found]:
 def _cell_block(
     matrix: Matrix, cell: Cell, found: list[Found], crashed: pl.DataFrame, worst: Found
 ) -> Cards:
-    """Returns a cell's cards, the first INLINE at once; writes a page of all where those do not do."""
+    """Returns a cell's cards, the first INLINE at once; more are on a page that it writes.
+
+    found: crashes, hardest first; crashed: runs with one; worst: shown elsewhere.
+    """
     config, weather = cell
     title = f"{config_title(config)}, {weather_title(weather)}"
     others = [item for item in found if item is not worst]

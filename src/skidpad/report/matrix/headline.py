@@ -74,7 +74,10 @@ def headline_numbers(matrix: Matrix) -> Numbers:
 
 
 def _meaning(put_back: int, first: int) -> str:
-    """Returns a note on what an intervention is, and how many followed soon on another one."""
+    """Returns a note on what an intervention is, and how many followed soon on another one.
+
+    put_back: interventions in all; first: those that did not follow.
+    """
     followed = put_back - first
     again = f"; {followed:,} soon after another one" if followed else ""
     return f"the car was put back, after light contacts, too{again}"

@@ -148,7 +148,7 @@ def test_ways_are_drawn_for_both_frictions_and_for_the_three_variants():
     variants = {name: pair("rain_0", 2, 2, cutin=name) for name in ("original", "unfixed", "fixed")}
     ways = trajectories(campaign(cells, variants=variants, series=lambda *_: series(10.0, runs=4)))
     modes, three = ways
-    assert modes.caption == "Ghost cut-in, icy_30: ways of ego and ghost. Thirty runs each."
+    assert modes.caption == "Ghost cut-in, icy_30: ways of ego and ghost. 4 runs each."
     assert {"original friction", "reduced friction"} <= {t for t, *_ in texts(modes.svg)}
     assert three.caption.startswith("Ghost cut-in: ways in the three variants")
     words = [t for t, *_ in texts(three.svg)]

@@ -23,6 +23,7 @@ from skidpad.campaign.user_files import keep_files
 from skidpad.campaign.workers.worker import Finished, Job, Runner
 from skidpad.core.errors import ConfigError, require_range
 from skidpad.core.vocabulary import Outcome
+from skidpad.core.wording import count_text
 from skidpad.evidence.statistics import clopper_pearson
 from skidpad.recording.campaign.ledger import (
     DAMAGED,
@@ -58,10 +59,8 @@ class Summary:
     def warnings(self) -> Iterator[str]:
         """Yields the sentences that a reader of the report should know first: damage, machines, failures."""
         if self.damaged:
-            yield (
-                f"{self.damaged} damaged lines of {LEDGER} were set aside in {DAMAGED}, and their "
-                "runs were driven again"
-            )
+            lines = count_text(self.damaged, "damaged line")
+            yield f"set aside from {LEDGER} into {DAMAGED}: {lines}; what they told of was driven again"
         if self.mixed_machines:
             yield "runs of different machines or versions: bytes may differ"
         if self.failed:

@@ -99,7 +99,8 @@ def entity_of(name: str, number: int, frame: ChannelFrame) -> Any:
         shape = frame.polygons[i, : frame.polygon_size[i]]
         cubes.append(_cube(frame.objects[i], shape, light))
         lines.append(_line(frame.predictions[i], 0.1, light))
-    stamp = fg.Timestamp(sec=int(frame.t), nsec=round((frame.t - int(frame.t)) * NS) % NS)
+    seconds, rest = divmod(round(frame.t * NS), NS)
+    stamp = fg.Timestamp(sec=seconds, nsec=rest)
     return fg.SceneEntity(timestamp=stamp, frame_id="map", id=name, cubes=cubes, lines=lines)
 
 

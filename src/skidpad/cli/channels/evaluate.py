@@ -236,9 +236,8 @@ def _refuse_training_drives(path: Path, segments: list[Segment]) -> None:
     seen = load_model(path).trained_on()
     both = [s.name for s in segments if (s.route, s.context.get("seed", s.name)) in seen]
     if both:
-        raise ConfigError(
-            f"{path}: was trained on {both[0]} and {len(both) - 1} more of these recordings"
-        )
+        more = f" and {len(both) - 1} more" if len(both) > 1 else ""
+        raise ConfigError(f"{path}: was trained on {both[0]}{more} of these recordings")
 
 
 def _print_results(table: dict[str, object]) -> None:

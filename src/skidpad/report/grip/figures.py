@@ -8,6 +8,7 @@ import numpy as np
 
 from skidpad.core.arrays import Floats
 from skidpad.core.setup import DT
+from skidpad.core.wording import count_text
 from skidpad.evidence.grip.study import ORIGINAL, REDUCED, CellSeries, Pair
 from skidpad.report.elements.figures import Chart, Curve, curves
 from skidpad.report.elements.page import Block, Figure
@@ -114,10 +115,11 @@ def trajectories(campaign: GripCampaign) -> list[Block]:
 
 def _ways(campaign: GripCampaign, sides: Sequence[tuple[str, Pair, str]], caption: str) -> Figure:
     """Returns a figure of the first WAYS paths of ego and ghost per side; each side needs a series."""
-    charts = []
+    charts, drawn = [], 0
     for title, pair, friction in sides:
         series = campaign.series(pair, friction)
         assert series is not None
+        drawn = max(drawn, len(series.values["x"][:WAYS]))
         ways = [
             Curve(name, along, left, colour=colour, style={"alpha": 0.35, "linewidth": 0.8})
             for colour, name, x, y in ((1, "ego", "y", "x"), (0, "ghost", "npc_y", "npc_x"))
@@ -125,4 +127,7 @@ def _ways(campaign: GripCampaign, sides: Sequence[tuple[str, Pair, str]], captio
         ]
         charts.append(Chart(ways, "m along the road", "m left", title, rules=LANE_EDGES))
     svg = curves(charts, width=9.6, height=1.5 * len(sides) + 0.5, stacked=True)
-    return Figure(svg, f"{caption} Thirty runs each.")
+    runs = count_text(drawn, "run")
+    return Figure(
+        svg, f"{caption} {runs} each." if drawn < WAYS else f"{caption} The first {runs} each."
+    )

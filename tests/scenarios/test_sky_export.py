@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from datetime import datetime
-from xml.etree import ElementTree
 
 import pytest
 
@@ -11,19 +10,19 @@ from skidpad.campaign.driving.outdoors import environment_of, weather_of
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.physics.presets import preset
 from skidpad.scenarios.export.tracks import Track
-from skidpad.scenarios.export.writer import OscVersion, Sheet, environment_action, write_scenario
+from skidpad.scenarios.export.writer import OscVersion, Sheet, write_scenario
 from skidpad.scenarios.reading.environment import Environment, Fall
 from skidpad.scenarios.scenario import check
 
 
-def exported(folder, weather, version):
+def exported(folder, environment, version):
     track = Track(
         "ego", "", True, SemanticClass.CAR, (4.2, 1.8, 0.0, 0.0), t=[0.0, 1.0], x=[0.0, 10.0],
         y=[0.0, 0.0], heading=[0.0, 0.0], v=[10.0, 10.0], z=[0.0, 0.0], height=1.5,
     )  # fmt: skip
     sheet = Sheet(
         title="x", date=datetime(1970, 1, 1), road_file="straight.xodr", t_end=1.0,  # noqa: DTZ001
-        version=version, environment=environment_of(weather),
+        version=version, environment=environment,
     )  # fmt: skip
     file = folder / "x.xosc"
     write_scenario(file, [track], sheet)
@@ -34,7 +33,7 @@ def exported(folder, weather, version):
 @pytest.mark.parametrize("name", ["clear-noon", "rain-night", "rain-noon"])
 def test_the_weather_of_a_run_is_that_of_its_file(tmp_path, name, version):
     weather = preset(name)
-    found = exported(tmp_path, weather, version)
+    found = exported(tmp_path, environment_of(weather), version)
     assert found.findings == ()  # the schema of its version accepts it
     environment = found.scenario.start.environment
     again = weather_of(environment, preset("clear-noon"), name)
@@ -46,10 +45,7 @@ def test_the_weather_of_a_run_is_that_of_its_file(tmp_path, name, version):
     assert environment.friction_scale == 1.0
 
 
-def test_falling_snow_is_written_as_snow() -> None:
-    action = environment_action(Environment(fall=Fall.SNOW, fall_mm_h=2.0), old=False)
-    precipitation = ElementTree.fromstring(ElementTree.tostring(action.get_element())).find(
-        ".//Precipitation"
-    )
-    assert precipitation is not None
-    assert precipitation.attrib == {"precipitationType": "snow", "precipitationIntensity": "2.0"}
+def test_falling_snow_is_written_as_snow(tmp_path) -> None:
+    snow = Environment(fall=Fall.SNOW, fall_mm_h=2.0)
+    found = exported(tmp_path, snow, OscVersion.V1_2).scenario.start.environment
+    assert (found.fall, found.fall_mm_h) == (Fall.SNOW, 2.0)

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from worlds import World, lanes_along, states_at, straight, table_of, traffic
 
-from skidpad.cockpit.studio import SENSOR, Studio, plane
+from skidpad.cockpit.studio import SENSOR, Looks, Studio, plane
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Beam, Outside
 from skidpad.core.specs import CameraSpec, Modality
 from skidpad.core.vocabulary import (
     ActorKind,
+    Bodywork,
     GripModel,
     LightState,
     RangeModel,
@@ -204,7 +205,7 @@ def test_weather_noise_spares_the_mask_only_where_a_cockpit_is_shown():
     table, states = traffic(world)
     night, nobody = preset("rain-night"), np.zeros(len(table), dtype=np.bool_)
     outside = Outside(weather=night, grip=GripModel.NONE, range_model=RangeModel.NONE)
-    shown = Studio(world, table, outside, 1, NO_EXTRAS, Scenery.NONE)
+    shown = Studio(world, table, outside, 1, NO_EXTRAS, Looks(Scenery.NONE, Bodywork.PLAIN))
     read = PixelSuite(world, table, twelve_sensors(), night)
     for view, id in SENSOR.items():
         if not id.startswith("rgb"):

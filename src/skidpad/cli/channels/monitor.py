@@ -133,13 +133,14 @@ class Listening(Struct, frozen=True):
         Raises ConfigError unless exactly one is asked for, FileError for a missing file.
         """
         from skidpad.core.errors import ConfigError, FileError
-        from skidpad.recording.sources import open_channels
 
         if (file is None) is (self.listen is None):
             raise ConfigError("monitor takes a FILE or --listen ros2, and one of them")
         if file is not None:
             if not file.exists():
                 raise FileError(f"{file}: no such file")
+            from skidpad.recording.sources import open_channels
+
             return open_channels(file, self.mapping, truth=False)
         if self.mapping is None:
             raise ConfigError("--listen needs --mapping FILE, which says which topics are what")
@@ -176,13 +177,13 @@ def monitor(
     import sys
     import time
 
+    source = listening.open_source(file)  # what is missing is said before anything is loaded
     from skidpad.core.errors import ConfigError
     from skidpad.evidence.channels.timing import time_by_objects, timing_statistics
     from skidpad.live.watch import Alarms, Timer, watch_whole
     from skidpad.recording.sources import file_hash
     from skidpad.report.channels.page import write_drive_report
 
-    source = listening.open_source(file)
     wanted = {name: _rule(name) for name in fail_if or []}
     if junit is not None and not wanted:
         raise ConfigError("--junit writes the verdicts of --fail-if, and none is given")

@@ -337,3 +337,16 @@ def test_a_wrong_level_or_weather_is_one_sentence() -> None:
         drive(Gentle, sensors="lasers")
     with pytest.raises(ConfigError, match="weather"):
         drive(Gentle, weather="locusts")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("vehicles", -1, "vehicles must be between 0 and 80, got -1"),
+        ("duration", -1.0, "duration must be between 0.05 and 100000, got -1.0"),
+    ],
+)
+def test_a_number_out_of_its_range_is_named_before_anything_is_driven(name, value, said) -> None:
+    """NumPy's `negative dimensions` came through."""
+    with pytest.raises(ConfigError, match=said):
+        drive(Gentle, **{name: value})

@@ -150,6 +150,9 @@ def test_a_vector_of_environments_gives_what_each_gives_alone():
         ({"grip": "icy"}, "unknown grip 'icy'; choose one of: none, statistical, physical"),
         ({"weather": "icy"}, "unknown weather 'icy'"),
         ({"traffic": "many"}, "unknown traffic 'many'"),
+        ({"vehicles": -1}, "vehicles must be between 0 and 80, got -1"),
+        ({"duration": -1.0}, "duration must be between 0.05 and 100000, got -1.0"),
+        ({"seeds": ()}, "seeds: at least one is needed"),
         ({"rewards": {"speed": 1.0}}, "unknown term 'speed'; there are distance_km, contacts"),
     ],
 )

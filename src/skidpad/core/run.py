@@ -7,12 +7,14 @@ a description is an option of every command that drives (`skidpad.cli.options.sp
 from __future__ import annotations
 
 from enum import Enum
+from functools import cache
+from math import inf
 from typing import Annotated, Any
 
 import msgspec
 from msgspec import Meta, Struct
 
-from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.errors import ConfigError, FileError, require_range
 from skidpad.core.names import path_part, slug
 from skidpad.core.setting import Plain
 from skidpad.core.settings import Settings, load_profile
@@ -407,6 +409,23 @@ LEFT_OUT: dict[str, tuple[Any, ...]] = {
 }
 OURS = "skidpad."  # stacks of this package are no foreign code
 _DIGITS: dict[type[Struct], int] = {Roads: 3, Scenario: 6, Route: 5}  # of the seed in a name
+
+
+def check_limits(values: Struct) -> None:
+    """Raises ConfigError for the first number outside the limits that its field declares."""
+    for name, low, high in _limits(type(values)):
+        require_range(name, getattr(values, name), low, high)
+
+
+@cache
+def _limits(kind: type[Struct]) -> tuple[tuple[str, float, float], ...]:
+    """Returns the least and the greatest value of each number of a struct that declares one."""
+    return tuple(
+        (field.name, -inf if meta.ge is None else meta.ge, inf if meta.le is None else meta.le)
+        for field in msgspec.structs.fields(kind)
+        for meta in getattr(field.type, "__metadata__", ())
+        if isinstance(meta, Meta) and (meta.ge is not None or meta.le is not None)
+    )
 
 
 def run_from_plain(plain: dict[str, Any], where: str) -> RunSpec:

@@ -97,6 +97,8 @@ class DriveEnv(gymnasium.Env):  # type: ignore[misc]
         render_mode: None = None,
     ) -> None:
         self.render_mode = render_mode
+        if seeds is not None and not len(seeds):
+            raise ConfigError("seeds: at least one is needed, or None for any")
         self.rewards, self.seeds = check_weights(rewards), None if seeds is None else tuple(seeds)
         self.observation_space = spaces.Box(LOW, HIGH, dtype=np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (2 if steers else 1,), np.float32)

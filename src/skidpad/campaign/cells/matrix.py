@@ -10,7 +10,14 @@ from msgspec import structs
 
 from skidpad.campaign.driving.drivers import NUMBERS
 from skidpad.core.errors import ConfigError, require_range
-from skidpad.core.run import REFERENCE, AdasDriver, DriverSpec, ReferenceDriver, RunSpec
+from skidpad.core.run import (
+    REFERENCE,
+    AdasDriver,
+    DriverSpec,
+    ReferenceDriver,
+    RunSpec,
+    check_limits,
+)
 from skidpad.core.told import describe_value
 from skidpad.core.weather import RANGES, Weather
 from skidpad.stack.configurations import (
@@ -136,8 +143,14 @@ def seeds(n: int, first: int = FIRST_SEED) -> range:
 
 
 def describe_run(driver: DriverSpec, weather: Weather, seed: int, template: RunSpec) -> RunSpec:
-    """Returns the template with this driver in this weather: what commands and `drive` run."""
-    return structs.replace(template, driver=driver, weather=weather, seed=seed)
+    """Returns the template with this driver in this weather: what commands and `drive` run.
+
+    Raises ConfigError for a number outside the limits of its field.
+    """
+    described = structs.replace(template, driver=driver, weather=weather, seed=seed)
+    check_limits(described)
+    check_limits(described.course)
+    return described
 
 
 def cross(

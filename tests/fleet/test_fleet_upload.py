@@ -104,6 +104,15 @@ def test_off_line_everything_waits_and_goes_when_somebody_answers(lite, tmp_path
     assert send_all(spool, away, 10.0, pauses.append).waiting == 3  # gives up, keeps
 
 
+def test_a_page_in_place_of_the_fleet_keeps_what_waits(tmp_path):
+    """A wireless network answers 200 with its log-in page; the raw ValueError ended the vehicle's sender."""
+    spool = Spool(tmp_path / "spool")
+    spool_folder(spool, monitored(tmp_path / "m"))
+    for page in ("<html>please log in</html>", "[]"):
+        sent = send(spool, lambda batch, page=page: httpx.Response(200, text=page))
+        assert (sent.acknowledged, sent.refused, sent.waiting) == (0, 0, 3)
+
+
 def test_an_answer_that_was_lost_is_given_again(lite, tmp_path):
     """The commit happened, the answer did not arrive: the next sending gets the same ids."""
     spool, post = Spool(tmp_path / "spool"), through(lite)

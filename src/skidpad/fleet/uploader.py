@@ -92,7 +92,7 @@ async def _through(
 
 
 def send(spool: Spool, post: Post) -> Sent:
-    """Sends what waits, once each, until the fleet is busy or off line; returns the counts.
+    """Sends what waits, once each, until the fleet is busy or out of reach; returns the counts.
 
     BackendError when the credential is not accepted: waiting would not help.
     """
@@ -105,7 +105,10 @@ def send(spool: Spool, post: Post) -> Sent:
         if answer.status_code in DENIED:
             raise BackendError(f"the fleet does not accept this vehicle: {_detail(answer)}")
         if answer.status_code == 200:
-            spool.acknowledge(batch.key, answer.json())
+            receipt = _receipt(answer)
+            if receipt is None:
+                break  # somebody between answered, such as the page of a wireless network
+            spool.acknowledge(batch.key, receipt)
             acknowledged += 1
         elif answer.status_code in FINAL:
             spool.refuse(batch.key)
@@ -145,6 +148,15 @@ def rounds(
         look()
         yield send_now()
         sleep(every_s)
+
+
+def _receipt(answer: httpx.Response) -> dict[str, Any] | None:
+    """Returns the fleet's receipt for a batch; None where the answer is no JSON object, so not its own."""
+    try:
+        receipt = answer.json()
+    except ValueError:
+        return None
+    return receipt if isinstance(receipt, dict) else None
 
 
 def _detail(answer: httpx.Response) -> Any:

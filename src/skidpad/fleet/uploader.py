@@ -107,7 +107,7 @@ def send(spool: Spool, post: Post) -> Sent:
         if answer.status_code == 200:
             receipt = _receipt(answer)
             if receipt is None:
-                break  # somebody between answered, such as the page of a wireless network
+                break  # not from the fleet: the log-in page of a wireless network, for example
             spool.acknowledge(batch.key, receipt)
             acknowledged += 1
         elif answer.status_code in FINAL:

@@ -105,6 +105,25 @@ def crosses_box(
 
 
 @inner_kernel
+def crosses_actor(
+    world: RadarWorld,
+    i: int,
+    c: float,
+    s: float,
+    place: tuple[float, float, float],
+    way: tuple[float, float, float],
+) -> bool:
+    """Whether the way from a point meets the box of actor i.
+
+    c, s: of the actor's yaw; place: of the point in m in the actor's axes; way: m in the world's axes.
+    """
+    o = (place[0], place[1], place[2] - world.height[i] / 2.0)
+    d = (c * way[0] + s * way[1], -s * way[0] + c * way[1], way[2])
+    half = (world.length[i] / 2.0, world.width[i] / 2.0, world.height[i] / 2.0)
+    return bool(crosses_box(o, d, half))
+
+
+@inner_kernel
 def is_hidden(
     world: RadarWorld,
     states: ActorStates,
@@ -118,11 +137,8 @@ def is_hidden(
         i = screens.row[k]
         if i == own:
             continue
-        c, s = screens.cos[k], screens.sin[k]
-        o = (screens.x[k], screens.y[k], origin[2] - states.z[i] - world.height[i] / 2.0)
-        d = (c * way[0] + s * way[1], -s * way[0] + c * way[1], way[2])
-        half = (world.length[i] / 2.0, world.width[i] / 2.0, world.height[i] / 2.0)
-        if crosses_box(o, d, half):
+        place = (screens.x[k], screens.y[k], origin[2] - states.z[i])
+        if crosses_actor(world, i, screens.cos[k], screens.sin[k], place, way):
             return True
     return False
 

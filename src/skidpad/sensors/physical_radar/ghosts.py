@@ -26,7 +26,7 @@ from skidpad.sensors.physical_radar.echoes import (
     RadarWorld,
     Screens,
     Sensor,
-    crosses_box,
+    crosses_actor,
     deposit_echo,
     draw_spread,
     echo_of,
@@ -132,10 +132,8 @@ def _is_blocked(
             continue
         c, s = screens.cos[k], screens.sin[k]
         dx, dy = start[0] - states.x[i], start[1] - states.y[i]
-        o = (c * dx + s * dy, -s * dx + c * dy, start[2] - states.z[i] - world.height[i] / 2.0)
-        d = (c * second[0] + s * second[1], -s * second[0] + c * second[1], second[2])
-        half = (world.length[i] / 2.0, world.width[i] / 2.0, world.height[i] / 2.0)
-        if crosses_box(o, d, half):
+        place = (c * dx + s * dy, -s * dx + c * dy, start[2] - states.z[i])
+        if crosses_actor(world, i, c, s, place, second):
             return True
     return False
 

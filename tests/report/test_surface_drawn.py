@@ -69,5 +69,9 @@ def test_a_folder_says_its_surface_and_one_without_says_none(tmp_path):
     assert read_run_surface(tmp_path) == ()
     (tmp_path / "config.yaml").write_text("version: 2\nsurface:\n- {ice_mm: 3.0, road: 1}\n")
     assert read_run_surface(tmp_path) == (SurfacePatch(ice_mm=3.0, road=1),)
+    cold = "- {ice_mm: 3.0, road: 1, air_below_c: 1.0}\nweather: {air_temperature_c: %s}\n"
+    for air_c, there in ((0.5, 1), (1.5, 0)):
+        (tmp_path / "config.yaml").write_text(f"version: 2\nsurface:\n{cold % air_c}")
+        assert len(read_run_surface(tmp_path)) == there
     (tmp_path / "config.yaml").write_text("version: 2\n")
     assert read_run_surface(tmp_path) == ()

@@ -21,6 +21,7 @@ from skidpad.cockpit.words import Link, Live, Pace
 from skidpad.core.run import AdasDriver, Roads, RunSpec, run_from_plain
 from skidpad.core.setup import DT
 from skidpad.core.states import ActorTable
+from skidpad.core.surface import present_patches
 from skidpad.simulation.pacing import Pacer
 
 
@@ -64,7 +65,8 @@ def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
 
     map = stage_of(spec).map
     looks = Looks(spec.scenery, spec.bodywork)
-    screen = Screen(feed, link, map, describe, spec.seed, spec.surface, looks)
+    surface = present_patches(spec.surface, spec.weather.air_temperature_c)
+    screen = Screen(feed, link, map, describe, spec.seed, surface, looks)
     time = CockpitPacer(link, screen.show, own_gc=about["own_gc"])
     try:
         driven = drive_at_desk(spec, desk, folder, (screen, time))

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import inf
 from typing import Literal
 
 from msgspec import Struct
 
 from skidpad.core.errors import ConfigError, require_range
+from skidpad.core.weather import RANGES
 
 FRICTION = (0.01, 1.5)  # times the friction that is there without the patch
 WATER_MM = (0.0, 10.0)  # for friction, deeper than 2 counts as 2 (docs/physics.md)
 ICE_MM = (0.0, 20.0)
 SNOW_MM = (0.0, 2000.0)
 RADIUS = (0.1, 1000.0)  # m
+AIR_C = RANGES["air_temperature_c"]  # of weather
 
 
 class SurfacePatch(
@@ -30,7 +33,9 @@ class SurfacePatch(
         road: OpenDRIVE id; the area is a stretch of it.
         lane: OpenDRIVE id of a lane of it; None: all driving lanes.
         s: from and to along the road, m; None: the whole road.
+        bridges: the area is every bridge that the map names.
         side: half of each lane, seen in its driving direction.
+        air_below_c: the patch is there while the air is colder, degrees Celsius; None: always.
     """
 
     name: str = ""
@@ -43,7 +48,9 @@ class SurfacePatch(
     road: int | None = None
     lane: int | None = None
     s: tuple[float, float] | None = None
+    bridges: bool = False
     side: Literal["both", "left", "right"] = "both"
+    air_below_c: float | None = None
 
     def __post_init__(self) -> None:
         self._require_what()
@@ -61,22 +68,29 @@ class SurfacePatch(
             require_range("friction", self.friction, *FRICTION)
 
     def _require_where(self) -> None:
-        """Raises ConfigError unless the patch has exactly one valid area: circle, polygon or road."""
-        areas = (self.circle is not None, bool(self.polygon), self.road is not None)
+        """Raises ConfigError unless the area is one valid circle, polygon, road, or the bridges."""
+        areas = (self.circle is not None, bool(self.polygon), self.road is not None, self.bridges)
         if sum(areas) != 1:
-            raise ConfigError("needs one of circle, polygon and road")
-        if self.road is None and (
-            self.lane is not None or self.s is not None or self.side != "both"
-        ):
-            raise ConfigError("lane, s and side go with a road")
+            raise ConfigError("needs one of circle, polygon, road and bridges")
+        if self.road is None and (self.lane is not None or self.s is not None):
+            raise ConfigError("lane and s go with a road")
+        if self.road is None and not self.bridges and self.side != "both":
+            raise ConfigError("side goes with a road or bridges")
         if self.polygon and len(self.polygon) < 3:
             raise ConfigError(f"polygon needs at least 3 corners, got {len(self.polygon)}")
         if self.circle is not None:
             require_range("circle's radius", self.circle[2], *RADIUS)
         if self.s is not None and not 0.0 <= self.s[0] < self.s[1]:
             raise ConfigError(f"s must run from 0 or more to more, got {list(self.s)}")
+        if self.air_below_c is not None:
+            require_range("air_below_c", self.air_below_c, *AIR_C)
 
     @property
     def stretch(self) -> tuple[float, float]:
         """Returns where the patch begins and ends along its road, m; without `s` it covers the whole road."""
         return (0.0, inf) if self.s is None else self.s
+
+
+def present_patches(surface: Iterable[SurfacePatch], air_c: float) -> tuple[SurfacePatch, ...]:
+    """Returns the patches that are there in air of this temperature, in degrees Celsius."""
+    return tuple(p for p in surface if p.air_below_c is None or air_c < p.air_below_c)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from skidpad.roads.roadside import (
     Barrier,
     BarrierKind,
     Box,
+    Bridge,
     ParkingSpace,
     Roadside,
     SignalHead,
@@ -62,7 +63,7 @@ class BakedMap:
     def content_hash(self) -> str:
         """Returns the SHA-256 in hex over names, types, shapes and values of all arrays (X-1, L-6).
 
-        Name, projection and ego's start are not part of it; -0.0 is 0.0 and every NaN the same.
+        Name, projection, ego's start and bridges are not part of it; -0.0 is 0.0 and every NaN the same.
         """
         digest = hashlib.sha256()
         for name, values in self.arrays().items():
@@ -82,6 +83,7 @@ class BakedMap:
             "name": self.name,
             "geo_reference": self.geo_reference,
             "ego_start": None if start is None else [start.road, start.lane, start.s],
+            "bridges": [astuple(bridge) for bridge in self.roadside.bridges],
         }
         buffer = BytesIO()
         content: dict[str, Any] = {"about": np.array(json.dumps(about)), **self.arrays()}
@@ -105,7 +107,9 @@ def load_baked(path: Path) -> BakedMap:
             samples=LaneSamples(*(arrays[f"samples.{c}"] for c in LaneSamples._fields)),
             lanes=LaneTable(*(arrays[f"lanes.{c}"] for c in LaneTable._fields)),
             signals=SignalTable(*(arrays[f"signals.{c}"] for c in SignalTable._fields)),
-            roadside=_roadside(arrays),
+            roadside=replace(
+                _roadside(arrays), bridges=tuple(_bridge(*b) for b in about.get("bridges", []))
+            ),
             geo_reference=str(about["geo_reference"]),
             ego_start=None if start is None else _start(*start),
         )
@@ -120,6 +124,12 @@ def load_baked(path: Path) -> BakedMap:
 def _start(road: int, lane: int, s: float) -> LanePosition:
     """Returns the lane position of a road id, a lane id and an s in m."""
     return LanePosition(int(road), int(lane), float(s))
+
+
+def _bridge(road: int, s_from: float, s_to: float, lanes: list[int] | None) -> Bridge:
+    """Returns the bridge of a road id, s from and to in m, and the least and greatest lane id or None."""
+    low_high = None if lanes is None else (int(lanes[0]), int(lanes[1]))
+    return Bridge(int(road), float(s_from), float(s_to), low_high)
 
 
 def _roadside_arrays(roadside: Roadside) -> dict[str, NDArray[Any]]:

@@ -88,6 +88,16 @@ class ParkingSpace:
 
 
 @dataclass(frozen=True, slots=True)
+class Bridge:
+    """A stretch of a road that leads over a bridge."""
+
+    road: int  # OpenDRIVE id
+    s_from: float  # m along the road
+    s_to: float
+    lanes: tuple[int, int] | None = None  # least and greatest lane id; None: all
+
+
+@dataclass(frozen=True, slots=True)
 class Roadside:
     """All of it for one map."""
 
@@ -96,3 +106,4 @@ class Roadside:
     heads: tuple[SignalHead, ...] = ()
     crosswalks: tuple[NDArray[np.float64], ...] = ()  # (k, 3) polygons
     parking: tuple[ParkingSpace, ...] = ()
+    bridges: tuple[Bridge, ...] = ()

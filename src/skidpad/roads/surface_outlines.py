@@ -9,6 +9,7 @@ import numpy as np
 
 from skidpad.core.arrays import Floats
 from skidpad.core.surface import SurfacePatch
+from skidpad.roads.bridges import spread_over_bridges
 from skidpad.roads.queries import RoadMap
 
 CORNERS = 32  # of a circle
@@ -37,7 +38,7 @@ def outline_patches(map: RoadMap, surface: Sequence[SurfacePatch]) -> list[Patch
     """Returns the polygons of all patches: one for an area, one per lane for a stretch of road."""
     return [
         PatchOutline(patch_kind(patch), patch.name, corners)
-        for patch in surface
+        for patch in spread_over_bridges(map, surface)
         for corners in _pieces(map, patch)
     ]
 

@@ -8,12 +8,15 @@ import pytest
 from shapely.geometry import Point, Polygon
 
 from skidpad.campaign.driving.surfaces import read_surface
-from skidpad.core.errors import ConfigError
-from skidpad.core.surface import SurfacePatch
+from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.surface import SurfacePatch, present_patches
 from skidpad.core.vocabulary import GripModel
 from skidpad.physics.grip import Road, grip_params, mu_at, physical_params, road_surface
 from skidpad.physics.presets import find_weather
-from skidpad.roads.bundled import load_map
+from skidpad.roads.baked import load_baked
+from skidpad.roads.bundled import FOLDER, bake_file, load_map
+from skidpad.roads.roadside import Bridge
+from skidpad.roads.surface_outlines import outline_patches
 from skidpad.simulation.world.patches import Patches
 
 ROAD = load_map("straight")
@@ -124,12 +127,19 @@ def test_the_kernel_finds_the_patch_that_plain_words_find():
     [
         ("puddles: []", "must be a mapping with `patches`"),
         ("patches: []", "a list of at least one patch"),
-        ("patches: [{water_mm: 1}]", "patches[0]: needs one of circle, polygon and road"),
+        ("patches: [{water_mm: 1}]", "patches[0]: needs one of circle, polygon, road and bridges"),
         ("patches: [{circle: [0, 0, 1]}]", "needs either friction or a depth"),
         ("patches: [{friction: 0.5, ice_mm: 1, road: 1}]", "needs either friction or a depth"),
         ("patches: [{water_mm: 13, road: 1}]", "water_mm must be between 0 and 10, got 13"),
         ("patches: [{friction: 0, road: 1}]", "friction must be between 0.01 and 1.5, got 0"),
-        ("patches: [{friction: 0.5, circle: [0, 0, 1], side: left}]", "go with a road"),
+        ("patches: [{friction: 0.5, circle: [0, 0, 1], side: left}]", "side goes with a road or"),
+        ("patches: [{friction: 0.5, circle: [0, 0, 1], s: [0, 1]}]", "lane and s go with a road"),
+        ("patches: [{ice_mm: 1, bridges: true, road: 1}]", "needs one of circle, polygon, road"),
+        ("patches: [{ice_mm: 1, bridges: true, lane: 1}]", "lane and s go with a road"),
+        (
+            "patches: [{ice_mm: 1, bridges: true, air_below_c: 80}]",
+            "air_below_c must be between -60 and 60, got 80",
+        ),
         ("patches: [{friction: 0.5, road: 1, s: [5, 5]}]", "s must run from 0 or more to more"),
         ("patches: [{friction: 0.5, polygon: [[0, 0], [1, 1]]}]", "at least 3 corners, got 2"),
         ("patches: [{mud: 1}]", "mud"),
@@ -158,3 +168,88 @@ def test_a_patch_on_no_road_of_the_map_says_what_there_is(patch, complaint):
     with pytest.raises(ConfigError) as caught:
         patches(patch)
     assert complaint in str(caught.value)
+
+
+BRIDGE = '<objects><bridge id="b" s="300" length="40" name="" type="concrete">{}</bridge>'
+
+
+def bridge_map(folder, lanes=""):
+    """The straight road, of which 40 m are a bridge."""
+    text = (FOLDER / "straight.xodr").read_text("utf-8")
+    assert text.count("<objects>") == 1
+    (folder / "bridge.xodr").write_text(text.replace("<objects>", BRIDGE.format(lanes)))
+    return load_map(folder / "bridge.xodr")
+
+
+def icy_bridge(map, air_c, **where):
+    """Ice on bridges below 1 degree, in air of this temperature above a road at 4 degrees."""
+    weather = replace(find_weather("clear-noon"), air_temperature_c=air_c, road_temperature_c=4.0)
+    ice = SurfacePatch(ice_mm=1.0, air_below_c=1.0, **(where or {"bridges": True}))
+    return Patches(map, [ice], Road(weather, GripModel.PHYSICAL))
+
+
+def friction_along(map, found, lane=-2):
+    """The share of the friction in the middle of a lane at 290, 310, 330 and 350 m."""
+    i = int(np.flatnonzero((map.lanes.road == PLACE.road) & (map.lanes.lane_id == lane))[0])
+    at = [
+        map.at(i, s - float(map.samples.s_road[map.lanes.first[i]])) for s in (290, 310, 330, 350)
+    ]
+    return [found.ratio_at(p.x, p.y, p.z) for p in at]
+
+
+def test_bridges_of_the_map_are_icy_while_the_air_is_colder_than_said(tmp_path):
+    map = bridge_map(tmp_path)
+    assert friction_along(map, icy_bridge(map, 1.0)) == [1.0] * 4
+    before, one, two, after = friction_along(map, icy_bridge(map, 0.9))
+    assert (before, after) == (1.0, 1.0)
+    assert one == two < 0.15
+    by_hand = icy_bridge(ROAD, 0.9, road=PLACE.road, s=(300.0, 340.0))
+    assert friction_along(ROAD, by_hand) == [before, one, two, after]
+
+
+def test_a_bridge_under_some_lanes_freezes_there_alone(tmp_path):
+    map = bridge_map(tmp_path, '<validity fromLane="-2" toLane="-2"/>')
+    found = icy_bridge(map, -3.0)
+    assert friction_along(map, found, -2)[1] < 0.15
+    assert friction_along(map, found, -3)[1] == 1.0
+
+
+def test_colder_weather_lays_the_ice_and_warmer_weather_takes_it(tmp_path):
+    map = bridge_map(tmp_path)
+    found = icy_bridge(map, 5.0)
+    for air_c, icy in ((5.0, False), (-1.0, True), (5.0, False)):
+        found.lay(replace(found.road, weather=replace(found.road.weather, air_temperature_c=air_c)))
+        assert (friction_along(map, found)[1] < 0.5) is icy
+
+
+def test_a_baked_file_keeps_the_bridges_and_they_change_no_hash(tmp_path):
+    map = bridge_map(tmp_path, '<validity fromLane="-3" toLane="-2"/>')
+    baked = bake_file(tmp_path / "bridge.xodr")
+    assert baked.roadside.bridges == (Bridge(PLACE.road, 300.0, 340.0, (-3, -2)),)
+    baked.save(tmp_path / "bridge.npz")
+    assert load_baked(tmp_path / "bridge.npz").roadside.bridges == baked.roadside.bridges
+    assert map.content_hash == ROAD.content_hash
+
+
+def test_bridges_are_drawn_where_they_are_and_only_when_cold(tmp_path):
+    map = bridge_map(tmp_path)
+    ice = SurfacePatch(ice_mm=1.0, bridges=True, air_below_c=1.0)
+    shown = outline_patches(map, present_patches([ice], 0.0))
+    corners = [corner for outline in shown for corner in outline.corners.tolist()]
+    along = [map.s_road(map.project(*corner)) for corner in corners]
+    assert {o.kind for o in shown} == {"ice"}
+    assert max(along) - min(along) == pytest.approx(40.0, abs=2.5)
+    assert present_patches([ice], 1.0) == ()
+
+
+def test_a_map_without_bridges_says_so():
+    with pytest.raises(ConfigError, match=r"map straight names no <bridge>; say road and s"):
+        icy_bridge(ROAD, -3.0)
+
+
+def test_a_wrong_bridge_of_a_map_names_file_line_and_field(tmp_path):
+    text = (FOLDER / "straight.xodr").read_text("utf-8")
+    wrong = BRIDGE.format("").replace('length="40"', 'length="-4"')
+    (tmp_path / "bad.xodr").write_text(text.replace("<objects>", wrong))
+    with pytest.raises(FileError, match=r"bad.xodr, line \d+: <bridge id=b> needs length of 0"):
+        load_map(tmp_path / "bad.xodr")

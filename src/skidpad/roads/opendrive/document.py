@@ -107,6 +107,7 @@ class RoadRecord:
     signals: tuple[Node, ...]  # <signal>
     references: tuple[Node, ...]  # <signalReference>
     objects: tuple[Node, ...]  # <object>
+    bridges: tuple[Node, ...]  # <bridge>
 
 
 @dataclass(frozen=True, slots=True)
@@ -298,6 +299,7 @@ def _road(read: Reader, node: Node) -> RoadRecord:
         signals=tuple(node.findall("signals/signal")),
         references=tuple(node.findall("signals/signalReference")),
         objects=tuple(node.findall("objects/object")),
+        bridges=tuple(node.findall("objects/bridge")),
     )
 
 

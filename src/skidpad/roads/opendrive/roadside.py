@@ -11,6 +11,7 @@ import shapely
 from skidpad.core.arrays import Floats
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.lanes import SignalTable
+from skidpad.roads.opendrive.bridges import bridges_of
 from skidpad.roads.opendrive.document import Document, Node, Reader, RoadRecord
 from skidpad.roads.opendrive.lane_shapes import LaneShape
 from skidpad.roads.opendrive.signals import road_place, signal_heads
@@ -89,6 +90,7 @@ def roadside(document: Document, signals: SignalTable, shapes: Sequence[LaneShap
         heads,
         tuple(crosswalks),
         tuple(parking),
+        tuple(b for road in document.roads.values() for b in bridges_of(read, road)),
     )
 
 

@@ -14,9 +14,10 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import hold
 from skidpad.core.states import ActorStates
-from skidpad.core.surface import SurfacePatch
+from skidpad.core.surface import SurfacePatch, present_patches
 from skidpad.physics.grip import GripParams, Road, road_surface
 from skidpad.physics.types import VehicleType
+from skidpad.roads.bridges import spread_over_bridges
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.world.patch_kernel import (
     ANY,
@@ -52,11 +53,13 @@ class Patches:
         """road: without patches. lanes: shares of its friction that materials make, under them.
 
         Raises:
-            ConfigError: a patch lies on no road of the map, or none of its lanes has such a stretch.
+            ConfigError: a patch lies on no road of the map, none of its lanes has such a stretch, or it
+                asks for bridges where the map names none.
         """
-        self.map, self.patches, self.lanes = map, tuple(patches), lanes or {}
-        for k, patch in enumerate(self.patches):
+        self.map, self.lanes = map, lanes or {}
+        for k, patch in enumerate(patches):
             _check(k, patch, map)
+        self.patches = spread_over_bridges(map, patches)
         self._place, self._tyres = np.zeros((0, 4, 2)), list[str]()
         self.lay(road)
 
@@ -88,7 +91,8 @@ class Patches:
         self._wheels = WheelPlaces(
             self._place, np.array([self.kinds.index(n) for n in own], np.int64)
         )
-        self._held = hold(_arrays(self.map, self.patches, self.lanes, self.road, self.kinds))
+        here = present_patches(self.patches, self.road.weather.air_temperature_c)
+        self._held = hold(_arrays(self.map, here, self.lanes, self.road, self.kinds))
 
     def fill(self, states: ActorStates, share: Floats, stiffness: Floats, film: Floats) -> None:
         """Set what patches do to the wheels, (w, 4) at FL, FR, RL, RR.

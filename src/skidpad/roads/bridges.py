@@ -36,8 +36,8 @@ def _parts(map: RoadMap, k: int, patch: SurfacePatch) -> Iterator[SurfacePatch]:
             )
 
 
-def _lanes(map: RoadMap, bridge: Bridge) -> list[int | None]:
-    """Returns the ids of the lanes that a bridge carries, [None] for all."""
+def _lanes(map: RoadMap, bridge: Bridge) -> Sequence[int | None]:
+    """Returns the ids of the lanes that a bridge carries or [None] for all."""
     if bridge.lanes is None:
         return [None]
     low, high = bridge.lanes

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from skidpad.roads.opendrive.document import Node, Reader, RoadRecord
 from skidpad.roads.roadside import Bridge
@@ -16,12 +17,14 @@ def bridges_of(read: Reader, road: RoadRecord) -> Iterator[Bridge]:
     for node in road.bridges:
         s, length = (_place(read, node, name) for name in ("s", "length"))
         end = round(min(s + length, road.length), 5)
-        valid = node.findall("validity")
-        lanes = [(read.integer(v, "fromLane"), read.integer(v, "toLane")) for v in valid]
-        if s < end:
-            for span in lanes or [None]:
-                ends = None if span is None else (min(span), max(span))
-                yield Bridge(road.id, round(s, 5), end, ends)
+        whole = Bridge(road.id, round(s, 5), end)
+        if s >= end:
+            continue
+        spans = [
+            sorted(read.integer(valid, name) for name in ("fromLane", "toLane"))
+            for valid in node.findall("validity")
+        ]
+        yield from [replace(whole, lanes=(low, high)) for low, high in spans] or [whole]
 
 
 def _place(read: Reader, node: Node, name: str) -> float:

@@ -80,8 +80,10 @@ def test_the_sun_stands_where_spherical_trigonometry_has_it():
     assert sun_at("2026-03-20T06:00:00.000+01:00") == pytest.approx((0.0, 90.0), abs=1e-9)
     assert sun_at("2026-03-20T18:00:00") == pytest.approx((0.0, 270.0), abs=1e-9)
     assert sun_at("2026-03-20T00:00:00")[0] == pytest.approx(-45.0)
-    with pytest.raises(FileError, match="dateTime"):
-        sun_at("tomorrow")
+    assert sun_at("2026-03-20T12:00Z") == pytest.approx((45.0, 180.0))
+    for wrong in ("tomorrow", "2026-03-20T25:99:00", "2026-03-20"):
+        with pytest.raises(FileError, match="dateTime"):
+            sun_at(wrong)
 
 
 def test_what_is_not_said_stays_and_what_is_too_much_is_held_in_range():

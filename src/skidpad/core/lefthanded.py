@@ -47,7 +47,10 @@ def turn_from_carla(x: float, y: float, z: float) -> tuple[float, float, float]:
 def poses_to_carla(
     x: Floats, y: Floats, z: Floats, roll: Floats, pitch: Floats, yaw: Floats
 ) -> Floats:
-    """Returns (n, 6) x, y, z in m, pitch, yaw, roll in deg, as CARLA's snapshots order them."""
+    """Returns (n, 6) CARLA's x, y, z in m, pitch, yaw, roll in deg, in the order of its snapshots.
+
+    Arguments: (n,) each, in m and rad, in ISO 8855 axes.
+    """
     turned = np.where(yaw == pi, 180.0, np.degrees(-yaw))  # in (-180, 180]
     return np.column_stack((x, -y, z, np.degrees(-pitch), turned, np.degrees(roll)))
 

@@ -20,7 +20,7 @@ WHERE = f"{__name__}:ActionStack"  # as `--stack` takes it
 class ActionStack:
     """Turns actions into commands; where an action has no steer, lane centring steers.
 
-    settings: `actions`, one per tick, drives a list of actions again; after its end the car rolls.
+    settings: `actions`, one per tick, drives a list of actions again; after its end the last one stays.
     """
 
     def __init__(
@@ -33,7 +33,11 @@ class ActionStack:
         self.smoothing = Smoothing(DT)
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
-        """Returns the command of the present action."""
+        """Returns the command of the tick's recorded action, else of the last one set.
+
+        An action is the pedal in -1..1 (below 0: brake) and the steer in -1..1; where it has no steer,
+        lane centring steers by the frame.
+        """
         if frame.tick < len(self.recorded):
             self.action = self.recorded[frame.tick]
         pedal = self.action[0]

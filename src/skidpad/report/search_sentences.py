@@ -76,7 +76,7 @@ def group_sentence(group: Group) -> str:
 
 
 def change_text(change: Change) -> str:
-    """Returns a change in words, as "LeadS 118.2 instead of 117.9"."""
+    """Returns a change as text, harmless value first: "LeadS 118.2 instead of 117.9"."""
     return f"{change.name} {_precise(change.harmless)} instead of {_precise(change.failing)}"
 
 

@@ -116,7 +116,11 @@ def parse_space(texts: Iterable[str]) -> Space:
 
 
 def check_space(space: Space) -> Space:
-    """Return the space; ConfigError for a weather that is none, or values outside a field's range."""
+    """Returns the same space; raises ConfigError where a law does not fit its variable.
+
+    The seed takes a range, `weather` known presets, `weather.FIELD` a range within that of a known
+    field; other variables are not checked.
+    """
     for variable in space.variables:
         _require_own(variable)
     return space

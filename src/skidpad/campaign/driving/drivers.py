@@ -73,9 +73,10 @@ def find_driver(
 
 
 def _describe_ours(name: str, label: str) -> DriverSpec | None:
-    """Returns the driver of this name that is no user's class; None where it is written as a class.
+    """Returns the driver of a name of ours or of "agent:PATH:CLASS"; None for other text with ":".
 
-    Raises ConfigError for a name without ":" that is unknown.
+    label: what results call a numbered configuration, "" for its name; other drivers ignore it.
+    Raises ConfigError for an unknown name without ":".
     """
     if name in NUMBERS:
         return structs.replace(numbered_driver(NUMBERS[name]), label=label or name)

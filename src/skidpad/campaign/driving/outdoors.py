@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import asin, atan2, cos, degrees, log, pi, radians, sin
@@ -25,6 +26,7 @@ from skidpad.scenarios.signals import held_lights
 from skidpad.simulation.backend import Backend
 
 NAME = "file"  # of the weather that a file describes
+CLOCK = re.compile(r"\dT([01]\d|2[0-4]):([0-5]\d)")  # hour and minute of an ISO 8601 date and time
 LATITUDE = radians(45.0)  # of the sun where a file says the time only, at an equinox; assumption
 WATER = {  # wetness and standing water in percent by the words of the standard; our assumption
     Wetness.DRY: (0.0, 0.0),
@@ -179,12 +181,13 @@ def _sky(e: Environment) -> dict[str, float]:
 def sun_at(time: str) -> tuple[float, float]:
     """Returns elevation and azimuth (from north, clockwise) of the sun in deg at an ISO 8601 time.
 
-    At an equinox and 45 deg north, whatever the date; FileError for no such time.
+    At an equinox and 45 deg north, in solar time: date, seconds and zone do not matter. FileError
+    for what is no date and time of ISO 8601.
     """
-    try:
-        hour, minute = (int(part) for part in time.partition("T")[2].split(":")[:2])
-    except ValueError:
-        raise FileError(f"TimeOfDay: dateTime must be an ISO 8601 time, got {time!r}") from None
+    found = CLOCK.search(time)
+    if found is None:
+        raise FileError(f"TimeOfDay: dateTime must be an ISO 8601 time, got {time!r}")
+    hour, minute = int(found[1]), int(found[2])
     turn = (hour + minute / 60.0 - 12.0) * pi / 12.0
     elevation = asin(cos(LATITUDE) * cos(turn))
     azimuth = atan2(sin(turn), sin(LATITUDE) * cos(turn)) + pi

@@ -97,7 +97,7 @@ def same_segment(recording: Path) -> bool:
 
 
 def first_ticks(log: RunLog, n: int) -> RunLog:
-    """Returns the log cut to its first n ticks, n >= 1."""
+    """Returns the log cut to its first n ticks, events too; 1 <= n <= length of the log."""
 
     def cut_series(series: Any) -> Any:
         return type(series)._make(a[:n] for a in series)

@@ -132,7 +132,11 @@ class Noisy(Changed):
         return super().tick(replace(frame, segments=seen))
 
     def _disturb_segments(self, id: str, segments: Segments, tick: int) -> Segments:
-        """Returns the segments with a depth error, without far ones; none in a missed tick."""
+        """Returns a copy of a camera's segments with an error of depth; empty in a missed tick.
+
+        Segments beyond `range_share` of DEPTH_READ are left out (from 1 on, none). id: of the camera.
+        Each call draws the next error: call it once per tick and camera.
+        """
         factor = self._factor(id)
         keep = segments.depth <= self.noise.range_share * DEPTH_READ
         if self.noise.range_share >= 1.0:

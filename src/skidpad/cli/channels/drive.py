@@ -124,7 +124,7 @@ def _describe_monitor(folder: Path) -> str:
 def outcomes(
     folders: Annotated[list[Path], typer.Argument(help="Folders of `skidpad channels drive`.")],
 ) -> None:
-    """Compare drivers over the seeds that all have driven: does redundancy pay?"""
+    """Compare drivers over the routes and seeds that all have driven: does redundancy pay?"""
     from skidpad.core.errors import FileError
     from skidpad.recording.channels.drives import read_outcomes
 

@@ -285,7 +285,10 @@ def keys(
     out: Annotated[Path, typer.Option(help="Folder of the keys, off line, never below --data.")],
     database: Database = None,
 ) -> None:
-    """Begin a maker's updates: three keys each for root and list, two of which must sign."""
+    """Begin a maker's updates: three keys each for root and list, two of which must sign.
+
+    Writes the keys and root.json, which vehicles pin, to --out. A maker can begin only once.
+    """
     import time
 
     with fleet_extra():

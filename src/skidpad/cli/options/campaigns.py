@@ -134,7 +134,10 @@ class Estimate(Struct, frozen=True, kw_only=True):
             self._print(part, f"{name}: ")
 
     def _print(self, campaign: Campaign[Any, Any, Any], name: str) -> None:
-        """Prints how many minutes the campaign would take, from runs that were measured."""
+        """Drives a few runs of the campaign and prints how many minutes all of it would take.
+
+        name: text before the sentence, as it stands; "" for none.
+        """
         from skidpad.core.wording import count_text
 
         found, workers = campaign.estimate(), 1 if campaign.alone else self.workers

@@ -23,7 +23,10 @@ def recording_hash(path: Path) -> str:
 
 
 def _canonical(value: object) -> bytes:
-    """Returns the bytes of a value with -0.0 and NaN normalised."""
+    """Returns the bytes of an array with its shape and type, or of a text; -0.0 and NaN are normalised.
+
+    A dict counts by its sorted items as Python prints them; nothing within it is normalised.
+    """
     if isinstance(value, dict):
         return repr(sorted(value.items())).encode()
     if isinstance(value, str):

@@ -209,7 +209,11 @@ class RosRecording:
                 raise FileError(f"{path}: {topics.ego.topic} must be of type {ODOMETRY}")
 
     def _reader(self) -> Any:
-        """Returns the open bag; raises MissingExtra, ConfigError or FileError where that fails."""
+        """Returns a reader of the bag, which a `with` statement opens.
+
+        Raises MissingExtra without the package rosbags, ConfigError for an unknown typestore, FileError
+        for what is no bag; `with` raises FileError where it cannot be opened.
+        """
         try:
             from rosbags.highlevel import AnyReader, AnyReaderError
             from rosbags.typesys import Stores, get_typestore

@@ -19,7 +19,10 @@ ID_LIMIT = 2**63  # identities are the largest numbers of the format
 
 
 def decode_worlds(lines: Iterable[str], n_channels: int) -> tuple[Cycle, ...]:
-    """Returns the worlds of lines of `encode_worlds`; FileError names the line that cannot be read."""
+    """Returns the worlds of lines of `encode_worlds`; FileError gives the number of a faulty line.
+
+    The first line counts as line 2, since a head line comes before it in a record.
+    """
     decoder = _Decoder(n_channels)
     for number, line in enumerate(lines, start=2):
         try:

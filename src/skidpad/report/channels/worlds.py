@@ -48,9 +48,10 @@ def worlds_replay(record: HazardRecord) -> dict[str, Any] | None:
 
 
 def with_intentions(cycles: Sequence[Cycle]) -> list[Cycle]:
-    """Returns the cycles with each channel's last plan and predictions filled in, until it is silent.
+    """Returns the cycles with each channel's last plan and predictions kept until it is silent.
 
-    A record keeps them each 0.5 s only.
+    A record has them each 0.5 s only. What is filled in is of the earlier frame: its times count from
+    that frame, and rows of `predictions` are its objects; `prediction_t` is not filled in.
     """
     newest: dict[int, ChannelFrame] = {}
     out = []

@@ -156,9 +156,10 @@ class GripCampaign(CampaignView[GripEntry]):
         return found
 
     def with_delays(self) -> pl.DataFrame:
-        """Returns the results of the campaign proper with `delay_s`, null but for reduced friction.
+        """Returns the results of the campaign proper with `delay_s`, only for reduced friction.
 
-        Without any delay the column is missing.
+        It is null in other rows and where no delay was found. Without any pair of runs the column is
+        missing.
         """
         parts = []
         for key, values in self.delays.items():

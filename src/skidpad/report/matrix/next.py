@@ -63,7 +63,10 @@ def _kinds_figure(matrix: Matrix) -> Figure:
 
 
 def _next_most(totals: dict[str, int], runs: dict[str, pl.DataFrame], worst: str) -> str:
-    """Returns a clause on the configuration that comes next, which shows how close it is; "" without one."""
+    """Returns a clause, "; next ...", on the configuration with most events per run but `worst`.
+
+    It gives events and runs. totals: events by configuration. "" where no other has runs.
+    """
     others = [c for c in totals if c != worst and len(runs[c])]
     if not others:
         return ""

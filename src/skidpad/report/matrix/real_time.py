@@ -54,7 +54,7 @@ def real_time_blocks(matrix: Matrix) -> list[Block]:
 
 
 def _published_table() -> Block:
-    """Returns the table of published factors and shares of slow ticks, by where they were measured."""
+    """Returns the table of published factors and shares of slow ticks, by stage and group of runs."""
     rows = read_published(Source.REAL_TIME).filter(
         pl.col("quantity").is_in(["mean_rtf", SLOW])
         & pl.col("stage").is_in(["preliminary", "final"])

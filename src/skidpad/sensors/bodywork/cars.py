@@ -123,7 +123,7 @@ def _side_at(share: float) -> float:
 
 
 def _plan(style: CarStyle, size: _Size, x: float) -> float:
-    """Half-width of the hull at x in m: rounded at nose and tail."""
+    """Returns the half-width of the hull in m at x m ahead of its centre; less at nose and tail."""
     out = size.half
     for end, share, deep in ((1.0, style.nose, 0.62), (-1.0, style.tail, 0.42)):
         inside = 0.5 * size.length - end * x

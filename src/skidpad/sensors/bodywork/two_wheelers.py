@@ -78,7 +78,7 @@ def make_two_wheeler(
 
 
 def _choose_steered(wheels: list[Part]) -> list[Part]:
-    """Wheels of which only the front one steers."""
+    """Returns copies of all the wheels, of which the foremost alone is `steered`."""
     front = max(w.hub[0] for w in wheels)
     return [w._replace(steered=w.hub[0] == front) for w in wheels]
 

@@ -15,7 +15,12 @@ CUT = 0.3  # m, the plane before the camera at which edges are cut
 
 @inner_kernel
 def project_corners(view: View, corners: Floats, out: Floats) -> int:
-    """Writes points (k, 2) in px of corners (n, 3), edges cut before the camera, into `out`; returns k."""
+    """Writes image points in px of corners in the world, (n, 3) in m, to `out`; returns how many.
+
+    A corner less than CUT m before the camera gives way to the points where its lines to all corners
+    beyond meet that plane, so the order is no outline's; 0 where no corner lies beyond. out: (MOST, 2)
+    is enough for 16 corners.
+    """
     r, n, count = view.rotation, corners.shape[0], 0
     camera = np.empty((n, 3))
     for i in range(n):

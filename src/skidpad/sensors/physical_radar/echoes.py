@@ -187,7 +187,10 @@ def echo_of(
 def deposit_echo(
     radar: RadarSetup, cells: Cells, echo: Echo, section: float, tick: int, index: int
 ) -> None:
-    """Add the echo of a point of this section to its cells."""
+    """Adds the echo of a point with a radar cross section of `section` m² to `cells`.
+
+    tick, index: they choose the random phase; `index` counts the points that return an echo.
+    """
     grid = radar.grid
     at = (
         echo.distance / grid.range_step,

@@ -46,9 +46,10 @@ def project_block(
     view: View,
     scratch: Scratch,
 ) -> None:
-    """Writes `count` vertices from `first` on to `scratch`: camera axes, screen and frustum codes.
+    """Writes `count` vertices from `first` on to rows 0 to count - 1 of `scratch`.
 
-    turn, shift: their frame to camera.
+    A row has camera axes in m, column and row in px, inverse depth, and a code of the planes of sight
+    that it lies beyond. turn (3, 3), shift (3,): from the frame of the vertices to the camera.
     """
     m00, m01, m02 = turn[0, 0], turn[0, 1], turn[0, 2]
     m10, m11, m12 = turn[1, 0], turn[1, 1], turn[1, 2]

@@ -68,11 +68,12 @@ def still_on_lane(
 
 @inner_kernel
 def settle(lanes: LaneArrays, rows: Rows, noise: float, driving: bool, tick: int) -> None:
-    """Find the lane under every present actor and put those that are grounded on the surface.
+    """Finds the lane under every present actor and puts those that are grounded on its surface.
 
-    Writes states.z, `placed`, and the slopes along and across each body, rad. noise: rad of cross
-    slope. driving: on driving lanes only. Beyond 20 m of such a lane an actor keeps its height on
-    level ground.
+    Writes states.z, `placed`, and the slopes along and across each body, rad. An actor keeps its lane
+    while it is inside, else gets the nearest one (driving: of driving lanes only). Beyond 20 m of a
+    lane it keeps its height on level ground. noise: rad, bound of an error of the cross slope that
+    is drawn for each actor and tick.
     """
     states, placed, grade, bank = rows.states, rows.placed, rows.grade, rows.bank
     for i in range(len(grade)):

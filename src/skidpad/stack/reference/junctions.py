@@ -102,7 +102,11 @@ class GivingWay:
 
 
 def _leads(path: PathPoints, at: int, seen: SeenActors, i: int) -> bool:
-    """Returns whether actor i drives along the own path, ahead or behind: it is followed, or follows."""
+    """Returns whether actor i is on the own path, ahead or behind, and heads along it.
+
+    It is within BESIDE m of one of the points from 40 before to 79 after `at`, the own car's. Its
+    speed does not matter.
+    """
     near = slice(max(at - 40, 0), at + 80)
     d = np.hypot(path.x[near] - seen.x[i], path.y[near] - seen.y[i])
     k = int(np.argmin(d))

@@ -100,9 +100,11 @@ class PairIndicators:
         return NAN if earlier is None else float(np.hypot(dx - earlier[1], dy - earlier[2]))
 
     def prediction(self, similar: Values) -> Values:
-        """Returns agreement of both channels' plans and predictions, and the mean agreement of all.
+        """Returns the agreement of both channels' plans and predictions, its variance, and the mean.
 
-        similar: what `similarity` returned in this cycle.
+        Call it once per cycle, after `similarity`, whose result is `similar`: the variance is that of
+        the plans' agreement over all cycles so far. The mean is over AGREEING, `similar` included. What
+        is unknown is NaN and left out of the mean, which is NaN if nothing is known.
         """
         assert self.matched is not None
         a, b, decay = self.a, self.b, self.settings.decay

@@ -58,7 +58,7 @@ def ratio(name: str, row: Row) -> Cell:
 
 
 def count(name: str, row: Row) -> float | None:
-    """Returns the number in a row's field `name`, None where it has none."""
+    """Returns the value of a row's field `name` as it is; None where it is absent or null."""
     return row.get(name)
 
 

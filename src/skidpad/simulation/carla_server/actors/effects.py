@@ -60,9 +60,9 @@ class Remarks:
         self.made: set[tuple[str, str]] = set()
 
     def remark(self, blueprint: Blueprint, given: Mapping[str, str]) -> None:
-        """Logs each attribute of `given` that acts on nothing, once for each blueprint.
+        """Logs each attribute of `given` that acts on nothing, and a sensor that sends nothing.
 
-        given: what a client sent; default values are not logged.
+        Each is logged once per blueprint; default values and names that it lacks are not logged.
         """
         known = acting(blueprint)
         for name, value in given.items():

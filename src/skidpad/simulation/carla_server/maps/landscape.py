@@ -127,7 +127,11 @@ def _barriers(side: Roadside) -> Iterator[Found]:
 
 
 def pieces(points: NDArray[np.float64]) -> Iterator[tuple[int, int]]:
-    """Yields first and last point of each about straight piece of a line; neighbours share a point."""
+    """Yields indices of the first and last point of each nearly straight piece of a line (n, 2 or more).
+
+    A piece keeps within BULGE m of its chord and is at most LONGEST_PIECE m long, unless it is one
+    step of the line. Neighbours share a point; nothing for fewer than two points.
+    """
     first = 0
     while first < len(points) - 1:
         last = first + 1

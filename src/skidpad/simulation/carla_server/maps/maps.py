@@ -114,9 +114,11 @@ class MapStore:
         self._text = xodr
 
     def load(self, name: str) -> ServedMap:
-        """Returns the map of that name with its scenery; CallError `map not found` as CARLA says it.
+        """Returns the map of that name with its scenery; CallError `map not found` for no such map.
 
-        Folders before the name do not matter. CallError, too, for a client's text that is missing or faulty.
+        Folders before the name do not matter. OPENDRIVE_MAP is the text that a client sent: CallError
+        where it is missing or faulty. FileError for a faulty file, ConfigError for a map that has no
+        room for a spawn point.
         """
         short = name.rsplit("/", 1)[-1]
         if short == OPENDRIVE_MAP:

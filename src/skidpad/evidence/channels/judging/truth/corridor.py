@@ -61,9 +61,11 @@ class Corridor:
         self.half_width = float(np.abs(polygon[:, 1]).max(initial=0.0))
 
     def places(self, objects: Floats, polygons: Floats) -> tuple[Flags, Flags]:
-        """Returns which of n objects (n, 5) with polygons (n, k, 2) are on the path, and which are ahead.
+        """Returns which objects are on the path, and which lie farther along it than the ego, (n,) bool.
 
-        On the path are those that reach into it and head along it within SAME_PATH; both are (n,) bool.
+        objects: (n, 5) x, y, heading, vx, vy; polygons: (n, k, 2) in m, each in its object's own axes. On
+        the path are those that reach into it and head along it within SAME_PATH, none with NaN in its
+        row. Those farther along need not be on it.
         """
         steps = np.diff(self.points, axis=0)
         length = np.maximum(_lengths(self.points), 1e-9)

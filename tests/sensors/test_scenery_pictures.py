@@ -15,7 +15,10 @@ from skidpad.roads.bundled import load_map
 from skidpad.roads.roadside import Box, Shape
 from skidpad.scenery.dressing import dress_map
 from skidpad.sensors.finish.extras import ALL_EXTRAS
+from skidpad.sensors.pictures.roughness import COARSE_SIZE, SIZE, make_tiles
 from skidpad.sensors.scene.grain import NO_GRAIN
+from skidpad.sensors.scene.materials import Material
+from skidpad.sensors.scene.road_mesh import road_pieces
 from skidpad.sensors.scene.shapes import shape_levels
 from skidpad.sensors.scene.static import build_scene
 from skidpad.sensors.scene.street_light import NO_STREET_LIGHT, street_light_of
@@ -65,7 +68,7 @@ def test_a_street_shows_buildings_trees_and_posts_that_it_did_not_have() -> None
 
 def test_grain_changes_colours_only() -> None:
     suite, rgb, labels, depth = look(Scenery.FULL, 3, 0.5)
-    assert suite.shading._grain.shape == (256, 3)
+    assert suite.shading._grain.shape == (256, 4)
     suite.shading._grain = NO_GRAIN
     ego = suite._ego
     plain = suite.observe(1, states_at([(ego.x, ego.y, ego.z, ego.yaw)]), {}).images
@@ -78,7 +81,7 @@ def test_grain_changes_colours_only() -> None:
 def test_without_scenery_there_is_no_grain() -> None:
     road_map = load_map("town")
     scene = build_scene(road_map.samples, road_map.lanes, road_map.roadside)
-    assert scene.grain.shape == (0, 3)
+    assert scene.grain.shape == (0, 4)
 
 
 def test_every_shape_stays_in_its_box_and_farther_levels_have_no_more_triangles() -> None:
@@ -104,7 +107,30 @@ def test_every_shape_stays_in_its_box_and_farther_levels_have_no_more_triangles(
 def test_colours_are_spread_more_evenly_than_without(lane: int, share: float) -> None:
     plain = share_of_commonest(look(Scenery.NONE, lane, share)[1])
     full = share_of_commonest(look(Scenery.FULL, lane, share)[1])
-    assert full < 0.75 * plain
+    assert full < 0.5 * plain
+
+
+def test_new_and_worn_asphalt_differs_in_material_only() -> None:
+    road_map = load_map("town")
+    even = [m[0] for _, m in road_pieces(road_map.samples, road_map.lanes)]
+    aged = [m[0] for _, m in road_pieces(road_map.samples, road_map.lanes, ages=True)]
+    found = set()
+    for a, b in zip(even, aged, strict=True):
+        assert np.array_equal(a.vertices, b.vertices)
+        assert np.array_equal(a.label, b.label)
+        differs = a.material != b.material
+        assert set(a.material[differs].tolist()) <= {Material.ASPHALT}
+        found |= set(b.material[differs].tolist())
+    assert found == {Material.NEW_ASPHALT, Material.WORN_ASPHALT}
+    plain = build_scene(road_map.samples, road_map.lanes, road_map.roadside)
+    assert not found & set((plain.chunks.key & 255).tolist())
+
+
+def test_noise_of_surfaces_repeats_without_a_seam() -> None:
+    tiles = make_tiles()
+    patches = tiles[SIZE * SIZE :].reshape(COARSE_SIZE, COARSE_SIZE, 4)[..., 0].astype(int)
+    inside = np.abs(np.diff(patches, axis=0)).mean()
+    assert np.abs(patches[0] - patches[-1]).mean() < 1.5 * inside
 
 
 def test_street_lamps_light_the_ground_at_night_only_and_fade_as_a_point_of_light() -> None:

@@ -22,10 +22,10 @@ from skidpad.sensors.finish.outline import MOST, spans
 from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.pictures.packing import pack, unpack
 from skidpad.sensors.raster.view import View
-from skidpad.sensors.scene.materials import MATERIALS, Material
+from skidpad.sensors.scene.materials import ASPHALTS, MATERIALS, Material
 
 GROUND = (
-    Material.ASPHALT,
+    *ASPHALTS,
     Material.SHOULDER,
     Material.MARKING,
     Material.SIDEWALK,

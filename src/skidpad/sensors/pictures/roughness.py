@@ -6,75 +6,114 @@ Depth and classes know nothing of it. Strengths are chosen by eye.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from skidpad.core.arrays import Floats32
+from skidpad.core.arrays import Floats, Floats32
 from skidpad.core.jit import inner_kernel
 from skidpad.sensors.pictures.blocks import BLOCK, LANES, ONE, ZERO, B, G, R, U, W, end_of_run
 from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.raster.view import View
 
 MORE_LANES = 3  # of the array of a block, behind those of shading
-SIZE = 256  # texels of a tile's edge, a power of two
-FINE, COARSE = 0.04, 1.0  # m, a texel of grains and one of patches
+SIZE, COARSE_SIZE = 256, 512  # texels of the edges of the tiles of grains and of patches
+FINE, COARSE = 0.04, 0.3  # m, a texel of grains and one of patches
+REPAIRS = 420  # rectangles in a tile, which cover about a fifth of it
+OCTAVES = (2, 8, 32, 64)  # texels from one value of the noise to the next
+NO_TILES = np.zeros(0, dtype=np.int8)
 
 
-def _make_tiles() -> Floats32:
-    """Returns (3 * SIZE * SIZE,) grains, then patches and tints in turn: mean 0, deviation a third."""
+@cache
+def make_tiles() -> NDArray[np.int8]:
+    """Returns the noise of all surfaces in 127ths: grains, then patches, tints, repairs, 0 by texel.
+
+    Mean 0, deviation a third; repairs: rectangles, 0 where there are none.
+    """
     rng = np.random.default_rng(20)
-    tiles = np.empty((3, SIZE, SIZE), dtype=np.float32)
-    coarse = (1.0, 4.0, 12.0, 28.0)
-    for tile, widths in zip(tiles, ((0.0, 1.2, 3.0), coarse, coarse), strict=True):
-        total = np.zeros((SIZE, SIZE))
-        for width in widths:
-            noise = rng.standard_normal((SIZE, SIZE))
-            smooth = ndimage.gaussian_filter(noise, width, mode="wrap") if width else noise
-            total += smooth / smooth.std()
-        tile[:] = np.clip(total / (3.0 * total.std()), -1.0, 1.0)
-    return np.concatenate([tiles[0].ravel(), np.stack(list(tiles[1:]), axis=-1).ravel()])
+    fine = [rng.standard_normal((SIZE, SIZE)) for _ in range(3)]
+    fine[1:] = [
+        ndimage.gaussian_filter(fine[n], width, mode="wrap") for n, width in ((1, 1.2), (2, 3.0))
+    ]
+    coarse = np.zeros((COARSE_SIZE, COARSE_SIZE, 4), dtype=np.int8)
+    for n in range(2):
+        coarse[..., n] = _quantize([_smooth_noise(rng, step) for step in OCTAVES])
+    coarse[..., 2] = _lay_repairs(rng)
+    return np.concatenate([_quantize(fine).ravel(), coarse.ravel()])
 
 
-TILES = _make_tiles()
+def _smooth_noise(rng: np.random.Generator, step: int) -> Floats:
+    """Returns (COARSE_SIZE, COARSE_SIZE) smooth noise that repeats, from values `step` texels apart."""
+    n = COARSE_SIZE // step
+    few = ndimage.gaussian_filter(rng.standard_normal((n, n)), 0.7, mode="wrap")
+    noise: Floats = ndimage.zoom(few, step, order=3, mode="grid-wrap", grid_mode=True)
+    return noise
+
+
+def _quantize(octaves: Sequence[Floats]) -> NDArray[np.int8]:
+    """Returns the sum of octaves of equal strength as bytes: three standard deviations are 127."""
+    total = sum((octave / octave.std() for octave in octaves), np.zeros_like(octaves[0]))
+    shares = np.clip(total / (3.0 * total.std()), -1.0, 1.0)
+    result: NDArray[np.int8] = np.round(127.0 * shares).astype(np.int8)
+    return result
+
+
+def _lay_repairs(rng: np.random.Generator) -> NDArray[np.int8]:
+    """Returns (COARSE_SIZE, COARSE_SIZE) how much darker (below 0) or paler repaired rectangles are."""
+    tile = np.zeros((COARSE_SIZE, COARSE_SIZE), dtype=np.int8)
+    for _ in range(REPAIRS):
+        sizes = rng.permutation([rng.integers(12, 48), rng.integers(6, 14)])
+        row, column = rng.integers(0, COARSE_SIZE, 2)
+        rows, columns = (
+            (at + np.arange(n)) % COARSE_SIZE for at, n in zip((row, column), sizes, strict=True)
+        )
+        tile[np.ix_(rows, columns)] = rng.choice((-127, -90, -50, 60))
+    return tile
+
 
 A, C, F = (np.intp((LANES + n) * BLOCK) for n in range(MORE_LANES))
-_PATCHES, _TWO, _NEXT = np.uint64(SIZE * SIZE), np.uint64(2), np.uint64(1)
-_SIZE, _PER_SIZE = np.float32(SIZE), np.float32(1.0 / SIZE)
+_PATCHES, _STEP = np.uint64(SIZE * SIZE), np.uint64(4)
+_TINT, _REPAIR = np.uint64(1), np.uint64(2)
+_SIZE, _COARSE_SIZE = np.float32(SIZE), np.float32(COARSE_SIZE)
+_PER_BYTE = np.float32(1.0 / 127.0)
 _PER_FINE, _PER_COARSE = np.float32(1.0 / FINE), np.float32(1.0 / COARSE)
 _LEAN_X, _LEAN_Y = np.float32(0.37), np.float32(0.91)  # m per m of height, so that walls vary too
 _NEAR = np.float32(9.0)  # m beyond which grains fade
 _FORE, _EVEN = np.float32(2.0), np.float32(0.30)  # m; rough ground is brighter at grazing angles
-_SPREAD = np.float32(0.7)  # m by which grains blur the edges of patches
+_SPREAD = np.float32(0.35)  # m by which grains blur the edges of patches
 _FARTHEST = np.float32(1e-5)
-_LEAST = np.float32(0.25)
+_LEAST = np.float32(0.35)
 _LOW = np.float32(0.02)  # climb of a ray per metre, below which veils are not drawn out further
-_VEIL = np.float32(1.0 / 22.0)  # texels of a layer of veils per metre of its height
+_VEIL = np.float32(1.0 / 70.0)  # texels of a layer of veils per metre of its height
 _SOFT = np.float32(6.0)  # veils reach their full strength this steeply above the horizon
-_AROUND, _CLOSE = np.float32(0.16), np.float32(0.10)
-_VEILED, _TINTED, _WARM = np.float32(0.20), np.float32(0.07), np.float32(0.06)
+_AROUND, _CLOSE, _DEEP = np.float32(0.26), np.float32(0.26), np.float32(0.32)
+_VEILED, _TINTED, _WARM = np.float32(0.40), np.float32(0.14), np.float32(0.08)
 _HALF = np.float32(0.5)
 _GREEN = np.float32(0.35)
 
 
 @inner_kernel
-def _texel(a: np.float32, b: np.float32) -> np.float32:
-    """Returns the index of the texel at row a and column b of a tile that repeats."""
+def _texel(a: np.float32, b: np.float32, size: np.float32) -> np.float32:
+    """Returns the index of the texel at row a and column b of a tile of `size` texels that repeats."""
+    per_size = ONE / size
     i, j = np.floor(a), np.floor(b)
-    i -= _SIZE * np.floor(i * _PER_SIZE)
-    j -= _SIZE * np.floor(j * _PER_SIZE)
-    index: np.float32 = i * _SIZE + j
+    i -= size * np.floor(i * per_size)
+    j -= size * np.floor(j * per_size)
+    index: np.float32 = i * size + j
     return index
 
 
 @inner_kernel
 def roughen(
-    view: View, v: np.float32, count: int, keys: NDArray[np.int32], grain: Floats32, tiles: Floats32,
+    view: View, v: np.float32, count: int, keys: NDArray[np.int32], grain: Floats32, tiles: NDArray[np.int8],
     work: Floats32,
 ) -> None:  # fmt: skip
     """Changes the colours of a block's surfaces in `work` by where in the world they lie.
 
-    v: m down per m ahead of the block's row; grain: (256, 3) strengths by material; tiles: `TILES`.
+    v: m down per m ahead of the block's row; grain: (256, 4) strengths by material; tiles: `make_tiles`.
     """
     r = view.rotation
     x_u, x_1 = np.float32(r[0, 0]), np.float32(r[1, 0]) * v + np.float32(r[2, 0])
@@ -88,7 +127,8 @@ def roughen(
     x = 0
     while x < count:
         m, end = keys[x] & 255, end_of_run(keys, x)
-        grains, patches, tints = grain[m, 0], grain[m, 1], grain[m, 2]
+        grains, patches, tints, repairs = grain[m, 0], grain[m, 1], grain[m, 2], grain[m, 3]
+        per_patch, per_repair = patches * _PER_BYTE, repairs * _PER_BYTE
         run, size = work[x:], end - x
         x = end
         if patches == ZERO:
@@ -97,24 +137,24 @@ def roughen(
             u, w = run[U + n], run[W + n]
             z = ONE / (w if w > _FARTHEST else _FARTHEST)
             run[A + n], run[C + n] = a_0 + z * (a_u * u + a_1), b_0 + z * (b_u * u + b_1)
-            run[F + n] = _texel(run[A + n] * _PER_FINE, run[C + n] * _PER_FINE)
+            run[F + n] = _texel(run[A + n] * _PER_FINE, run[C + n] * _PER_FINE, _SIZE)
         for n in range(size):
-            run[F + n] = tiles[np.uint64(run[F + n])]
+            run[F + n] = _PER_BYTE * tiles[np.uint64(run[F + n])]
         for n in range(size):
             blur = run[F + n] * _SPREAD
             run[A + n] = _texel(
-                (run[A + n] + blur) * _PER_COARSE, (run[C + n] - blur) * _PER_COARSE
+                (run[A + n] + blur) * _PER_COARSE, (run[C + n] - blur) * _PER_COARSE, _COARSE_SIZE
             )
         for n in range(size):
-            at = _PATCHES + _TWO * np.uint64(run[A + n])
-            run[A + n] = tiles[at]
-            run[C + n] = tiles[at + _NEXT]
+            at = _PATCHES + _STEP * np.uint64(run[A + n])
+            run[A + n] = per_patch * tiles[at] + per_repair * tiles[at + _REPAIR]
+            run[C + n] = _PER_BYTE * tiles[at + _TINT]
         for n in range(size):
             fade = _NEAR * run[W + n]
             fade = fade if fade < ONE else ONE
             near = _FORE * run[W + n]
             near = _EVEN - near / (ONE + near)
-            share = ONE + grains * fade * run[F + n] + patches * (run[A + n] + near)
+            share = ONE + grains * fade * run[F + n] + run[A + n] + patches * near
             share = share if share > _LEAST else _LEAST
             hue = tints * run[C + n] * share
             run[R + n] *= share + hue
@@ -124,7 +164,7 @@ def roughen(
 
 @inner_kernel
 def vary_sky(
-    view: View, v: np.float32, count: int, light: Lighting, sun: Floats32, tiles: Floats32,
+    view: View, v: np.float32, count: int, light: Lighting, sun: Floats32, tiles: NDArray[np.int8],
     work: Floats32,
 ) -> None:  # fmt: skip
     """Changes a block's sky in `work`: brighter around the sun, thin veils, no two parts alike.
@@ -142,11 +182,11 @@ def vary_sky(
         u = work[U + x]
         up = z_u * u + z_1
         up = (up if up > _LOW else _LOW) * _VEIL
-        work[A + x] = _texel((x_u * u + x_1) / up, (y_u * u + y_1) / up)
+        work[A + x] = _texel((x_u * u + x_1) / up, (y_u * u + y_1) / up, _COARSE_SIZE)
     for x in range(count):
-        at = _PATCHES + _TWO * np.uint64(work[A + x])
-        work[A + x] = tiles[at]
-        work[C + x] = tiles[at + _NEXT]
+        at = _PATCHES + _STEP * np.uint64(work[A + x])
+        work[A + x] = _PER_BYTE * tiles[at]
+        work[C + x] = _PER_BYTE * tiles[at + _TINT]
     for x in range(count):
         u = work[U + x]
         ray = ONE / np.sqrt(u * u + v * v + ONE)
@@ -154,7 +194,7 @@ def vary_sky(
         high = up * _SOFT if up * _SOFT < ONE else ONE
         high = high if high > ZERO else ZERO
         toward = (u * sun0 + v * sun1 + sun2) * ray
-        bright = ONE + clear * (_AROUND * toward + _CLOSE * toward * toward)
+        bright = ONE + clear * (_AROUND * toward + _CLOSE * toward * toward - _DEEP * up)
         veil = high * _VEILED * work[A + x]
         hue = high * _TINTED * work[C + x] + clear * _WARM * toward
         empty = work[W + x] <= ZERO

@@ -38,15 +38,15 @@ from skidpad.sensors.pictures.blocks import (
     slopes,
 )
 from skidpad.sensors.pictures.lighting import Lighting
-from skidpad.sensors.pictures.roughness import MORE_LANES, TILES, roughen, vary_sky
+from skidpad.sensors.pictures.roughness import MORE_LANES, NO_TILES, make_tiles, roughen, vary_sky
 from skidpad.sensors.pictures.sky import disc, sky
 from skidpad.sensors.pictures.street_lamps import add_street_light
 from skidpad.sensors.raster.view import View
 from skidpad.sensors.scene.grain import NO_GRAIN
-from skidpad.sensors.scene.materials import ACTOR_PAINTED, EMISSIVE, MATERIALS, Material
+from skidpad.sensors.scene.materials import ACTOR_PAINTED, ASPHALTS, EMISSIVE, MATERIALS, Material
 from skidpad.sensors.scene.street_light import NO_STREET_LIGHT, StreetLight
 
-ROADLIKE = (Material.ASPHALT, Material.SHOULDER, Material.MARKING, Material.SIDEWALK)
+ROADLIKE = (*ASPHALTS, Material.SHOULDER, Material.MARKING, Material.SIDEWALK)
 SNOWY = (
     Material.GRASS,
     Material.EMBANKMENT,
@@ -55,7 +55,7 @@ SNOWY = (
     Material.MEDIAN,
     Material.ROOF,
 )
-SNOWED = (Material.ASPHALT, Material.MARKING)
+SNOWED = (*ASPHALTS, Material.MARKING)
 SNOW_LEFT = 0.72  # share of a driven road that packed snow covers; by eye
 GLOSSY = (Material.PAINT, Material.GLASS, Material.LAMP_GLASS)
 WET_DARKENING = 0.52  # of asphalt's albedo; Lekner and Dorf (1988) give 0.4 to 0.7
@@ -84,6 +84,7 @@ class Shading:
         """
         self._street_light = street_light
         self._grain = grain * np.float32(1.0 - 0.6 * light.snow)
+        self._tiles = make_tiles() if grain.size else NO_TILES
         self.light = light
         self._table = _look_up(palette, table, light, snow_on_road)
         self._plain_tail = self._table.reshape(-1, MATERIALS, COLUMNS)[0, Material.TAIL_LAMP].copy()
@@ -147,7 +148,7 @@ class Shading:
             (body.T @ (view.centre - (ego.x, ego.y, ego.z))).astype(np.float32),
             self._table,
             self._grain,
-            TILES,
+            self._tiles,
             self._street_light,
             self._work,
             inverse,
@@ -333,7 +334,7 @@ def shade(
     offset: Floats32,
     table: Floats32,
     grain: Floats32,
-    tiles: Floats32,
+    tiles: NDArray[np.int8],
     lamps: StreetLight,
     work: Floats32,
     inverse: Floats32,

@@ -50,7 +50,10 @@ class Material(IntEnum):
     ROOF = 30
     FRAME = 31  # of doors and windows
     FIRST_FREE = 32
-    # of shaped bodies only, from the end of the byte
+    # from the end of the byte: of roads of dressed maps only
+    NEW_ASPHALT = 250  # darker than what lies about it
+    WORN_ASPHALT = 251  # paler
+    # and of shaped bodies only
     LAMP_GLASS = 252  # of head lamps: glass by day, and as bright as they are when they shine
     BRAKE_LAMP = 253  # shines when the actor brakes, and at no other time
     INDICATOR_LEFT = 254
@@ -90,14 +93,17 @@ BASE_COLOUR: dict[Material, tuple[int, int, int]] = {
     Material.LIT_WINDOW: (122, 112, 88),
     Material.ROOF: (126, 74, 58),
     Material.FRAME: (196, 194, 188),
+    Material.NEW_ASPHALT: (66, 66, 71),
+    Material.WORN_ASPHALT: (114, 112, 109),
     Material.LAMP_GLASS: (132, 140, 150),
     Material.BRAKE_LAMP: (96, 14, 16),
     Material.INDICATOR_LEFT: (170, 92, 24),
     Material.INDICATOR_RIGHT: (170, 92, 24),
 }
 
-END_FREE = int(Material.LAMP_GLASS)  # box colours have the numbers before it
+END_FREE = int(Material.NEW_ASPHALT)  # box colours have the numbers before it
 
+ASPHALTS = (Material.ASPHALT, Material.NEW_ASPHALT, Material.WORN_ASPHALT)
 # Lamps shine of themselves: neither sun nor headlights change them.
 EMISSIVE = (Material.LAMP_RED, Material.LAMP_YELLOW, Material.LAMP_GREEN)
 # Painted in the colour of the actor's table row.

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.randomness import stream_key
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.lanes import LaneKind, LaneSamples, LaneTable, Marking
 from skidpad.sensors.scene.materials import Material
@@ -39,6 +40,12 @@ SURFACE: dict[LaneKind, tuple[SemanticClass, Material]] = {
     LaneKind.MEDIAN: (SemanticClass.TERRAIN, Material.MEDIAN),
     LaneKind.OTHER: (SemanticClass.ROAD, Material.SHOULDER),
 }
+AGES = (  # drawn from: what lies on a stretch of road or lane
+    Material.NEW_ASPHALT, Material.WORN_ASPHALT,
+    Material.ASPHALT, Material.ASPHALT, Material.ASPHALT, Material.WORN_ASPHALT,
+)  # fmt: skip
+OWN_AGES = 2  # so many of AGES, from the first, let a lane's stretch differ from its road's
+STRETCH = 2  # chunks, the shortest that is laid anew
 RAISED = (LaneKind.SIDEWALK, LaneKind.MEDIAN, LaneKind.BORDER, LaneKind.OTHER)  # beyond a kerb
 KERB_HEIGHT, KERB_WIDTH = 0.12, 0.15  # m, of a kerb that the file names and gives no size
 DRIVABLE = (LaneKind.DRIVING, LaneKind.RAMP)
@@ -58,8 +65,13 @@ class Edges(NamedTuple):
     marking_right: NDArray[np.uint8]
 
 
-def road_pieces(samples: LaneSamples, lanes: LaneTable) -> Iterator[tuple[ChunkKey, list[Mesh]]]:
-    """Yields the pieces of all lanes, each with its chunk key and one mesh per level."""
+def road_pieces(
+    samples: LaneSamples, lanes: LaneTable, ages: bool = False
+) -> Iterator[tuple[ChunkKey, list[Mesh]]]:
+    """Yields the pieces of all lanes, each with its chunk key and one mesh per level.
+
+    ages: asphalt is new or worn on some stretches of lanes.
+    """
     outer = _outermost(lanes)
     for lane in range(len(lanes.road)):
         edges = _edges(samples, lanes, lane)
@@ -71,7 +83,18 @@ def road_pieces(samples: LaneSamples, lanes: LaneTable) -> Iterator[tuple[ChunkK
             if b > a:
                 key = ("road", int(lanes.road[lane]), int(lanes.section[lane]), int(index[a]))
                 piece = _cut_edges(edges, slice(a, b + 1))
-                yield key, _levels(piece, lanes, lane, outer[lane])
+                look = SURFACE[LaneKind(int(lanes.kind[lane]))]
+                if ages and look[1] is Material.ASPHALT and lanes.junction[lane] < 0:
+                    look = (look[0], _age_of(lanes, lane, int(index[a])))
+                yield key, _levels(piece, lanes, lane, outer[lane], look)
+
+
+def _age_of(lanes: LaneTable, lane: int, chunk: int) -> Material:
+    """Returns the asphalt of a lane in a chunk of its road: as old as the road, or laid on its own."""
+    road, one = int(lanes.road[lane]), int(lanes.lane_id[lane])
+    own = stream_key(0, "asphalt", road, one, chunk // STRETCH) % len(AGES)
+    whole = stream_key(0, "asphalt", road, chunk // (3 * STRETCH)) % len(AGES)
+    return AGES[own if own < OWN_AGES else whole]
 
 
 def _edges(samples: LaneSamples, lanes: LaneTable, lane: int) -> Edges | None:
@@ -124,10 +147,16 @@ def _stations(s: NDArray[np.float64], chord: float) -> NDArray[np.intp]:
     return np.unique(np.concatenate([[0], inner, [len(s) - 1]]))
 
 
-def _levels(piece: Edges, lanes: LaneTable, lane: int, outer: NDArray[np.bool_]) -> list[Mesh]:
+def _levels(
+    piece: Edges,
+    lanes: LaneTable,
+    lane: int,
+    outer: NDArray[np.bool_],
+    look: tuple[SemanticClass, Material],
+) -> list[Mesh]:
     """Returns the meshes of a piece of lane by level of detail, with kerbs, skirts and edge lines."""
     kind = LaneKind(int(lanes.kind[lane]))
-    label, material = SURFACE[kind]
+    label, material = look
     ground = piece
     piece, is_raised = _raise_beyond_kerbs(piece, kind)
     meshes = []

@@ -82,7 +82,7 @@ def build_scene(samples: LaneSamples, lanes: LaneTable, roadside: Roadside) -> S
     palette = base_palette()
     box_material = _box_materials({b.rgb for b in roadside.boxes}, palette)
     pieces = chain(
-        road_pieces(samples, lanes),
+        road_pieces(samples, lanes, ages=_is_dressed(roadside)),
         ground_pieces(samples),
         furniture_pieces(roadside, box_material),
     )
@@ -103,11 +103,16 @@ def build_scene(samples: LaneSamples, lanes: LaneTable, roadside: Roadside) -> S
     return StaticScene(chunks, lamps_found, palette, street_light, grain)
 
 
+def _is_dressed(roadside: Roadside) -> bool:
+    """Returns whether the map has generated scenery."""
+    return any(b.shape is not Shape.BOX for b in roadside.boxes)
+
+
 def _grain_of(
     roadside: Roadside, box_material: Mapping[tuple[int, int, int], int]
 ) -> NDArray[np.float32]:
     """Returns how uneven materials look on a map with generated things; empty on any other."""
-    if all(b.shape is Shape.BOX for b in roadside.boxes):
+    if not _is_dressed(roadside):
         return NO_GRAIN
     return grain_table((b.label, box_material[b.rgb]) for b in roadside.boxes)
 

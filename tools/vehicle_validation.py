@@ -1,10 +1,12 @@
 """Manoeuvres that show how far the vehicle can be trusted; `python tools/vehicle_validation.py DIR`
-draws the figures of docs/physics.md and prints its tables of manoeuvres. The comparison needs
+draws the figures of docs/physics.md, writes step-steer.csv beside DIR and prints its tables of
+manoeuvres. The comparison needs
 commonroad-vehicle-models (extra `test`).
 """
 
 from __future__ import annotations
 
+import csv
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,7 +35,7 @@ from skidpad.core.constants import G
 from skidpad.core.errors import MissingExtra
 from skidpad.core.geometry import Pose, kmh_from_mps, mps_from_kmh
 from skidpad.physics.fleet import Fleet
-from skidpad.physics.grip import GripParams
+from skidpad.physics.grip import GripParams, RoadSurface, mu_at, physical_params, stiffness_at
 from skidpad.physics.stopping import stops
 from skidpad.physics.types import EGO_TYPE, DrivenWheels, VehicleType, traffic_types, vehicle_type
 from skidpad.physics.vehicle import steer_share
@@ -84,6 +86,21 @@ class Trace:
     yaw_rate: Floats
 
 
+# Surfaces of the step steer: depth of water, ice and snow, mm
+SURFACES = {
+    "dry": (0.0, 0.0, 0.0),
+    "0.5 mm of water": (0.5, 0.0, 0.0),
+    "1 mm of water": (1.0, 0.0, 0.0),
+    "packed snow": (0.0, 0.0, 50.0),
+    "sheet ice, -5 C": (0.0, 3.0, 0.0),
+}
+STEP_SPEED, STEP_DEMAND = (
+    20.0,
+    0.3,
+)  # m/s; of the friction, as lateral acceleration of a neutral car
+RISEN = 0.9  # of the last yaw rate
+
+
 def drive(fleet: Fleet, duration: float, mu: float, commands: Any) -> Trace:
     """Drive vehicle 0; commands(t, fleet) gives throttle, brake, steer, handbrake, reverse."""
     rows = []
@@ -102,15 +119,22 @@ def placed(kind: VehicleType, v: float, **options: Any) -> Fleet:
     return fleet
 
 
-def step_steer(v: float, delta: float, duration: float = 2.5) -> Trace:
-    """Our model of ORACLE: road-wheel angle delta at once, speed held."""
+def step_steer(
+    v: float, delta: float, duration: float = 2.5, mu: float = ORACLE_MU, stiffness: float = 1.0
+) -> Trace:
+    """Our model of ORACLE: road-wheel angle delta at once, speed held.
+
+    stiffness: slip stiffness of all tyres over the dry one.
+    """
 
     def commands(_: float, fleet: Fleet) -> tuple[float, ...]:
         speed = fleet.speed(0)
         steer = delta / (ORACLE.steer_max * steer_share(speed))
         return max(0.5 * (v - speed), 0.0), 0.0, steer, 0.0, 0.0
 
-    return drive(placed(ORACLE, v), duration, ORACLE_MU, commands)
+    fleet = placed(ORACLE, v)
+    fleet.stiffness[:] = stiffness
+    return drive(fleet, duration, mu, commands)
 
 
 def brake(v: float, deceleration: float, duration: float = 6.0) -> Trace:
@@ -120,8 +144,14 @@ def brake(v: float, deceleration: float, duration: float = 6.0) -> Trace:
     return drive(placed(ORACLE, v), duration, ORACLE_MU, lambda *_: (0, pedal, 0, 0, 0))
 
 
-def oracle(v: float, delta: float, deceleration: float, duration: float) -> Trace:
-    """The single-track drift model of commonroad-vehicle-models under the same demand."""
+def oracle(
+    v: float, delta: float, deceleration: float, duration: float, mu: float = ORACLE_MU,
+    stiffness: float = 1.0,
+) -> Trace:  # fmt: skip
+    """The single-track drift model of commonroad-vehicle-models under the same demand.
+
+    mu and stiffness scale its Magic Formula tyres: peak friction and initial slope, along and across.
+    """
     try:
         from vehiclemodels.init_std import init_std
         from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
@@ -130,6 +160,8 @@ def oracle(v: float, delta: float, deceleration: float, duration: float) -> Trac
         raise MissingExtra("the comparison of vehicle models", "test") from error
     dt = 0.001
     p = parameters_vehicle2()
+    p.tire.p_dx1, p.tire.p_dy1 = p.tire.p_dx1 * mu / ORACLE_MU, p.tire.p_dy1 * mu / ORACLE_MU
+    p.tire.p_kx1, p.tire.p_ky1 = p.tire.p_kx1 * stiffness, p.tire.p_ky1 * stiffness
     state = np.array(init_std([0.0, 0.0, 0.0, v, 0.0, 0.0, 0.0], p))
     rows = []
     for k in range(round(duration / dt)):
@@ -139,6 +171,37 @@ def oracle(v: float, delta: float, deceleration: float, duration: float) -> Trac
         state = state + dt * np.array(vehicle_dynamics_std(list(state), [rate, -deceleration], p))
         rows.append((k * dt, state[0], state[1], state[4], state[3], state[5]))
     return Trace(*np.array(rows).T)
+
+
+def rise_time(trace: Trace) -> float:
+    """s from the step of the steer until the yaw rate has come to RISEN of the last one."""
+    return float(trace.t[np.argmax(np.abs(trace.yaw_rate) > RISEN * abs(trace.yaw_rate[-1]))])
+
+
+def rises() -> list[dict[str, float | str]]:
+    """Rise times of the yaw rate on SURFACES, here and in the drift model: rows of docs/step-steer.csv."""
+    rows: list[dict[str, float | str]] = []
+    for name, (film, ice, snow) in SURFACES.items():
+        surface = RoadSurface(film, ice, snow, 0.0, -5.0 if ice or snow else 15.0)
+        params = physical_params(surface, stiffness=True)
+        mu, stiffness = mu_at(params, STEP_SPEED), stiffness_at(params, STEP_SPEED)
+        delta = STEP_DEMAND * mu * G * ORACLE.wheelbase / STEP_SPEED**2
+        ours = step_steer(STEP_SPEED, delta, 4.0, mu, stiffness)
+        theirs = oracle(STEP_SPEED, delta, 0.0, 4.0, mu, stiffness)
+        plain = step_steer(STEP_SPEED, delta, 4.0, mu)
+        rows.append(
+            {
+                "surface": name,
+                "friction": round(mu, 3),
+                "stiffness": round(stiffness, 3),
+                "rise_here_s": round(rise_time(ours), 2),
+                "rise_drift_model_s": round(rise_time(theirs), 2),
+                "rise_here_dry_stiffness_s": round(rise_time(plain), 2),
+                "yaw_rate_here_rad_s": round(float(ours.yaw_rate[-1]), 4),
+                "yaw_rate_drift_model_rad_s": round(float(theirs.yaw_rate[-1]), 4),
+            }
+        )
+    return rows
 
 
 def handbrake_turn(mu: float, v: float, steer: float = 0.02) -> Trace:
@@ -312,6 +375,11 @@ def main(folder: Path) -> None:
             panel(place)
         figure.savefig(folder / f"physics_{name}.png", dpi=75)
         plt.close(figure)
+    rows = rises()
+    with (folder.parent / "step-steer.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, rows[0], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
     print(table())
 
 

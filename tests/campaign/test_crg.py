@@ -5,7 +5,13 @@ import sys
 import numpy as np
 import pytest
 
-from skidpad.campaign.driving.crg import LEVELS_MM, hollow_depths, puddles, read_crg
+from skidpad.campaign.driving.crg import (
+    LEVELS_MM,
+    hollow_depths,
+    puddles,
+    read_crg,
+    slippery_parts,
+)
 from skidpad.campaign.driving.surfaces import read_surface
 from skidpad.core.errors import ConfigError, FileError, MissingExtra
 
@@ -92,3 +98,54 @@ def test_a_file_gives_its_puddles_and_a_bad_one_a_sentence(tmp_path):
         read_crg(tmp_path / "bad.crg")
     with pytest.raises(FileError):
         read_crg(tmp_path / "none.crg")
+
+
+class Polished(Road):
+    """A lane of 0.9 with a polished strip of 0.45 from v = 0 to 1 in its middle 4 m; unknown beyond v = 1."""
+
+    def uv_to_z(self, u, v):
+        polished = (u > 4.0) & (u < 8.0) & (v > 0.0) & (v < 1.0)
+        return np.where(v > 1.0, np.nan, np.where(polished, 0.45, 0.9))
+
+
+def test_friction_of_a_grid_is_one_patch_where_it_is_the_same():
+    (patch,) = slippery_parts(Polished(), "polished")
+    assert patch.friction == pytest.approx(0.5)
+    x, y = np.transpose(patch.polygon)
+    assert (x.min(), x.max()) == pytest.approx((9.0, 10.0))
+    assert (y.min(), y.max()) == pytest.approx((24.0, 28.0))
+    assert len(patch.polygon) == 6  # three places on either side
+
+
+def test_friction_out_of_range_is_one_sentence():
+    road = Polished()
+    road.uv_to_z = lambda u, v: np.full(len(v), 2.0)
+    with pytest.raises(ConfigError, match=r"friction must be between 0.009 and 1.35, got 2.0"):
+        list(slippery_parts(road, "odd"))
+
+
+def test_a_surface_names_files_of_friction_and_of_heights(tmp_path):
+    crg = pytest.importorskip("pyopencrg")
+    u, v = np.arange(0.0, 20.01, 0.1), np.arange(-1.5, 1.51, 0.05)
+    mu = np.full((len(u), len(v)), 0.9)
+    mu[u < 9.99] = 0.3
+    crg.CrgRoad(mu, u_inc=0.1, v=v, x_start=100.0, y_start=50.0).save(tmp_path / "mu.crg")
+    surface = tmp_path / "surface.yaml"
+    surface.write_text("crg: [{file: mu.crg, purpose: friction}]\n")
+    (patch,) = read_surface(surface)
+    assert patch.friction == pytest.approx(1 / 3)
+    corners = np.array(patch.polygon)
+    assert np.ptp(corners[:, 0]) == pytest.approx(10.0, abs=0.01)
+    surface.write_text("crg: [{file: mu.crg}]\n")
+    with pytest.raises(ConfigError, match=r"mu.crg has no hollow"):
+        read_surface(surface)
+    surface.write_text("patches: [{ice_mm: 1, road: 1}]\ncrg: [{file: mu.crg, purpose: friction}]")
+    assert [p.ice_mm for p in read_surface(surface)] == [1.0, 0.0]
+    for text, complaint in (
+        ("crg: []", "crg must be a list of at least one file"),
+        ("crg: [{file: mu.crg, purpose: colour}]", r"surface.yaml: crg\[0\]: .*colour"),
+        ("crg: [{file: none.crg}]", r"none.crg cannot be read as OpenCRG"),
+    ):
+        surface.write_text(text)
+        with pytest.raises((ConfigError, FileError), match=complaint):
+            read_surface(surface)

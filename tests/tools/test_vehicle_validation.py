@@ -1,9 +1,13 @@
 """Against an independent model, inside its valid range (lateral acceleration below 5 m/s^2)."""
 
+import csv
+from itertools import pairwise
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from vehicle_validation import ORACLE, brake, handbrake_turn, oracle, step_steer
+from vehicle_validation import ORACLE, brake, handbrake_turn, oracle, rises, step_steer
 
 pytest.importorskip("vehiclemodels")
 
@@ -36,3 +40,25 @@ def test_braking_against_the_drift_model(deceleration):
 def test_the_spin_of_the_figure_is_a_spin():
     trace = handbrake_turn(0.4, 50 / 3.6)
     assert abs(np.unwrap(trace.yaw)[-1]) > np.radians(100)
+
+
+def test_the_yaw_rate_rises_on_water_snow_and_ice_as_in_the_drift_model_and_as_the_page_says():
+    """Softer tyres answer later; with the dry stiffness, the default, no road changes the rise."""
+    rows = rises()
+    for row in rows:
+        assert row["rise_here_s"] == pytest.approx(row["rise_drift_model_s"], rel=0.1)
+        assert row["yaw_rate_here_rad_s"] == pytest.approx(
+            row["yaw_rate_drift_model_rad_s"], rel=0.03
+        )
+        assert row["rise_here_dry_stiffness_s"] == rows[0]["rise_here_s"]
+    by_stiffness = sorted(rows, key=lambda row: row["stiffness"])
+    assert all(a["rise_here_s"] > b["rise_here_s"] for a, b in pairwise(by_stiffness))
+    page = Path(__file__).parents[2] / "docs" / "step-steer.csv"
+    with page.open(encoding="utf-8") as file:
+        published = list(csv.DictReader(file))
+    for row, said in zip(rows, published, strict=True):
+        assert row["surface"] == said["surface"]
+        assert row["rise_here_s"] == pytest.approx(float(said["rise_here_s"]), abs=0.02)
+        assert row["rise_drift_model_s"] == pytest.approx(
+            float(said["rise_drift_model_s"]), abs=0.02
+        )

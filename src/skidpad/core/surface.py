@@ -15,6 +15,9 @@ FRICTION = (0.01, 1.5)  # times the friction that is there without the patch
 WATER_MM = (0.0, 10.0)  # for friction, deeper than 2 counts as 2 (docs/physics.md)
 ICE_MM = (0.0, 20.0)
 SNOW_MM = (0.0, 2000.0)
+# Wheel paths lie this far from the middle of a lane and are this wide, m: the usual track of a car and
+# a car's place in its lane; our assumption
+PATH_OFFSET, PATH_WIDTH = 0.75, 0.6
 RADIUS = (0.1, 1000.0)  # m
 AIR_C = RANGES["air_temperature_c"]  # of weather
 
@@ -34,7 +37,7 @@ class SurfacePatch(
         lane: OpenDRIVE id of a lane of it; None: all driving lanes.
         s: from and to along the road, m; None: the whole road.
         bridges: the area is every bridge that the map names.
-        side: half of each lane, seen in its driving direction.
+        side: half of each lane, seen in its driving direction, its two wheel paths, or the rest of it.
         air_below_c: the patch is there while the air is colder, degrees Celsius; None: always.
     """
 
@@ -49,7 +52,7 @@ class SurfacePatch(
     lane: int | None = None
     s: tuple[float, float] | None = None
     bridges: bool = False
-    side: Literal["both", "left", "right"] = "both"
+    side: Literal["both", "left", "right", "wheel_paths", "beside_wheel_paths"] = "both"
     air_below_c: float | None = None
 
     def __post_init__(self) -> None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from skidpad.core.arrays import Floats
-from skidpad.core.surface import SurfacePatch
+from skidpad.core.surface import PATH_OFFSET, PATH_WIDTH, SurfacePatch
 from skidpad.roads.bridges import spread_over_bridges
 from skidpad.roads.queries import RoadMap
 
@@ -63,10 +63,9 @@ def _on_road(map: RoadMap, corners: Floats) -> Floats:
 
 
 def _stretches(map: RoadMap, patch: SurfacePatch) -> Iterator[Floats]:
-    """Yields the outline (n, 3) in m of a patch on each drivable lane of its road; one side may be half."""
+    """Yields the outlines (n, 3) in m of a patch on each drivable lane of its road, one for each strip."""
     s, lanes = map.samples, map.lanes
-    low, high = (0.0, np.inf) if patch.s is None else patch.s
-    left, right = (0.5 if patch.side != "right" else 0.0), (-0.5 if patch.side != "left" else 0.0)
+    low, high = patch.stretch
     for lane in np.flatnonzero((lanes.road == patch.road) & (map.arrays.drivable == 1)):
         if patch.lane not in (None, int(lanes.lane_id[lane])):
             continue
@@ -75,14 +74,31 @@ def _stretches(map: RoadMap, patch: SurfacePatch) -> Iterator[Floats]:
         if len(rows) < 2:
             continue
         some = np.unique(np.append(rows[::STEP], rows[-1]))
-        edges = [
-            np.column_stack(
-                [
-                    s.x[some] - side * s.width[some] * np.sin(s.heading[some]),
-                    s.y[some] + side * s.width[some] * np.cos(s.heading[some]),
-                    s.z[some],
-                ]
-            )
-            for side in (left, right)
-        ]
-        yield np.concatenate([edges[0], edges[1][::-1]])
+        for strip in _strips(patch.side, 0.5 * s.width[some]):
+            edges = [
+                np.column_stack(
+                    [
+                        s.x[some] - offset * np.sin(s.heading[some]),
+                        s.y[some] + offset * np.cos(s.heading[some]),
+                        s.z[some],
+                    ]
+                )
+                for offset in strip
+            ]
+            yield np.concatenate([edges[0], edges[1][::-1]])
+
+
+def _strips(side: str, half: Floats) -> list[tuple[Floats, Floats]]:
+    """Returns the edges of what a side covers of a lane, left and right of its middle, m.
+
+    half: of the lane's width, (n,).
+    """
+    near, far = PATH_OFFSET - 0.5 * PATH_WIDTH, PATH_OFFSET + 0.5 * PATH_WIDTH
+    inner, outer = np.minimum(near, half), np.minimum(far, half)
+    return {
+        "both": [(half, -half)],
+        "left": [(half, 0.0 * half)],
+        "right": [(0.0 * half, -half)],
+        "wheel_paths": [(outer, inner), (-inner, -outer)],
+        "beside_wheel_paths": [(half, outer), (inner, -inner), (-outer, -half)],
+    }[side]

@@ -9,10 +9,12 @@ from shapely.geometry import Point, Polygon
 
 from skidpad.campaign.driving.surfaces import read_surface
 from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.states import ActorStates
 from skidpad.core.surface import SurfacePatch, present_patches
 from skidpad.core.vocabulary import GripModel
 from skidpad.physics.grip import Road, grip_params, mu_at, physical_params, road_surface
 from skidpad.physics.presets import find_weather
+from skidpad.physics.types import vehicle_type
 from skidpad.roads.baked import load_baked
 from skidpad.roads.bundled import FOLDER, bake_file, load_map
 from skidpad.roads.roadside import Bridge
@@ -80,6 +82,50 @@ def test_a_stretch_covers_its_lane_its_side_and_nothing_else():
     assert found.ratio_at(*ahead, Z) == 1.0
 
 
+@pytest.mark.parametrize(
+    ("side", "wet"),
+    [("wheel_paths", [0.5, 0.75, 1.0]), ("beside_wheel_paths", [0.0, 0.3, 1.2, 1.7])],
+)
+def test_wheel_paths_and_the_rest_of_a_lane_are_wet_apart(side, wet):
+    """Paths are 0.6 m wide, 0.75 m left and right of the middle of each lane."""
+    found = patches(SurfacePatch(friction=0.5, road=PLACE.road, side=side))
+    heading = float(ROAD.samples.heading[500])
+    for offset in (0.0, 0.3, 0.5, 0.75, 1.0, 1.2, 1.7):
+        for left in (offset, -offset):
+            at = X - left * np.sin(heading), Y + left * np.cos(heading)
+            assert (found.ratio_at(*at, Z) == 0.5) is (offset in wet), left
+
+
+def test_a_road_that_has_dried_in_its_wheel_paths_is_wet_beside_them():
+    """In the middle of the lane all wheels are dry, 0.4 m aside all are wet."""
+    found = patches(SurfacePatch(water_mm=0.5, road=PLACE.road, side="beside_wheel_paths"))
+    car = vehicle_type("hatchback")
+    found.set_vehicles([car])
+    heading = float(ROAD.samples.heading[500])
+    wet = {}
+    for left in (0.0, 0.4):
+        states = ActorStates.empty(1)
+        states.x[0], states.y[0] = X - left * np.sin(heading), Y + left * np.cos(heading)
+        states.z[0], states.yaw[0], states.vx[0] = Z, heading, 20.0
+        states.present[0] = True
+        share, stiffness, film = (np.zeros((1, 4)) for _ in range(3))
+        found.fill(states, share, stiffness, film)
+        wet[left] = (share[0] < 1.0).tolist()
+    assert wet == {0.0: [False] * 4, 0.4: [True] * 4}
+
+
+@pytest.mark.parametrize(("side", "strips"), [("wheel_paths", 2), ("beside_wheel_paths", 3)])
+def test_strips_are_drawn_beside_each_other(side, strips):
+    stretch = {"road": PLACE.road, "lane": PLACE.lane_id, "s": (100.0, 200.0)}
+    parts = outline_patches(ROAD, [SurfacePatch(water_mm=1.0, side=side, **stretch)])
+    (whole,) = outline_patches(ROAD, [SurfacePatch(water_mm=1.0, **stretch)])
+    assert len(parts) == strips
+    covered = sum(Polygon(part.corners).area for part in parts)
+    paths = 2 * 0.6 / PLACE.width
+    share = paths if side == "wheel_paths" else 1.0 - paths
+    assert covered == pytest.approx(share * Polygon(whole.corners).area, rel=1e-6)
+
+
 def test_the_bounds_leave_out_only_where_nothing_is():
     found = patches(SurfacePatch(friction=0.5, circle=(X, Y, 4.0)))
     rng = np.random.default_rng(3)
@@ -125,7 +171,7 @@ def test_the_kernel_finds_the_patch_that_plain_words_find():
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("puddles: []", "must be a mapping with `patches`"),
+        ("puddles: []", "must be a mapping with `patches` or `crg`"),
         ("patches: []", "a list of at least one patch"),
         ("patches: [{water_mm: 1}]", "patches[0]: needs one of circle, polygon, road and bridges"),
         ("patches: [{circle: [0, 0, 1]}]", "needs either friction or a depth"),

@@ -8,12 +8,13 @@ from typing import NamedTuple
 from skidpad.core.arrays import Floats, Ints
 from skidpad.core.jit import Held, inner_kernel, kernel
 from skidpad.core.states import ActorStates
+from skidpad.core.surface import PATH_OFFSET, PATH_WIDTH
 from skidpad.physics.grip import grip_of_row, mu_at, stiffness_at
 from skidpad.roads.kernels import LaneArrays, project_kernel, s_road_kernel, sample_kernel
 
 NO_PATCH = -1.0  # stiffness and film where no patch says them
 ANY = 2**40  # a lane id that means all lanes, a road id that means none
-BOTH, LEFT, RIGHT = range(3)  # halves of a lane
+BOTH, LEFT, RIGHT, PATHS, BESIDE = range(5)  # halves of a lane, its wheel paths, and the rest of it
 
 
 class PatchArrays(NamedTuple):
@@ -117,6 +118,9 @@ def _is_on_stretch(
     """Returns whether a place on the road lies on the stretch: its road, lane, side and low..high in m."""
     if on_road != road or (lane != ANY and lane != on_lane):
         return False
+    if side >= PATHS:
+        on_path = abs(abs(offset) - PATH_OFFSET) <= 0.5 * PATH_WIDTH
+        return on_path == (side == PATHS) and low <= s_road <= high
     if side != BOTH and (offset > 0.0) != (side == LEFT):
         return False
     return low <= s_road <= high

@@ -21,9 +21,11 @@ from skidpad.roads.bridges import spread_over_bridges
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.world.patch_kernel import (
     ANY,
+    BESIDE,
     BOTH,
     LEFT,
     NO_PATCH,
+    PATHS,
     RIGHT,
     PatchArrays,
     WheelPlaces,
@@ -38,6 +40,13 @@ LaneFrictions = dict[tuple[int, int], list[tuple[float, float, float]]]
 REACH = 12.0  # m from a vehicle's origin to its farthest wheel, and half a lane
 SPACING = 1.0  # m, the largest distance of two lane samples
 LISTED = 20  # roads that a message names
+SIDES = {
+    "both": BOTH,
+    "left": LEFT,
+    "right": RIGHT,
+    "wheel_paths": PATHS,
+    "beside_wheel_paths": BESIDE,
+}
 
 
 class Patches:
@@ -156,8 +165,7 @@ def _stretch_key(patch: SurfacePatch) -> tuple[int, int, int]:
     """Returns (road, lane, side) as codes; ANY and BOTH where the patch does not restrict them."""
     if patch.road is None:
         return ANY, ANY, BOTH
-    side = {"both": BOTH, "left": LEFT, "right": RIGHT}[patch.side]
-    return patch.road, ANY if patch.lane is None else patch.lane, side
+    return patch.road, ANY if patch.lane is None else patch.lane, SIDES[patch.side]
 
 
 def _surface_grip(patch: SurfacePatch, road: Road, tyres: str) -> GripParams:

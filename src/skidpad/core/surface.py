@@ -15,6 +15,7 @@ FRICTION = (0.01, 1.5)  # times the friction that is there without the patch
 WATER_MM = (0.0, 10.0)  # for friction, deeper than 2 counts as 2 (docs/physics.md)
 ICE_MM = (0.0, 20.0)
 SNOW_MM = (0.0, 2000.0)
+SLUSH_MM = (0.0, 15.0)
 # Wheel paths lie this far from the middle of a lane and are this wide, m: the usual track of a car and
 # a car's place in its lane; our assumption
 PATH_OFFSET, PATH_WIDTH = 0.75, 0.6
@@ -31,6 +32,7 @@ class SurfacePatch(
         name: what pages call it.
         friction: times the friction that the weather leaves there.
         water_mm, ice_mm, snow_mm: depth, mm; where the weather's is more, that counts.
+        slush_mm: depth, mm; it lies on what else is there.
         circle: x, y of the middle and the radius, m, in the map's plane.
         polygon: corners x, y, m, in the map's plane, at least three.
         road: OpenDRIVE id; the area is a stretch of it.
@@ -46,6 +48,7 @@ class SurfacePatch(
     water_mm: float = 0.0
     ice_mm: float = 0.0
     snow_mm: float = 0.0
+    slush_mm: float = 0.0
     circle: tuple[float, float, float] | None = None
     polygon: tuple[tuple[float, float], ...] = ()
     road: int | None = None
@@ -61,12 +64,19 @@ class SurfacePatch(
 
     def _require_what(self) -> None:
         """Raises ConfigError unless the patch has either a friction or a depth in mm, within its range."""
-        deep = {"water_mm": WATER_MM, "ice_mm": ICE_MM, "snow_mm": SNOW_MM}
+        deep = {
+            "water_mm": WATER_MM,
+            "ice_mm": ICE_MM,
+            "snow_mm": SNOW_MM,
+            "slush_mm": SLUSH_MM,
+        }
         for name, (low, high) in deep.items():
             require_range(name, getattr(self, name), low, high)
-        lies = self.water_mm > 0.0 or self.ice_mm > 0.0 or self.snow_mm > 0.0
+        lies = any(getattr(self, name) > 0.0 for name in deep)
         if lies is (self.friction is not None):
-            raise ConfigError("needs either friction or a depth: water_mm, ice_mm, snow_mm")
+            raise ConfigError(
+                "needs either friction or a depth: water_mm, ice_mm, snow_mm, slush_mm"
+            )
         if self.friction is not None:
             require_range("friction", self.friction, *FRICTION)
 

@@ -26,8 +26,11 @@ class PatchOutline(NamedTuple):
 
 
 def patch_kind(patch: SurfacePatch) -> str:
-    """Returns what lies there, "snow", "ice", "water" or else "friction": snow hides ice, ice hides water."""
-    if patch.snow_mm > 0.0:
+    """Returns what lies there, "snow", "ice", "water" or else "friction": snow hides ice, ice hides water.
+
+    Slush is snow here.
+    """
+    if patch.snow_mm > 0.0 or patch.slush_mm > 0.0:
         return SNOW
     if patch.ice_mm > 0.0:
         return ICE

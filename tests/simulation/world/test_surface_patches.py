@@ -58,6 +58,15 @@ def test_ice_on_a_dry_road_is_as_slippery_as_an_icy_road():
     assert mu_at(icy, 0.0) < 0.15
 
 
+def test_slush_between_the_wheel_paths_is_felt_beside_them():
+    found = patches(SurfacePatch(slush_mm=8.0, road=PLACE.road, side="beside_wheel_paths"))
+    heading = float(ROAD.samples.heading[500])
+    at = [(X - left * np.sin(heading), Y + left * np.cos(heading)) for left in (0.75, 0.0)]
+    path, between = (found.ratio_at(*xy, Z, 20.0) for xy in at)
+    assert path == 1.0
+    assert between < 0.25
+
+
 def test_the_slippery_one_of_two_patches_counts():
     found = patches(
         SurfacePatch(friction=0.7, circle=(X, Y, 5.0)),
@@ -177,6 +186,7 @@ def test_the_kernel_finds_the_patch_that_plain_words_find():
         ("patches: [{circle: [0, 0, 1]}]", "needs either friction or a depth"),
         ("patches: [{friction: 0.5, ice_mm: 1, road: 1}]", "needs either friction or a depth"),
         ("patches: [{water_mm: 13, road: 1}]", "water_mm must be between 0 and 10, got 13"),
+        ("patches: [{slush_mm: 16, road: 1}]", "slush_mm must be between 0 and 15, got 16"),
         ("patches: [{friction: 0, road: 1}]", "friction must be between 0.01 and 1.5, got 0"),
         ("patches: [{friction: 0.5, circle: [0, 0, 1], side: left}]", "side goes with a road or"),
         ("patches: [{friction: 0.5, circle: [0, 0, 1], s: [0, 1]}]", "lane and s go with a road"),

@@ -16,6 +16,7 @@ from skidpad.core.jit import hold
 from skidpad.core.states import ActorStates
 from skidpad.core.surface import SurfacePatch, present_patches
 from skidpad.physics.grip import GripParams, Road, road_surface
+from skidpad.physics.slush import slush_grip
 from skidpad.physics.types import VehicleType
 from skidpad.roads.bridges import spread_over_bridges
 from skidpad.roads.queries import RoadMap
@@ -174,15 +175,15 @@ def _surface_grip(patch: SurfacePatch, road: Road, tyres: str) -> GripParams:
     Always by the physical model, which alone knows films and snow.
     """
     outside = road_surface(road.weather)
-    return road.params(
-        tyres,
-        replace(
-            outside,
-            film_mm=max(outside.film_mm, patch.water_mm),
-            ice_mm=max(outside.ice_mm, patch.ice_mm),
-            snow_mm=max(outside.snow_mm, patch.snow_mm),
-        ),
+    surface = replace(
+        outside,
+        film_mm=max(outside.film_mm, patch.water_mm),
+        ice_mm=max(outside.ice_mm, patch.ice_mm),
+        snow_mm=max(outside.snow_mm, patch.snow_mm),
     )
+    if patch.slush_mm > 0.0:
+        return slush_grip(road, surface, patch.slush_mm, tyres)
+    return road.params(tyres, surface)
 
 
 def _bounds(patch: SurfacePatch, map: RoadMap) -> tuple[float, float, float, float]:

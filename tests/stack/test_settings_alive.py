@@ -299,6 +299,7 @@ OTHERS: dict[str, Scenario] = {
     "wind_direction_deg": Scenario(0.0, in_wind(wind_speed=12.0)),
     "wind_gusts": Scenario(0.3, in_wind(wind_speed=12.0)),
     "camera": Scenario(False, lambda s: pictures(s, "rain-noon", "rgb_front")),
+    "camera_haze": Scenario(True, lambda s: pictures(s, "rain-noon", "rgb_front")),
     "night_rain": Scenario("rain_only", lambda s: pictures(s, "rain-night", "rgb_front")),
     "headways": Scenario("field", short_drive("clear-noon")),
     "drivers": Scenario(False, short_drive("rain-noon")),

@@ -140,6 +140,9 @@ class SensorSettings(SettingsPart):
         RadarOutput.POINTS, "M-1, T-11", "rows of the radar, with radar_model=physical"
     )
     camera: bool = setting_field(True, "M-4", "weather acts on RGB images")
+    camera_haze: bool = setting_field(
+        False, "M-4, T-11", "contrast of RGB images falls with distance by Koschmieder's law"
+    )
     night_rain: NightRain = setting_field(
         NightRain.BOTH, "D-094", "camera effects of rain at night"
     )

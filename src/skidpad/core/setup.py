@@ -88,6 +88,13 @@ class Wind:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class CameraOptics:
+    """What colour pictures show of the quantities of `physics.camera`; all off: the published pictures."""
+
+    haze: bool = False  # contrast by visibility
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Setup:
     """Everything that a backend needs to begin a run."""
 
@@ -100,6 +107,7 @@ class Setup:
     grip: GripModel = GripModel.PHYSICAL
     range_model: RangeModel = RangeModel.PHYSICAL
     camera_effect: bool = True  # weather acts on RGB images
+    camera_optics: CameraOptics = CameraOptics()  # of RGB images (embedded backend)
     rain_hides_night: bool = False  # in rain the camera effect of the night is left out (D-094)
     mu_ref: float = 0.9  # friction at CARLA's tire_friction 3.5 on a dry road
     tyres: str = REFERENCE  # of vehicles that have none of their own (embedded backend)

@@ -10,6 +10,7 @@ from math import exp, inf, log, log10, radians, sin, sqrt
 from typing import NamedTuple
 
 from skidpad.core.inputs import Beam
+from skidpad.core.jit import kernel
 from skidpad.core.weather import Weather
 from skidpad.physics.droplets import (
     FOG_BACKSCATTER,
@@ -72,10 +73,29 @@ def visibility(weather: Weather) -> float:
     return min(sight(weather), VISIBILITY_MOST)
 
 
+class Air(NamedTuple):
+    """What visible light meets on its way."""
+
+    fog: float  # 1/m, extinction of fog and clear air
+    fog_start: float  # m, where they begin
+    rain: float  # 1/m, extinction from the lens on
+
+
+def air_of(weather: Weather) -> Air:
+    """Returns what this weather puts in the way of visible light."""
+    rain = rain_extinction(rain_rate(weather))
+    return Air(fog_extinction(weather), float(weather.fog_distance), rain)
+
+
+@kernel
+def air_depth(air: Air, distance: float) -> float:
+    """Returns the optical depth of `distance` m of air, in nepers."""
+    return air.fog * max(distance - air.fog_start, 0.0) + air.rain * distance
+
+
 def transmission(weather: Weather, distance: float) -> float:
     """Returns the share of light left after `distance` m; fog begins at the weather's fog_distance."""
-    fog = fog_extinction(weather) * max(distance - weather.fog_distance, 0.0)
-    return exp(-fog - rain_extinction(rain_rate(weather)) * distance)
+    return exp(-air_depth(air_of(weather), float(distance)))
 
 
 class LidarAir(NamedTuple):

@@ -13,7 +13,7 @@ from skidpad.core.errors import BackendError
 from skidpad.core.frames import CameraImage, PartialImages, RadarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Beam, Outside
-from skidpad.core.setup import DT
+from skidpad.core.setup import DT, CameraOptics
 from skidpad.core.specs import CameraSpec, Modality, RadarSpec, SensorSpec
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import Bodywork, LightState, RangeModel
@@ -50,6 +50,7 @@ class PixelSettings:
 
     range_model: RangeModel = RangeModel.NONE
     camera_effect: bool = True  # degrade RGB images
+    optics: CameraOptics = CameraOptics()
     in_cockpit: bool = True  # weather spares what the published windscreen mask hides
     extras: frozenset[Extra] = NO_EXTRAS  # additions to colour images, for people only
     exclusive_stages: bool = False  # rain switches the night stage off (D-094)
@@ -107,7 +108,7 @@ class PixelSuite:
         limited = range_model is RangeModel.PHYSICAL
         labels = label_range(weather, Beam.LOW if beam is None else beam)
         sight = Sight(depth_range(weather), labels) if limited else UNLIMITED
-        light = lighting(weather, beam)
+        light = lighting(weather, beam, haze=settings.optics.haze)
         snowed = Extra.SNOW in settings.extras
         static = self.scene.static
         self.shading = Shading(

@@ -66,6 +66,7 @@ class Pixels:
             PixelSettings(
                 range_model=setup.range_model,
                 camera_effect=setup.camera_effect,
+                optics=setup.camera_optics,
                 exclusive_stages=setup.rain_hides_night,
                 seed=seed,
                 dt=setup.dt,

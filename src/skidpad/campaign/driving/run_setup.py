@@ -33,7 +33,7 @@ from skidpad.core.run import (
     StackDriver,
 )
 from skidpad.core.settings import NightRain, Relocation, TrafficSettings
-from skidpad.core.setup import ActorSetup, Setup, TrafficSetup, Wind
+from skidpad.core.setup import ActorSetup, CameraOptics, Setup, TrafficSetup, Wind
 from skidpad.core.simulator import BackendKind
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand
 from skidpad.core.told import describe_value
@@ -281,6 +281,7 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
         grip=spec.grip,
         range_model=sensors.range,
         camera_effect=sensors.camera,
+        camera_optics=CameraOptics(haze=sensors.camera_haze),
         rain_hides_night=sensors.night_rain is NightRain.RAIN_ONLY,
         mu_ref=world.mu_ref,
         tyres=world.tyres,

@@ -91,7 +91,7 @@ class Finish:
             send_back(view, self._ego, light, self._gains, inverse, key, out)
         bloom, wet = Extra.LAMPS in extras, self._wet if Extra.REFLECTIONS in extras else 0.0
         if bloom or wet > 0.0:
-            shine(view, self._sources, bloom, wet, light.extinction, WETTABLE, inverse, key, out)
+            shine(view, self._sources, bloom, wet, light.air, WETTABLE, inverse, key, out)
 
 
 def _within(bodies: Bodies, ego: Pose, reach: float) -> Bodies:

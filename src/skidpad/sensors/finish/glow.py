@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.jit import inner_kernel, kernel
+from skidpad.physics.optics import Air, air_depth
 from skidpad.sensors.finish.lamps import Sources
 from skidpad.sensors.pictures.packing import pack, unpack
 from skidpad.sensors.raster.view import View
@@ -113,7 +114,7 @@ def shine(
     sources: Sources,
     bloom: bool,
     wet: float,
-    extinction: float,
+    air: Air,
     wettable: NDArray[np.bool_],
     inverse: NDArray[np.float32],
     key: NDArray[np.int32],
@@ -130,7 +131,7 @@ def shine(
         facing = (dx * sources.face_x[i] + dy * sources.face_y[i]) / far
         if facing <= 0.02:
             continue
-        power = facing * np.exp(-extinction * far)
+        power = facing * np.exp(-air_depth(air, far))
         c = sources.colour[i]
         inside = 0.0 <= u < view.width and view.top <= v < view.height
         if inside:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.vocabulary import SemanticClass
+from skidpad.physics.optics import air_depth
 from skidpad.sensors.finish.glow import add_light
 from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.pictures.shading import HEADLAMP_X, HEADLAMP_Z, beam_at, beam_of, behind_lamps
@@ -82,7 +83,7 @@ def _send_back(
 ) -> None:
     """Adds to the picture `out` what retroreflective surfaces send back of the ego's own beam."""
     beam, slope, reach = beam_of(light)
-    per, beta = np.float32(1.0 / view.focal), np.float32(light.extinction)
+    per = np.float32(1.0 / view.focal)
     nearest = np.float32(1.0 / FAR)
     for row in range(view.top, view.height):
         v = np.float32(row + 0.5 - view.cy) * per
@@ -107,6 +108,6 @@ def _send_back(
                 if cone < LEAST:
                     continue
                 lit = back * beam_at(px, py, pz, beam, slope, reach) + np.float32(SPILL) * cone
-                lit *= np.exp(-beta * z)
+                lit *= np.float32(np.exp(-air_depth(light.air, z)))
                 if lit > LEAST:
                     out[row, column] = add_light(out[row, column], lit, lit, lit * 0.85)

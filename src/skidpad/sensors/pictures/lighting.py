@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from skidpad.core.inputs import Beam
 from skidpad.core.lefthanded import mirror_value
 from skidpad.core.weather import Weather
-from skidpad.physics.optics import extinction
+from skidpad.physics.optics import Air, air_of, extinction
 
 Colour = NDArray[np.float32]
 
@@ -33,8 +33,8 @@ class Lighting(NamedTuple):
     zenith: Colour  # colour of the sky overhead
     horizon: Colour  # and at the horizon; also the colour of haze
     disc: float  # brightness of the sun's disc and glow
-    extinction: float  # 1/m along the line of sight
-    haze_begins: float  # m
+    air: Air  # along the line of sight
+    curved: float  # 1: contrast falls as by Koschmieder, 0: as in the published pictures
     wet: float  # 0 dry .. 1 water on the road
     snow: float  # 0 .. 1 share of white ground
     headlights: float  # strength of the ego's beam, 0 off
@@ -42,8 +42,15 @@ class Lighting(NamedTuple):
     lamps: float  # strength of other vehicles' lamps, 0 by day
 
 
-def lighting(weather: Weather, beam: Beam | None = None) -> Lighting:
-    """Returns the light of a weather. beam: of the ego; None: low beam by night, else none (A-218)."""
+def lighting(weather: Weather, beam: Beam | None = None, *, haze: bool = False) -> Lighting:
+    """Returns the light of a weather.
+
+    Args:
+        weather: what sun, sky and air are like.
+        beam: of the ego; None: low beam by night, else none (A-218).
+        haze: contrast falls with distance as `physics.camera` says; else as in the published pictures,
+            where rain, too, begins where the fog does.
+    """
     if beam is None:
         beam = Beam.LOW if weather.is_night else Beam.OFF
     altitude = radians(weather.sun_altitude_deg)
@@ -73,14 +80,20 @@ def lighting(weather: Weather, beam: Beam | None = None) -> Lighting:
         (zenith + night * NIGHT_ZENITH).astype(np.float32),
         (horizon + night * NIGHT_HORIZON).astype(np.float32),
         float(day * clear * (0.35 if cloud > 0.5 else 1.0)),
-        extinction(weather),
-        weather.fog_distance if weather.fog_density > 0.0 else 0.0,
+        air_of(weather) if haze else _published_air(weather),
+        float(haze),
         max(weather.wetness, weather.precipitation_deposits) / 100.0,
         _smooth(weather.snow_depth_mm / 20.0),
         0.0 if beam is Beam.OFF else 1.0,
         beam is Beam.HIGH,
         night,
     )
+
+
+def _published_air(weather: Weather) -> Air:
+    """Returns the air of the published pictures: all of it begins with the fog, or at the lens without."""
+    start = float(weather.fog_distance) if weather.fog_density > 0.0 else 0.0
+    return Air(extinction(weather), start, 0.0)
 
 
 DAY_ZENITH, DAY_HORIZON = np.array([0.10, 0.26, 0.60]), np.array([0.48, 0.64, 0.82])

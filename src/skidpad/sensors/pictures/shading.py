@@ -13,6 +13,7 @@ from skidpad.core.arrays import Floats32
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.states import ActorTable
+from skidpad.physics.camera import share_left
 from skidpad.sensors.pictures.blocks import (
     BLOCK,
     COLUMNS,
@@ -184,7 +185,6 @@ def _look_up(palette: Floats32, table: ActorTable, light: Lighting, snow_on_road
 
 _HALF = np.float32(0.5)
 _TINY = np.float32(1e-12)
-_SIXTEENTH = np.float32(0.0625)
 _GLOSS_SHARE = np.float32(0.35)
 _F0 = np.float32(0.03)  # reflectance of water and glass at normal incidence, about
 _BEAM_WIDTH = np.float32(2.6)  # 1 / tangent squared: half the light at 22 deg to the side
@@ -278,7 +278,8 @@ def _surfaces(
     v: np.float32, count: int, light: Lighting, sun: Floats32, up: Floats32, work: Floats32
 ) -> None:
     """Applies sun, diffuse light, lamps, wet mirror and haze to a block's surfaces in `work`."""
-    beta, begins = np.float32(light.extinction), np.float32(light.haze_begins)
+    fog, begins = np.float32(light.air.fog), np.float32(light.air.fog_start)
+    rain, curved = np.float32(light.air.rain), np.float32(light.curved)
     wet = np.float32(light.wet)
     sun_r, sun_g, sun_b = light.sun[0], light.sun[1], light.sun[2]
     low_r, low_g, low_b = light.bounce[0], light.bounce[1], light.bounce[2]
@@ -307,13 +308,9 @@ def _surfaces(
         mirror = fresnel * (film * _FILM_SHARE + gloss * _GLOSS_SHARE)
         shown = ONE - glow
         dull = shown * (ONE - film * _DARK) * (ONE - mirror)
-        depth = ray / (w if w > _FARTHEST else _FARTHEST) - begins
-        depth = (depth if depth > ZERO else ZERO) * beta * _SIXTEENTH
-        through = ONE / (ONE + depth)
-        through = through * through
-        through = through * through
-        through = through * through
-        through = through * through
+        way = ray / (w if w > _FARTHEST else _FARTHEST)
+        foggy = way - begins
+        through = share_left((foggy if foggy > ZERO else ZERO) * fog + way * rain, curved)
         veil = mirror * shown * through + (ONE - through)
 
         r = glow + dull * (low_r + tilt * span_r + sun_r * n_sun + lit)

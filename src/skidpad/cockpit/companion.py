@@ -12,6 +12,7 @@ from skidpad.campaign.driving.loop import Moment
 from skidpad.cockpit import hud
 from skidpad.cockpit.source import Source, index_at
 from skidpad.cockpit.studio import FOR_PEOPLE, Looks, Studio, View, plane
+from skidpad.cockpit.turn_signals import TurnSignals
 from skidpad.core.setup import DT
 from skidpad.sensors.finish.extras import ALL_EXTRAS, Extra
 from skidpad.simulation.world.world import BRAKING
@@ -23,6 +24,7 @@ class Companion:
     def __init__(self, source: Source, first: int, looks: Looks = FOR_PEOPLE) -> None:
         """first: the tick with which the other run begins; looks: of the world in its pictures."""
         self.source, self.first = source, first
+        self._signals = TurnSignals(source)
         outside = source.seat(0).outside
         self.studio = Studio(source.map, source.table, outside, source.seed, looks=looks)
 
@@ -36,7 +38,8 @@ class Companion:
         truth = mine.truth
         self.studio.change(source.seat(k).outside, extras)
         braking = truth.commands[:, 1] > BRAKING
-        images = self.studio.look(truth.tick, truth.states, truth.lights, braking, source.crash(k))
+        turns, crash = self._signals.at(truth.tick), source.crash(k)
+        images = self.studio.look(truth.tick, truth.states, truth.lights, braking, crash, turns)
         said = {
             "t": round(truth.tick * DT, 2),
             "speed_kmh": hud.motion(mine)["speed_kmh"],

@@ -18,6 +18,7 @@ from skidpad.cockpit.marks import LightAhead, marks_of, patch_marks
 from skidpad.cockpit.pictures import Picture, colours, draw
 from skidpad.cockpit.source import Source, index_at
 from skidpad.cockpit.studio import FOR_PEOPLE, Looks, Studio, View, plane
+from skidpad.cockpit.turn_signals import TurnSignals
 from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.setup import DT
 from skidpad.recording.run.surfaces import read_run_surface
@@ -83,13 +84,15 @@ def frames(
     companion = None if other is None else Companion(other, source.tick(0), looks)
     camera, light = studio.suite.cameras[view.value], LightAhead(source.map)
     outlines = outline_patches(source.map, read_run_surface(source.folder))
+    signals = TurnSignals(source)
     for k in moments:
         moment = source.moment(k)
         studio.change(source.seat(k).outside)
         truth = moment.truth
         braking = truth.commands[:, 1] > BRAKING
         crash = source.crash(k)
-        images = studio.look(truth.tick, truth.states, truth.lights, braking, crash)
+        turns = signals.at(truth.tick)
+        images = studio.look(truth.tick, truth.states, truth.lights, braking, crash, turns)
         picture = colours(plane(images[view.value]))
         seen = marks_of(camera, moment.frame.radar, moment.report, light.mark(camera, moment))
         patches = patch_marks(camera, outlines, truth.states.pose(0))

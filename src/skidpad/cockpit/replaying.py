@@ -16,6 +16,7 @@ from skidpad.cockpit.opening import open_source
 from skidpad.cockpit.screen import Screen, Shown
 from skidpad.cockpit.source import Source, index_at, opening_tick
 from skidpad.cockpit.studio import FOR_PEOPLE, MAIN, Looks, View
+from skidpad.cockpit.turn_signals import TurnSignals
 from skidpad.cockpit.words import Link
 from skidpad.core.errors import OutputError, SkidpadError
 from skidpad.core.inputs import Beam
@@ -70,6 +71,7 @@ class Replayer:
         self.screen = Screen(
             feed, link, source.map, self._describe_moment, source.seed, surface, looks
         )
+        self.screen.signals = TurnSignals(source).at
         self.screen.begin(source.table)
         if other is not None:
             self.screen.beside = Companion(other, source.tick(0), looks)

@@ -8,6 +8,8 @@ from time import perf_counter
 from typing import Any, NamedTuple
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from skidpad.campaign.driving.loop import Moment, Sink
 from skidpad.cockpit import hud
@@ -63,6 +65,7 @@ class Screen(Sink):
         self._at = 0.0
         self.crash: Pose | None = None  # where the ego's last contact was
         self.latest: Callable[[], list[tuple[str, str]]] = list  # of further sensors and functions
+        self.signals: Callable[[int], NDArray[np.bool_]] | None = None  # (n, 2) lit in a tick
         self.beside: Beside | None = None  # another run in step with this one
 
     def begin(self, table: ActorTable) -> None:
@@ -94,7 +97,10 @@ class Screen(Sink):
         shown, truth = self.ask(), moment.truth
         self.studio.change(shown.outside, self.link.extras)
         braking = truth.commands[:, 1] > BRAKING
-        images = self.studio.look(truth.tick, truth.states, truth.lights, braking, self.crash)
+        turns = None if self.signals is None else self.signals(truth.tick)
+        images = self.studio.look(
+            truth.tick, truth.states, truth.lights, braking, self.crash, turns
+        )
         views = [v for v in View if self._is_wanted(v)]
         planes: dict[str, Any] = {v.value: plane(images[v.value]) for v in views}
         if self.beside is not None:

@@ -126,10 +126,12 @@ class Studio:
         lights: Mapping[int, LightState],
         braking: NDArray[np.bool_],
         crash: Pose | None = None,
+        indicating: NDArray[np.bool_] | None = None,
     ) -> Mapping[str, CameraImage]:
         """Returns the images of this moment by word of the view, each drawn when it is read.
 
-        crash: what the crash camera looks at; None: at the ego. Valid until the next call.
+        crash: what the crash camera looks at; None: at the ego. indicating: (n, 2) whose left and
+        right indicators are lit. Valid until the next call.
         """
         ego = states.pose(0)
         mount = mount_in(
@@ -137,7 +139,7 @@ class Studio:
         )
         cameras = self.suite.cameras
         cameras[View.CRASH.value] = replace(cameras[View.CRASH.value], mount=mount)
-        return self.suite.observe(tick, states, lights, braking).images
+        return self.suite.observe(tick, states, lights, braking, indicating).images
 
 
 def watching(place: Pose) -> Pose:

@@ -10,7 +10,7 @@ import numpy as np
 from skidpad.sensors.bodywork.body import Body, assemble, plate_of, skin, span, upright
 from skidpad.sensors.bodywork.wheels import heavy_wheels
 from skidpad.sensors.scene.materials import Material
-from skidpad.sensors.scene.mesh import Mesh, box, ribbon
+from skidpad.sensors.scene.mesh import Mesh, Points, box, ribbon
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,6 +28,13 @@ CITY_BUS = BusStyle()
 COACH = BusStyle(hull=0.84, doors=((0.14, 0.22),), windows=6, axles=(0.20, 0.72), wheel=0.12)
 
 
+ROOF = 0.945  # height of the hull
+SIDE = (  # height and half width of the hull, in shares of its own
+    (0.10, 0.97), (0.15, 1.0), (0.26, 1.0), (0.42, 1.0),
+    (0.80, 0.985), (0.83, 0.98), (0.91, 0.95), (ROOF, 0.85),
+)  # fmt: skip
+
+
 def make_bus(
     label: int,
     style: BusStyle,
@@ -41,37 +48,11 @@ def make_bus(
     h, half = 0.5 * length, 0.5 * width * style.hull
     radius = wheel or style.wheel * height
     places = axles or (h - style.axles[0] * length, h - style.axles[1] * length)
-    roof, low = 0.945 * height, 0.10 * height
-    rows = (
-        (low, 0.97),
-        (0.15 * height, 1.0),
-        (0.26 * height, 1.0),
-        (0.42 * height, 1.0),
-        (0.80 * height, 0.985),
-        (0.83 * height, 0.98),
-        (0.91 * height, 0.95),
-        (roof, 0.85),
-    )
     stations = _bus_stations(style, length, places, radius)
-    rings, count = [], len(rows)
-    for x, arched in stations:
-        inside = min(h - x, h + x)
-        narrow = 1.0 - 0.10 * max(0.0, 1.0 - inside / 0.35) ** 2
-        bottom = low
-        if arched:
-            away = min(min(abs(x - a) for a in places) / (1.13 * radius), 1.0)
-            bottom = max(low, radius * (1.0 + 1.13 * np.sqrt(1.0 - away * away)))
-        side = [(x, half * wide * narrow, max(z, bottom)) for z, wide in rows]
-        lean = (
-            0.16 * max(0.0, 1.0 - inside / 0.20)
-            if x > 0.0
-            else 0.05 * max(0.0, 1.0 - inside / 0.20)
-        )
-        side = [(a - np.sign(a) * lean * max(0.0, c / height - 0.4), b, c) for a, b, c in side]
-        rings.append(side + [(a, -b, c) for a, b, c in reversed(side)])
+    rings, count = _bus_rings(stations, h, half, height, places, radius)
     others = _bus_materials(style, stations, length, count)
     fixed = [
-        skin(np.array(rings), label, Material.PAINT, others),
+        skin(rings, label, Material.PAINT, others),
         *_bus_ends(label, h, half, height),
         box(
             (-h + 0.30, h - 0.30),
@@ -83,22 +64,55 @@ def make_bus(
         box(
             (-0.35 * h, 0.30 * h),
             (-0.62 * half, 0.62 * half),
-            (roof - 0.01, height),
+            (ROOF * height - 0.01, height),
             label,
             Material.CARGO,
         ),
+        *_bus_mirrors(label, h, half, 0.5 * width, height),
     ]
-    outer = 0.5 * width
-    for s in (1.0, -1.0):
-        y = span(s * (0.80 * half), s * outer)
-        fixed.append(
-            box((h - 0.16, h - 0.08), y, (0.80 * height, 0.815 * height), label, Material.TRIM)
-        )
-        y = span(s * (outer - 0.16), s * outer)
-        fixed.append(
-            box((h - 0.18, h - 0.06), y, (0.66 * height, 0.80 * height), label, Material.TRIM)
-        )
     return assemble(fixed, heavy_wheels(label, places, half, radius, 0.28))
+
+
+def _bus_rings(
+    stations: list[tuple[float, bool]],
+    h: float,
+    half: float,
+    height: float,
+    places: tuple[float, ...],
+    radius: float,
+) -> tuple[Points, int]:
+    """Returns the hull's rings (r, k, 3) from nose to tail, and how many points one side of them has.
+
+    h, half: m, half the length of the bus and half the width of the hull; places: x of the axles.
+    """
+    rows = [(share * height, wide) for share, wide in SIDE]
+    low = rows[0][0]
+    rings = []
+    for x, arched in stations:
+        inside = min(h - x, h + x)
+        narrow = 1.0 - 0.10 * max(0.0, 1.0 - inside / 0.35) ** 2
+        bottom = low
+        if arched:
+            away = min(min(abs(x - a) for a in places) / (1.13 * radius), 1.0)
+            bottom = max(low, radius * (1.0 + 1.13 * np.sqrt(1.0 - away * away)))
+        side = [(x, half * wide * narrow, max(z, bottom)) for z, wide in rows]
+        lean = (0.16 if x > 0.0 else 0.05) * max(0.0, 1.0 - inside / 0.20)
+        side = [(a - np.sign(a) * lean * max(0.0, c / height - 0.4), b, c) for a, b, c in side]
+        rings.append(side + [(a, -b, c) for a, b, c in reversed(side)])
+    return np.array(rings), len(rows)
+
+
+def _bus_mirrors(label: int, h: float, half: float, outer: float, height: float) -> list[Mesh]:
+    """Mirrors on arms at both sides of the nose, as far out as the box (outer, m)."""
+    parts = []
+    for s in (1.0, -1.0):
+        arm, glass = span(s * (0.80 * half), s * outer), span(s * (outer - 0.16), s * outer)
+        z = 0.80 * height
+        parts += [
+            box((h - 0.16, h - 0.08), arm, (z, 0.815 * height), label, Material.TRIM),
+            box((h - 0.18, h - 0.06), glass, (0.66 * height, z), label, Material.TRIM),
+        ]
+    return parts
 
 
 def _bus_stations(

@@ -23,6 +23,8 @@ from skidpad.sensors.bodywork.wheels import spoked_wheel
 from skidpad.sensors.scene.materials import Material
 from skidpad.sensors.scene.mesh import Mesh, box, merge
 
+Span = tuple[float, float]
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TwoWheelerStyle:
@@ -57,6 +59,44 @@ TWO_WHEELERS = {
 }
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Frame:
+    """The points in m that all parts of a two-wheeler hang on, and the shapes they are made of."""
+
+    label: int
+    style: TwoWheelerStyle
+    front: Point  # hub of the front wheel
+    rear: Point
+    seat: Point
+    bars: Point  # middle of the handlebar
+    radius: float  # of the wheels
+    width: float  # of the handlebar
+
+    def bar(
+        self, a: Point, b: Point, radii: tuple[float, float], material: int, sides: int = 6
+    ) -> Mesh:
+        """Returns a round bar from a to b."""
+        return tube((a, b), radii, self.label, material, sides)
+
+    def block(self, x: Span, y: Span, z: Span, material: int) -> Mesh:
+        """Returns a block between two x, two y and two z."""
+        return box(x, y, z, self.label, material)
+
+    def lump(self, centre: Point, radii: Point, material: int, sides: int = 8) -> Mesh:
+        """Returns an ellipsoid about a centre."""
+        return ball(centre, radii, self.label, material, sides)
+
+    def pane(self, x: float, y: Span, z: Span, material: int) -> Mesh:
+        """Returns an upright rectangle that looks along x."""
+        return upright(self.label, x, y, z, material)
+
+    def handlebar(self) -> Mesh:
+        """Returns the handlebar, as wide as the box."""
+        x, _, z = self.bars
+        half = 0.5 * self.width
+        return self.block((x - 0.02, x + 0.02), (-half, half), (z - 0.02, z + 0.02), Material.TRIM)
+
+
 def make_two_wheeler(
     label: int, style: TwoWheelerStyle, length: float, width: float, height: float
 ) -> Body:
@@ -70,8 +110,11 @@ def make_two_wheeler(
     seat = (-0.10 * length, 0.0, style.seat * height)
     high = (0.60 if style.motor else 0.585) * height - (0.04 * height if style.low_bars else 0.0)
     bars = (0.5 * h if style.motor else 0.44 * h, 0.0, high)
-    frame = _motorcycle if style.motor else _bicycle
-    parts = frame(label, style, front, rear, seat, bars, radius, width)
+    frame = _Frame(
+        label=label, style=style, front=front, rear=rear, seat=seat, bars=bars, radius=radius,
+        width=width,
+    )  # fmt: skip
+    parts = _motorcycle(frame) if style.motor else _bicycle(frame)
     pedals = (0.02 * length, 0.0, 0.55 * radius if style.motor else 0.78 * radius)
     rider = _rider(style, seat, bars, pedals, width, height)
     return assemble([*parts, rider], _choose_steered(wheels))
@@ -83,239 +126,164 @@ def _choose_steered(wheels: list[Part]) -> list[Part]:
     return [w._replace(steered=w.hub[0] == front) for w in wheels]
 
 
-def _bicycle(
-    label: int,
-    style: TwoWheelerStyle,
-    front: Point,
-    rear: Point,
-    seat: Point,
-    bars: Point,
-    radius: float,
-    width: float,
-) -> list[Mesh]:
+def _bicycle(f: _Frame) -> list[Mesh]:
     """Frame, fork, handlebar, saddle, crank and lamps."""
-    crank = (0.5 * (front[0] + rear[0]) - 0.08, 0.0, 0.82 * radius)
-    head = (bars[0] + 0.03, 0.0, bars[2] - 0.10)
+    crank = (0.5 * (f.front[0] + f.rear[0]) - 0.08, 0.0, 0.82 * f.radius)
+    head = (f.bars[0] + 0.03, 0.0, f.bars[2] - 0.10)
     low = (head[0] + 0.05, 0.0, head[2] - 0.16)
-    saddle = (seat[0], 0.0, seat[2] - 0.02)
-    pairs = [(crank, saddle), (crank, low), (rear, crank)]
-    pairs += [(rear, (saddle[0] + 0.04, 0.0, saddle[2] - 0.22))]
-    pairs += [] if style.skirt else [(head, (saddle[0] + 0.02, 0.0, saddle[2] - 0.12))]
-    parts = [tube(p, (0.020, 0.020), label, Material.PAINT, 5) for p in pairs]
+    parts = _bicycle_tubes(f, crank, head, low)
     for s in (1.0, -1.0):
-        parts.append(
-            tube(
-                ((front[0], 0.05 * s, front[2]), (low[0], 0.02 * s, low[2])),
-                (0.012, 0.016),
-                label,
-                Material.PAINT,
-                4,
-            )
-        )
-        foot = (crank[0] + 0.12 * s, 0.10 * s, crank[2] - 0.11 * s)
-        parts.append(
-            tube(((crank[0], 0.06 * s, crank[2]), foot), (0.012, 0.012), label, Material.STEEL, 4)
-        )
-        parts.append(
-            box(
-                (foot[0] - 0.05, foot[0] + 0.05),
-                span(foot[1], foot[1] + 0.08 * s),
-                (foot[2] - 0.015, foot[2] + 0.015),
-                label,
-                Material.TRIM,
-            )
-        )
+        parts += _bicycle_side(f, s, crank, low)
     parts += [
-        tube((low, bars), (0.018, 0.018), label, Material.PAINT, 5),
-        box(
-            (bars[0] - 0.02, bars[0] + 0.02),
-            (-0.5 * width, 0.5 * width),
-            (bars[2] - 0.02, bars[2] + 0.02),
-            label,
-            Material.TRIM,
-        ),
-        box(
-            (seat[0] - 0.14, seat[0] + 0.12),
-            (-0.07, 0.07),
-            (seat[2] - 0.06, seat[2] - 0.01),
-            label,
-            Material.TRIM,
-        ),
-        upright(
-            label,
-            bars[0] + 0.09,
-            (-0.04, 0.04),
-            (bars[2] - 0.14, bars[2] - 0.06),
-            Material.LAMP_GLASS,
-        ),
-        upright(
-            label,
-            rear[0] - 0.5 * radius,
-            (-0.035, 0.035),
-            (2.0 * radius, 2.0 * radius + 0.06),
-            Material.TAIL_LAMP,
-        ),
+        f.bar(low, f.bars, (0.018, 0.018), Material.PAINT, 5),
+        f.handlebar(),
+        *_saddle_and_lamps(f),
     ]
-    if style.skirt:  # mudguards and a rack
-        parts.append(
-            box(
-                (rear[0] - 0.6 * radius, rear[0] + 0.5 * radius),
-                (-0.07, 0.07),
-                (2.0 * radius + 0.06, 2.0 * radius + 0.08),
-                label,
-                Material.TRIM,
-            )
-        )
-        parts.append(tube((front, (low[0], 0.0, low[2])), (0.012, 0.012), label, Material.TRIM, 4))
+    if f.style.skirt:
+        parts += _mudguards(f, low)
     return parts
 
 
-def _motorcycle(
-    label: int,
-    style: TwoWheelerStyle,
-    front: Point,
-    rear: Point,
-    seat: Point,
-    bars: Point,
-    radius: float,
-    width: float,
-) -> list[Mesh]:
+def _bicycle_tubes(f: _Frame, crank: Point, head: Point, low: Point) -> list[Mesh]:
+    """The tubes between crank, saddle, rear wheel and head; one for a skirt has no upper one."""
+    saddle = (f.seat[0], 0.0, f.seat[2] - 0.02)
+    pairs = [(crank, saddle), (crank, low), (f.rear, crank)]
+    pairs += [(f.rear, (saddle[0] + 0.04, 0.0, saddle[2] - 0.22))]
+    pairs += [] if f.style.skirt else [(head, (saddle[0] + 0.02, 0.0, saddle[2] - 0.12))]
+    return [f.bar(a, b, (0.020, 0.020), Material.PAINT, 5) for a, b in pairs]
+
+
+def _bicycle_side(f: _Frame, s: float, crank: Point, low: Point) -> list[Mesh]:
+    """Fork blade, crank and pedal of the left (s = 1) or right (-1) side."""
+    foot = (crank[0] + 0.12 * s, 0.10 * s, crank[2] - 0.11 * s)
+    blade = (f.front[0], 0.05 * s, f.front[2]), (low[0], 0.02 * s, low[2])
+    return [
+        f.bar(*blade, (0.012, 0.016), Material.PAINT, 4),
+        f.bar((crank[0], 0.06 * s, crank[2]), foot, (0.012, 0.012), Material.STEEL, 4),
+        f.block(
+            (foot[0] - 0.05, foot[0] + 0.05),
+            span(foot[1], foot[1] + 0.08 * s),
+            (foot[2] - 0.015, foot[2] + 0.015),
+            Material.TRIM,
+        ),
+    ]
+
+
+def _saddle_and_lamps(f: _Frame) -> list[Mesh]:
+    """Saddle, head lamp and tail lamp of a bicycle."""
+    (x, _, z), (front, _, high), tall = f.seat, f.bars, 2.0 * f.radius
+    return [
+        f.block((x - 0.14, x + 0.12), (-0.07, 0.07), (z - 0.06, z - 0.01), Material.TRIM),
+        f.pane(front + 0.09, (-0.04, 0.04), (high - 0.14, high - 0.06), Material.LAMP_GLASS),
+        f.pane(
+            f.rear[0] - 0.5 * f.radius, (-0.035, 0.035), (tall, tall + 0.06), Material.TAIL_LAMP
+        ),
+    ]
+
+
+def _mudguards(f: _Frame, low: Point) -> list[Mesh]:
+    """A rack, and the stay of a mudguard."""
+    x, tall = f.rear[0], 2.0 * f.radius
+    rack = (x - 0.6 * f.radius, x + 0.5 * f.radius)
+    return [
+        f.block(rack, (-0.07, 0.07), (tall + 0.06, tall + 0.08), Material.TRIM),
+        f.bar(f.front, (low[0], 0.0, low[2]), (0.012, 0.012), Material.TRIM, 4),
+    ]
+
+
+def _motorcycle(f: _Frame) -> list[Mesh]:
     """Engine, tank, seat, fork, mudguards, exhaust, lamps, plate and what the style adds."""
-    top = seat[2] - 0.03
-    head = (bars[0] + 0.10, 0.0, bars[2] - 0.06)
+    top = f.seat[2] - 0.03
+    head = (f.bars[0] + 0.10, 0.0, f.bars[2] - 0.06)
+    x, r = f.front[0], f.radius
     parts = [
-        ball((0.04, 0.0, 1.25 * radius), (0.27, 0.15, 0.21), label, Material.TRIM),
-        tube(
-            ((bars[0] - 0.08, 0.0, top + 0.10), (seat[0] + 0.16, 0.0, top + 0.02)),
-            (0.15, 0.12),
-            label,
-            Material.PAINT,
-            8,
+        *_engine_and_seat(f, top),
+        f.block(
+            (x - 0.8 * r, x + 0.6 * r), (-0.07, 0.07), (2.03 * r, 2.03 * r + 0.03), Material.PAINT
         ),
-        tube(
-            ((seat[0] + 0.18, 0.0, top - 0.02), (rear[0] + 0.02, 0.0, top + 0.02)),
-            (0.11, 0.07),
-            label,
-            Material.TRIM,
-            8,
-        ),
-        tube(
-            ((seat[0] + 0.10, 0.0, top - 0.10), (rear[0] - 0.55 * radius, 0.0, top - 0.03)),
-            (0.11, 0.05),
-            label,
-            Material.PAINT,
-            8,
-        ),
-        tube((rear, (0.0, 0.0, 1.1 * radius)), (0.04, 0.05), label, Material.STEEL, 5),
-        tube(
-            ((0.1, -0.13, 0.8 * radius), (rear[0] - 0.2 * radius, -0.16, 1.15 * radius)),
-            (0.035, 0.06),
-            label,
-            Material.STEEL,
-            6,
-        ),
-        box(
-            (front[0] - 0.8 * radius, front[0] + 0.6 * radius),
-            (-0.07, 0.07),
-            (2.03 * radius, 2.03 * radius + 0.03),
-            label,
-            Material.PAINT,
-        ),
-        box(
-            (bars[0] - 0.02, bars[0] + 0.02),
-            (-0.5 * width, 0.5 * width),
-            (bars[2] - 0.02, bars[2] + 0.02),
-            label,
-            Material.TRIM,
-        ),
-        ball(head, (0.09, 0.10, 0.10), label, Material.PAINT, 8),
-        upright(
-            label,
-            head[0] + 0.088,
-            (-0.065, 0.065),
-            (head[2] - 0.05, head[2] + 0.05),
-            Material.LAMP_GLASS,
-        ),
-        upright(
-            label,
-            rear[0] - 0.58 * radius,
-            (-0.08, 0.08),
-            (top - 0.05, top + 0.01),
-            Material.TAIL_LAMP,
-        ),
-        upright(
-            label,
-            rear[0] - 0.59 * radius,
-            (-0.05, 0.05),
-            (top - 0.07, top - 0.052),
-            Material.BRAKE_LAMP,
-        ),
-        plate_of(label, rear[0] - 0.75 * radius, top - 0.22, 0.22),
+        f.handlebar(),
+        *_motorcycle_lamps(f, top, head),
     ]
     for s, turn in ((1.0, Material.INDICATOR_LEFT), (-1.0, Material.INDICATOR_RIGHT)):
-        parts.append(
-            tube(
-                ((front[0], 0.10 * s, front[2]), (bars[0] + 0.02, 0.08 * s, bars[2])),
-                (0.025, 0.03),
-                label,
-                Material.STEEL,
-                5,
-            )
-        )
-        for x, z in ((head[0] - 0.02, head[2] - 0.09), (rear[0] - 0.5 * radius, top - 0.07)):
-            parts.append(ball((x, 0.15 * s, z), (0.03, 0.04, 0.03), label, turn, 6))
-        y = span(0.36 * width * s, 0.44 * width * s)
-        parts.append(
-            box(
-                (bars[0] + 0.02, bars[0] + 0.04),
-                y,
-                (bars[2] + 0.05, bars[2] + 0.13),
-                label,
-                Material.TRIM,
-            )
-        )
-        if style.cases:
-            y = span(0.15 * s, 0.28 * s)
-            parts.append(
-                box(
-                    (rear[0] - 0.2, rear[0] + 0.26),
-                    y,
-                    (1.3 * radius, 1.3 * radius + 0.28),
-                    label,
-                    Material.TRIM,
-                )
-            )
-    if style.fairing:
-        parts += [
-            tube(
-                ((head[0] + 0.05, 0.0, head[2] - 0.02), (0.05, 0.0, 1.1 * radius)),
-                (0.11, 0.21),
-                label,
-                Material.PAINT,
-                8,
-            ),
-            tube(
-                ((head[0] + 0.02, 0.0, head[2] + 0.05), (head[0] - 0.14, 0.0, head[2] + 0.19)),
-                (0.10, 0.06),
-                label,
-                Material.GLASS,
-                6,
-            ),
-        ]
-    if style.shield:
-        x = bars[0] + 0.02
-        parts += [
-            tube(
-                ((x + 0.06, 0.0, bars[2] - 0.08), (x - 0.02, 0.0, 0.9 * radius)),
-                (0.12, 0.22),
-                label,
-                Material.PAINT,
-                8,
-            ),
-            box((seat[0], x), (-0.16, 0.16), (0.85 * radius, 1.1 * radius), label, Material.PAINT),
-            ball((rear[0] + 0.08, 0.0, 1.75 * radius), (0.30, 0.19, 0.26), label, Material.PAINT),
-        ]
+        parts += _motorcycle_side(f, s, turn, top, head)
+    if f.style.fairing:
+        parts += _fairing(f, head)
+    if f.style.shield:
+        parts += _shield(f)
     return parts
+
+
+def _engine_and_seat(f: _Frame, top: float) -> list[Mesh]:
+    """Engine, tank, seat, tail, swinging arm and exhaust; top: m, of the seat."""
+    bars, seat, rear, r = f.bars[0], f.seat[0], f.rear[0], f.radius
+    tank = (bars - 0.08, 0.0, top + 0.10), (seat + 0.16, 0.0, top + 0.02)
+    cushion = (seat + 0.18, 0.0, top - 0.02), (rear + 0.02, 0.0, top + 0.02)
+    tail = (seat + 0.10, 0.0, top - 0.10), (rear - 0.55 * r, 0.0, top - 0.03)
+    exhaust = (0.1, -0.13, 0.8 * r), (rear - 0.2 * r, -0.16, 1.15 * r)
+    return [
+        f.lump((0.04, 0.0, 1.25 * r), (0.27, 0.15, 0.21), Material.TRIM),
+        f.bar(*tank, (0.15, 0.12), Material.PAINT, 8),
+        f.bar(*cushion, (0.11, 0.07), Material.TRIM, 8),
+        f.bar(*tail, (0.11, 0.05), Material.PAINT, 8),
+        f.bar(f.rear, (0.0, 0.0, 1.1 * r), (0.04, 0.05), Material.STEEL, 5),
+        f.bar(*exhaust, (0.035, 0.06), Material.STEEL, 6),
+    ]
+
+
+def _motorcycle_lamps(f: _Frame, top: float, head: Point) -> list[Mesh]:
+    """Housing and glass of the head lamp at `head`, tail and brake lamp, plate."""
+    rear, r = f.rear[0], f.radius
+    glass = (head[2] - 0.05, head[2] + 0.05)
+    return [
+        f.lump(head, (0.09, 0.10, 0.10), Material.PAINT, 8),
+        f.pane(head[0] + 0.088, (-0.065, 0.065), glass, Material.LAMP_GLASS),
+        f.pane(rear - 0.58 * r, (-0.08, 0.08), (top - 0.05, top + 0.01), Material.TAIL_LAMP),
+        f.pane(rear - 0.59 * r, (-0.05, 0.05), (top - 0.07, top - 0.052), Material.BRAKE_LAMP),
+        plate_of(f.label, rear - 0.75 * r, top - 0.22, 0.22),
+    ]
+
+
+def _motorcycle_side(f: _Frame, s: float, turn: Material, top: float, head: Point) -> list[Mesh]:
+    """Fork, indicators, mirror and case of the left (s = 1) or right (-1) side."""
+    (x, _, z), rear, r = f.bars, f.rear[0], f.radius
+    fork = (f.front[0], 0.10 * s, f.front[2]), (x + 0.02, 0.08 * s, z)
+    parts = [f.bar(*fork, (0.025, 0.03), Material.STEEL, 5)]
+    for at, high in ((head[0] - 0.02, head[2] - 0.09), (rear - 0.5 * r, top - 0.07)):
+        parts.append(f.lump((at, 0.15 * s, high), (0.03, 0.04, 0.03), turn, 6))
+    mirror = span(0.36 * f.width * s, 0.44 * f.width * s)
+    parts.append(f.block((x + 0.02, x + 0.04), mirror, (z + 0.05, z + 0.13), Material.TRIM))
+    if f.style.cases:
+        low = 1.3 * r
+        case = span(0.15 * s, 0.28 * s)
+        parts.append(f.block((rear - 0.2, rear + 0.26), case, (low, low + 0.28), Material.TRIM))
+    return parts
+
+
+def _fairing(f: _Frame, head: Point) -> list[Mesh]:
+    """A fairing around the head lamp at `head`, with a screen over it."""
+    x, _, z = head
+    screen = (x + 0.02, 0.0, z + 0.05), (x - 0.14, 0.0, z + 0.19)
+    return [
+        f.bar(
+            (x + 0.05, 0.0, z - 0.02),
+            (0.05, 0.0, 1.1 * f.radius),
+            (0.11, 0.21),
+            Material.PAINT,
+            8,
+        ),
+        f.bar(*screen, (0.10, 0.06), Material.GLASS, 6),
+    ]
+
+
+def _shield(f: _Frame) -> list[Mesh]:
+    """What a scooter has: a shield before the legs, a floor, and a case over the engine."""
+    x, r = f.bars[0] + 0.02, f.radius
+    shield = (x + 0.06, 0.0, f.bars[2] - 0.08), (x - 0.02, 0.0, 0.9 * r)
+    return [
+        f.bar(*shield, (0.12, 0.22), Material.PAINT, 8),
+        f.block((f.seat[0], x), (-0.16, 0.16), (0.85 * r, 1.1 * r), Material.PAINT),
+        f.lump((f.rear[0] + 0.08, 0.0, 1.75 * r), (0.30, 0.19, 0.26), Material.PAINT),
+    ]
 
 
 def _rider(

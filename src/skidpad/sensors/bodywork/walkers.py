@@ -54,52 +54,17 @@ def make_walker(label: int, style: WalkerStyle, length: float, width: float, hei
 def _walker(label: int, style: WalkerStyle, deep: float, wide: float) -> Mesh:
     """A walker of height 1 with one leg and the other arm ahead, so far in and across as is asked."""
     hip, neck = style.hip, style.neck
-    chest, k = neck - 0.09, min(1.0, (wide - 0.042) / 0.112)
+    k = min(1.0, (wide - 0.042) / 0.112)
     rows = [
         (hip - 0.02, 0.058, 0.085 * k),
         (hip + 0.10, 0.052, 0.080 * k),
-        (chest, 0.066, 0.112 * k),
+        (neck - 0.09, 0.066, 0.112 * k),
         (neck - 0.02, 0.045, 0.095 * k),
         (neck, 0.03, 0.04 * k),
     ]
-    parts = [
-        _torso(label, rows),
-        tube(
-            ((0.0, 0.0, neck - 0.02), (0.01, 0.0, neck + 0.04)), (0.03, 0.028), label, Material.SKIN
-        ),
-        ball((0.012, 0.0, 1.0 - style.head), (0.052, 0.043, style.head), label, Material.SKIN),
-        ball(
-            (-0.006, 0.0, 1.0 - 0.82 * style.head), (0.054, 0.047, 0.82 * style.head), label, HAIR
-        ),
-    ]
-    if style.hair > 0.0:
-        z = 1.0 - style.head
-        parts.append(
-            tube(((-0.03, 0.0, z), (-0.035, 0.0, z - style.hair)), (0.045, 0.03), label, HAIR)
-        )
+    parts = [_torso(label, rows), *_head(label, style)]
     for s in (1.0, -1.0):
-        foot = (deep - 0.075 if s > 0.0 else 0.03 - deep, 0.048 * s * k, 0.045)
-        knee = (0.5 * foot[0] + 0.025, 0.046 * s * k, 0.52 * hip)
-        parts += [
-            tube(((0.0, 0.046 * s * k, hip), knee), (0.052, 0.038), label, style.trousers),
-            tube((knee, foot), (0.038, 0.026), label, style.trousers),
-            box(
-                (foot[0] - 0.03, foot[0] + 0.075),
-                (foot[1] - 0.024, foot[1] + 0.024),
-                (0.0, 0.05),
-                label,
-                SHOE,
-            ),
-        ]
-        swing = -0.3 * s * min(deep, 0.16)
-        shoulder = (0.0, 0.114 * s * k, neck - 0.045)
-        elbow = (0.5 * swing, s * min(0.115 + 0.02 * k, wide - 0.028), neck - 0.19)
-        hand = (swing + 0.03, s * (wide - 0.018), neck - 0.335)
-        parts += [
-            tube((shoulder, elbow), (0.034, 0.027), label, Material.CLOTH),
-            tube((elbow, hand), (0.026, 0.02), label, style.sleeves),
-            ball(hand, (0.022, 0.018, 0.03), label, Material.SKIN, 6),
-        ]
+        parts += [*_leg(label, style, s, deep, k), *_arm(label, style, s, deep, wide, k)]
     if style.coat is not None:
         hem = [
             (style.coat, min(0.095, 0.9 * deep), 0.105 * k),
@@ -108,17 +73,59 @@ def _walker(label: int, style: WalkerStyle, deep: float, wide: float) -> Mesh:
         ]
         parts.append(_torso(label, hem))
     if style.pack:
-        back = max(-0.13, -deep)
-        parts.append(
-            box(
-                (back, -0.04),
-                (-0.075 * k, 0.075 * k),
-                (hip + 0.06, neck - 0.04),
-                label,
-                Material.FENCE,
-            )
-        )
+        x, z = (max(-0.13, -deep), -0.04), (hip + 0.06, neck - 0.04)
+        parts.append(box(x, (-0.075 * k, 0.075 * k), z, label, Material.FENCE))
     return merge(parts)
+
+
+def _head(label: int, style: WalkerStyle) -> list[Mesh]:
+    """Neck, head and hair."""
+    neck, half = style.neck, style.head
+    nape = (0.0, 0.0, neck - 0.02), (0.01, 0.0, neck + 0.04)
+    parts = [
+        tube(nape, (0.03, 0.028), label, Material.SKIN),
+        ball((0.012, 0.0, 1.0 - half), (0.052, 0.043, half), label, Material.SKIN),
+        ball((-0.006, 0.0, 1.0 - 0.82 * half), (0.054, 0.047, 0.82 * half), label, HAIR),
+    ]
+    if style.hair > 0.0:
+        z = 1.0 - half
+        hanging = (-0.03, 0.0, z), (-0.035, 0.0, z - style.hair)
+        parts.append(tube(hanging, (0.045, 0.03), label, HAIR))
+    return parts
+
+
+def _leg(label: int, style: WalkerStyle, s: float, deep: float, k: float) -> list[Mesh]:
+    """The left leg (s = 1) ahead or the right one (-1) behind: thigh, shin and shoe. k: narrower by it."""
+    hip = style.hip
+    foot = (deep - 0.075 if s > 0.0 else 0.03 - deep, 0.048 * s * k, 0.045)
+    knee = (0.5 * foot[0] + 0.025, 0.046 * s * k, 0.52 * hip)
+    return [
+        tube(((0.0, 0.046 * s * k, hip), knee), (0.052, 0.038), label, style.trousers),
+        tube((knee, foot), (0.038, 0.026), label, style.trousers),
+        box(
+            (foot[0] - 0.03, foot[0] + 0.075),
+            (foot[1] - 0.024, foot[1] + 0.024),
+            (0.0, 0.05),
+            label,
+            SHOE,
+        ),
+    ]
+
+
+def _arm(
+    label: int, style: WalkerStyle, s: float, deep: float, wide: float, k: float
+) -> list[Mesh]:
+    """The left arm (s = 1) behind or the right one (-1) ahead: two limbs and a hand."""
+    neck = style.neck
+    swing = -0.3 * s * min(deep, 0.16)
+    shoulder = (0.0, 0.114 * s * k, neck - 0.045)
+    elbow = (0.5 * swing, s * min(0.115 + 0.02 * k, wide - 0.028), neck - 0.19)
+    hand = (swing + 0.03, s * (wide - 0.018), neck - 0.335)
+    return [
+        tube((shoulder, elbow), (0.034, 0.027), label, Material.CLOTH),
+        tube((elbow, hand), (0.026, 0.02), label, style.sleeves),
+        ball(hand, (0.022, 0.018, 0.03), label, Material.SKIN, 6),
+    ]
 
 
 def _torso(label: int, rows: Sequence[tuple[float, float, float]]) -> Mesh:

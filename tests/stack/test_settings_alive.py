@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from stackfakes import (
     BUMPER_DEPTH,
     LANE_WIDTH,
@@ -39,6 +40,7 @@ from skidpad.core.weather import Weather
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.recording.run.log_files import log_hash
 from skidpad.roads.bundled import load_map
+from skidpad.roads.queries import RoadMap
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.simulation.recovery import Supervisor
 from skidpad.stack.adas import AdasStack
@@ -193,6 +195,30 @@ def tight_bend(settings: Settings) -> float:
     return roll
 
 
+def wet_transition(settings: Settings) -> float:
+    """Friction under a car where the superelevation of a motorway passes through low values, in rain."""
+    road_map = load_map("motorway")
+    bank = np.abs(np.tan(road_map.samples.bank))
+    row = int(np.flatnonzero((bank > 0.005) & (bank < 0.01) & on_road(road_map))[0])
+    s = road_map.samples
+    place = Pose(s.x[row], s.y[row], s.z[row], yaw=s.heading[row])
+    ready = cell(settings, "rain-noon")
+    setup = stage_of(ready).setup
+    ego = replace(setup.ego, place=place, speed=20.0)
+    backend = EmbeddedBackend()
+    backend.reset(replace(setup, map="motorway", ego=ego, actors=(), traffic=None), ready.seed)
+    backend.step(VehicleCommand())
+    found = float(backend.truth().mu[0].mean())
+    backend.close()
+    return found
+
+
+def on_road(road_map: RoadMap) -> NDArray[np.bool_]:
+    """Which samples lie on lanes that can be driven, outside of junctions."""
+    lanes = (road_map.arrays.drivable == 1) & (road_map.lanes.junction == -1)
+    return lanes[road_map.samples.lane]
+
+
 def in_wind(**also: Any) -> Outcome:
     """A short drive in a wind."""
     return lambda s: short_drive("rain-noon")(s.with_values({"wind": True, **also}))
@@ -284,6 +310,7 @@ OTHERS: dict[str, Scenario] = {
     "tyres": Scenario("summer_1.6mm", short_drive("icy_30")),
     "tyre_stiffness": Scenario(True, short_drive("rain-noon")),
     "water_drag": Scenario(True, short_drive("rain-noon")),
+    "sheet_flow": Scenario(True, wet_transition),
     "lidar": Scenario("physical", lidar),
     "spray": Scenario(True, sprayed),
     "radar_model": Scenario("physical", short_drive("clear-noon")),

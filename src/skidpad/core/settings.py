@@ -86,6 +86,9 @@ class WorldSettings(SettingsPart):
         False, "M-1, T-11", "slip stiffness falls on water, snow and ice"
     )
     water_drag: bool = setting_field(False, "M-1, T-11", "wheels push water aside")
+    sheet_flow: bool = setting_field(
+        False, "M-1, T-11", "rain is deeper where the map's superelevation is low"
+    )
     lane_material: bool = setting_field(
         False, "M-1, T-11", "<material friction> of OpenDRIVE replaces mu_ref on its lane"
     )

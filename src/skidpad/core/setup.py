@@ -113,6 +113,7 @@ class Setup:
     tyres: str = REFERENCE  # of vehicles that have none of their own (embedded backend)
     tyre_stiffness: bool = False  # slip stiffness falls on water, snow and ice (embedded backend)
     water_drag: bool = False  # wheels push water aside (embedded backend)
+    sheet_flow: bool = False  # rain is deeper where superelevation is low (embedded backend)
     # mu_ref that <material friction> of the map replaces; None: it is not read (embedded backend)
     material_base: float | None = None
     lidar: LidarModel = LidarModel.EXACT  # of the lidars that a stack asks for (embedded backend)

@@ -107,13 +107,16 @@ def rain_rate(weather: Weather) -> float:
     return RAIN_FULL * weather.precipitation / 100.0
 
 
-def runoff_film(rain_mm_h: float) -> float:
+def runoff_film(
+    rain_mm_h: float, length: float = DRAIN_LENGTH, slope: float = DRAIN_SLOPE
+) -> float:
     """Returns the depth in mm of rain flowing off the road, above its texture; 0 where the texture holds it.
 
-    After Gallaway, Schiller and Rose, TTI report 138-5 (1971), which relates these quantities; the
-    numbers in d = 0.01485 T^0.11 L^0.43 I^0.59 / S^0.42 - T were not found in a public text.
+    length: m that the water has flowed, down a slope. After Gallaway, Schiller and Rose, TTI report 138-5
+    (1971), which relates these quantities; the numbers in d = 0.01485 T^0.11 L^0.43 I^0.59 / S^0.42 - T
+    were not found in a public text.
     """
-    depth = 0.01485 * TEXTURE_MM**0.11 * DRAIN_LENGTH**0.43 * rain_mm_h**0.59 / DRAIN_SLOPE**0.42
+    depth = 0.01485 * TEXTURE_MM**0.11 * length**0.43 * rain_mm_h**0.59 / slope**0.42
     return float(max(depth - TEXTURE_MM, 0.0))
 
 

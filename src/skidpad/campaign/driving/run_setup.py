@@ -287,6 +287,7 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
         tyres=world.tyres,
         tyre_stiffness=world.tyre_stiffness,
         water_drag=world.water_drag,
+        sheet_flow=world.sheet_flow,
         material_base=world.mu_ref if world.lane_material else None,
         lidar=sensors.lidar,
         spray=sensors.spray,

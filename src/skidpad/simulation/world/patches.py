@@ -32,6 +32,7 @@ from skidpad.simulation.world.patch_kernel import (
     WheelPlaces,
     fill_patches,
 )
+from skidpad.simulation.world.sheet_flow import SheetFlow
 
 __all__ = ["NO_PATCH", "FrictionZone", "LaneFrictions", "Patches", "in_zone"]
 
@@ -59,14 +60,17 @@ class Patches:
         patches: Sequence[SurfacePatch],
         road: Road,
         lanes: LaneFrictions | None = None,
+        sheet_flow: SheetFlow | None = None,
     ) -> None:
         """road: without patches. lanes: shares of its friction that materials make, under them.
+
+        sheet_flow: what rain adds to the patches; None: nothing.
 
         Raises:
             ConfigError: a patch lies on no road of the map, none of its lanes has such a stretch, or it
                 asks for bridges where the map names none.
         """
-        self.map, self.lanes = map, lanes or {}
+        self.map, self.lanes, self.sheet_flow = map, lanes or {}, sheet_flow
         for k, patch in enumerate(patches):
             _check(k, patch, map)
         self.patches = spread_over_bridges(map, patches)
@@ -76,6 +80,9 @@ class Patches:
     def lay(self, road: Road) -> None:
         """The road without patches is this from now on."""
         self.road = road
+        self._here = present_patches(self.patches, road.weather.air_temperature_c)
+        if self.sheet_flow is not None:
+            self._here += self.sheet_flow.patches(road.weather)
         self._pack()
 
     def set_vehicles(self, types: Sequence[VehicleType]) -> None:
@@ -101,8 +108,7 @@ class Patches:
         self._wheels = WheelPlaces(
             self._place, np.array([self.kinds.index(n) for n in own], np.int64)
         )
-        here = present_patches(self.patches, self.road.weather.air_temperature_c)
-        self._held = hold(_arrays(self.map, here, self.lanes, self.road, self.kinds))
+        self._held = hold(_arrays(self.map, self._here, self.lanes, self.road, self.kinds))
 
     def fill(self, states: ActorStates, share: Floats, stiffness: Floats, film: Floats) -> None:
         """Set what patches do to the wheels, (w, 4) at FL, FR, RL, RR.

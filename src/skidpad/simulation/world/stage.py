@@ -11,6 +11,7 @@ from skidpad.scenery.dressing import dress_map
 from skidpad.simulation.world.actors import Role, cast_of, place_of
 from skidpad.simulation.world.lights import Lights
 from skidpad.simulation.world.patches import LaneFrictions, Patches
+from skidpad.simulation.world.sheet_flow import SheetFlow
 from skidpad.simulation.world.touch import ContactBook
 from skidpad.simulation.world.traffic.care import care_of
 from skidpad.simulation.world.traffic.manager import Traffic
@@ -41,8 +42,9 @@ def build_world(setup: Setup, seed: int) -> World:
     drivers = Traffic(map, traffic, seed, care_of(setup, traffic.slow_in_weather))
     world.let_drive(drivers)
     lanes = lane_frictions(setup)
-    if setup.patches or lanes:
-        world.patches = Patches(map, setup.patches, road, lanes)
+    if setup.patches or lanes or setup.sheet_flow:
+        flow = SheetFlow(map) if setup.sheet_flow else None
+        world.patches = Patches(map, setup.patches, road, lanes, flow)
     drawn = setup.scenery is Scenery.FULL or setup.bodywork is Bodywork.SHAPED
     paints = seed if drawn else None
     ids = world.enter([role.newcomer(i, paints) for i, role in enumerate(roles)])

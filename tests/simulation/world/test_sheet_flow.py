@@ -8,7 +8,14 @@ import pytest
 
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
-from skidpad.physics.grip import TEXTURE_MM, Road, physical_params, road_surface, runoff_film
+from skidpad.physics.grip import (
+    TEXTURE_MM,
+    Road,
+    physical_params,
+    ratio_at,
+    road_surface,
+    runoff_film,
+)
 from skidpad.roads.bundled import FOLDER, load_map
 from skidpad.roads.cross_slopes import cross_slopes
 from skidpad.simulation.world.patches import Patches
@@ -45,7 +52,8 @@ def test_one_point_by_hand(banked):
     slopes = cross_slopes(banked)
     k = at(banked, slopes, -2, 530.0)
     assert slopes.s_road[k] == pytest.approx(530.0, abs=0.5)
-    b, g = 0.03 - 0.0006 * (slopes.s_road[k] - 500.0), 0.01
+    b = 0.03 - 0.0006 * (slopes.s_road[k] - 500.0)
+    g = 0.01 + 5.25 * 0.0006  # of the road, and of its twist 5.25 m to the right
     assert slopes.cross[k] == pytest.approx(np.tan(b), rel=1e-3)
     assert slopes.grade[k] == pytest.approx(g, abs=1e-4)
     assert slopes.above[k] == pytest.approx(17.75, abs=0.01)
@@ -83,15 +91,9 @@ def test_a_wheel_meets_the_level_that_the_film_reaches(banked):
     place = banked.at(lane, 530.0)
     wanted = physical_params(replace(elsewhere, film_mm=1.5))
     share = found.ratio_at(place.x, place.y, place.z, 20.0)
-    assert share * ratio(road.params(), 20.0) == pytest.approx(ratio(wanted, 20.0), rel=1e-6)
+    assert share * ratio_at(road.params(), 20.0) == pytest.approx(ratio_at(wanted, 20.0), rel=1e-6)
     found.lay(replace(road, weather=Weather(wetness=100.0)))
     assert found.ratio_at(place.x, place.y, place.z, 20.0) == 1.0  # no rain, no flow
-
-
-def ratio(params, v):
-    from skidpad.physics.grip import ratio_at
-
-    return ratio_at(params, v)
 
 
 def test_a_map_without_superelevation_is_crowned_everywhere():

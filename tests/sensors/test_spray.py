@@ -62,7 +62,9 @@ def cloud(first=0.1, length=30.0, yaw=0.0):
 def along(clouds, eye, way, distance, n=20_000):
     ways = np.tile(np.asarray(way, float) / np.linalg.norm(way), (n, 1))
     azimuth = np.full(n, np.arctan2(way[1], way[0]))
-    return spray_of(clouds, np.asarray(eye, float), azimuth, ways, np.full(n, distance), KEY, 0)
+    met = np.ones(n, np.bool_)
+    eye = np.asarray(eye, float)
+    return spray_of(clouds, eye, azimuth, ways, np.full(n, distance), met, 0.0, KEY, 0)
 
 
 def test_depth_along_the_whole_cloud_is_the_integral_of_its_extinction():

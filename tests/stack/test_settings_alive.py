@@ -265,17 +265,25 @@ def lidar(settings: Settings) -> bytes:
     return found
 
 
-def sprayed(settings: Settings) -> bytes:
-    """What a physical lidar returns behind a fast vehicle in rain."""
-    ready = cell(settings.with_values({"lidar": "physical"}), "rain-noon")
-    spec = LidarSpec("lidar", Pose(0.0, 0.0, 2.0), range=80.0)
-    setup = stage_of(ready).setup
-    ego = replace(setup.ego, speed=30.0)
-    setup = replace(setup, ego=ego, specs=(*setup.specs, spec), asked=frozenset({"lidar"}))
-    backend = EmbeddedBackend()
-    found = backend.reset(setup, ready.seed).extra["lidar"].xyz.tobytes()
-    backend.close()
-    return found
+def physical_lidar(weather: str | Weather, **also: Any) -> Outcome:
+    """What a physical lidar returns at the start in a weather."""
+
+    def outcome(settings: Settings) -> bytes:
+        ready = cell(settings.with_values({"lidar": "physical", **also}), weather)
+        spec = LidarSpec("lidar", Pose(0.0, 0.0, 2.0), range=80.0)
+        setup = stage_of(ready).setup
+        setup = replace(
+            setup,
+            ego=replace(setup.ego, speed=30.0),
+            specs=(*setup.specs, spec),
+            asked=frozenset({"lidar"}),
+        )
+        backend = EmbeddedBackend()
+        found = backend.reset(setup, ready.seed).extra["lidar"].xyz.tobytes()
+        backend.close()
+        return found
+
+    return outcome
 
 
 def recovery(settings: Settings) -> list[Any]:
@@ -312,7 +320,11 @@ OTHERS: dict[str, Scenario] = {
     "water_drag": Scenario(True, short_drive("rain-noon")),
     "sheet_flow": Scenario(True, wet_transition),
     "lidar": Scenario("physical", lidar),
-    "spray": Scenario(True, sprayed),
+    "lidar_fog": Scenario("advection", physical_lidar(Weather(fog_density=90.0))),
+    "lidar_wet_ground": Scenario(True, physical_lidar("rain-noon")),
+    "lidar_dirt": Scenario(0.5, physical_lidar("rain-noon")),
+    "lidar_drops_s": Scenario(5.0, physical_lidar("rain-noon")),
+    "spray": Scenario(True, physical_lidar("rain-noon")),
     "radar_model": Scenario("physical", short_drive("clear-noon")),
     "radar_multipath": Scenario(True, with_radar),
     "radar_output": Scenario("tracks", with_radar),

@@ -17,6 +17,7 @@ from typing import Any
 import msgspec
 
 from skidpad.core.errors import ConfigError, require_choice
+from skidpad.core.lidar_effects import LidarFog
 from skidpad.core.setting import Plain, SettingField, SettingsPart, describe_settings, setting_field
 from skidpad.core.stack_settings import StackSettings
 from skidpad.core.tyres import REFERENCE, known_tyres
@@ -129,6 +130,26 @@ class SensorSettings(SettingsPart):
     )
     lidar: LidarModel = setting_field(
         LidarModel.EXACT, "M-1, T-11", "lost and false returns of lidars in rain, fog, snow"
+    )
+    lidar_fog: LidarFog = setting_field(
+        LidarFog.FIXED, "M-1, T-11", "drops of fog for lidars with lidar=physical"
+    )
+    lidar_wet_ground: bool = setting_field(
+        False, "M-1, T-11", "water on the ground mirrors beams away, with lidar=physical"
+    )
+    lidar_dirt: float = setting_field(
+        0.0,
+        "M-1, T-11",
+        "share of a lidar's window under dirt, with lidar=physical",
+        low=0.0,
+        high=0.95,
+    )
+    lidar_drops_s: float = setting_field(
+        0.0,
+        "M-1, T-11",
+        "seconds that rain drops stay on a lidar's window, with lidar=physical",
+        low=0.0,
+        high=60.0,
     )
     spray: bool = setting_field(
         False, "M-1, T-11", "spray behind vehicles, for lidars with lidar=physical"

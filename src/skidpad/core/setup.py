@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from skidpad.core.geometry import Pose
+from skidpad.core.lidar_effects import LidarEffects
 from skidpad.core.slots import fill_slots
 from skidpad.core.specs import SensorSpec
 from skidpad.core.states import VehicleCommand
@@ -117,6 +118,7 @@ class Setup:
     # mu_ref that <material friction> of the map replaces; None: it is not read (embedded backend)
     material_base: float | None = None
     lidar: LidarModel = LidarModel.EXACT  # of the lidars that a stack asks for (embedded backend)
+    lidar_effects: LidarEffects = LidarEffects()  # on such lidars (embedded backend)
     spray: bool = False  # behind vehicles, for such lidars (embedded backend)
     radar_model: RadarModel = RadarModel.GEOMETRIC  # of the common radar (embedded backend)
     radar_multipath: bool = False  # of such a radar

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from itertools import count
 from typing import Any, Protocol
 from weakref import WeakValueDictionary
@@ -27,8 +28,10 @@ from skidpad.core.specs import (
 )
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LidarModel, LightState, RangeModel
-from skidpad.physics.grip import road_surface
+from skidpad.physics.fog import with_fog
+from skidpad.physics.grip import rain_rate, road_surface
 from skidpad.physics.optics import LidarAir, extinction, lidar_air
+from skidpad.physics.wetted import water_cover, window_loss
 from skidpad.sensors import inertial
 from skidpad.sensors.channels.presets import senses_of
 from skidpad.sensors.channels.suite import CYCLE, ChannelSuite
@@ -162,15 +165,18 @@ def make_lidar(spec: LidarSpec, sensors: AskedSensors) -> Callable[[], LidarPoin
     if server is not None:
         return lambda: server(spec)
     returns, setup = None, sensors.setup
+    effects, rain = setup.lidar_effects, rain_rate(setup.weather)
     if setup.lidar is LidarModel.PHYSICAL:
         physical = setup.range_model is RangeModel.PHYSICAL
-        air = lidar_air(setup.weather) if physical else LidarAir()
-        returns = ReturnModel(air, spec.range)
+        air = with_fog(lidar_air(setup.weather), effects.fog) if physical else LidarAir()
+        film = road_surface(setup.weather).film_mm if effects.wet_ground else 0.0
+        returns = ReturnModel(air, spec.range, water_cover(film))
     key = stream_key(sensors.seed, "lidar", spec.id)
     clouds = None
     if setup.spray:
         clouds = SprayClouds(sensors.table, road_surface(setup.weather).film_mm / 1000.0)
-    lidar = Lidar(spec, setup.dt, sensors.air, returns, key, clouds)
+    window = partial(window_loss, effects.dirt, rain, stay=effects.drops_s)
+    lidar = Lidar(spec, setup.dt, sensors.air, returns, key, clouds, window)
     return lambda: lidar.measure(
         sensors.tick, sensors.states.pose(EGO), sensors.scene(), EGO, sensors.states
     )

@@ -19,6 +19,7 @@ from skidpad.campaign.user_files import road_file
 from skidpad.core.errors import ConfigError, FileError, StackError
 from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import Pose, kmh_from_mps
+from skidpad.core.lidar_effects import LidarEffects
 from skidpad.core.run import (
     ActorMode,
     AdasDriver,
@@ -290,6 +291,12 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
         sheet_flow=world.sheet_flow,
         material_base=world.mu_ref if world.lane_material else None,
         lidar=sensors.lidar,
+        lidar_effects=LidarEffects(
+            fog=sensors.lidar_fog,
+            wet_ground=sensors.lidar_wet_ground,
+            dirt=sensors.lidar_dirt,
+            drops_s=sensors.lidar_drops_s,
+        ),
         spray=sensors.spray,
         radar_model=sensors.radar_model,
         radar_multipath=sensors.radar_multipath,

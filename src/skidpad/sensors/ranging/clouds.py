@@ -12,6 +12,7 @@ from math import atan2, cos, exp, log, pi, sin
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
 from skidpad.core.geometry import Pose
@@ -31,6 +32,8 @@ ANSWERS = 3.0  # m, half a pulse of 20 ns
 MEETS = (0.9, 10.0)  # m, from and to which receiver and beam come to overlap; `lidar_returns`
 LEAST = 1e-4  # 1/m, clouds thinner than this are left out
 DENSER = -np.log1p(-(np.arange(1024) + 0.5) / 1024)  # quantiles of an exponential distribution
+FIRST_BITS = np.uint64(64 - 10)  # of random bits, as many as choose one of them
+CERTAIN = 1.0 - 1e-12  # of a bound, so that rounding leaves no answer out
 SALT = np.uint64(0x5BF0_3635_D1F9_B3A7)
 
 
@@ -65,16 +68,36 @@ def _span(cloud: Floats, back: float, left: float) -> float:
     return most + ROOM
 
 
+@inner_kernel
+def _leaves(o: float, w: float, a: float, b: float) -> bool:
+    """Returns whether a beam that begins at o goes away from what lies between a and b."""
+    return bool((o > b and w >= 0.0) or (o < a and w <= 0.0))
+
+
+@inner_kernel
+def _cut(o: float, w: float, a: float, b: float, low: float, far: float) -> tuple[float, float]:
+    """Returns the part of a stretch from low to far that lies between a and b; far -1: none does.
+
+    o, w: where a beam begins on this axis, and how far it goes per metre.
+    """
+    if abs(w) < 1e-9:
+        return low, (-1.0 if o < a or o > b else far)
+    t0, t1 = (a - o) / w, (b - o) / w
+    return max(low, min(t0, t1)), min(far, max(t0, t1))
+
+
 @kernel
 def spray_of(
-    clouds: Floats, eye: Floats, azimuth: Floats, ways: Floats, distance: Floats, key: np.uint64,
-    tick: int,
+    clouds: Floats, eye: Floats, azimuth: Floats, ways: Floats, distance: Floats,
+    met: NDArray[np.bool_], least: float, key: np.uint64, tick: int,
 ) -> Sprayed:  # fmt: skip
     """Returns what clouds (k, 8) do to beams from `eye` (3,) with unit vectors ways (n, 3), of the world.
 
     A cloud: x, y, z of the middle of the rear at the road, yaw, length, half width, height in m,
     extinction in 1/m at its begin. azimuth (m,): of the columns of n / m beams each, roughly.
-    distance (n,): m to the surface that ends each beam.
+    distance (n,): m to the surface that ends each beam, where it has `met` one, else to the lidar's range.
+    Left out is what changes no return: answers below `least`, and the depth of beams that meet nothing
+    behind a cloud that is too far to answer.
     """
     n = distance.size
     channels = n // azimuth.size
@@ -92,20 +115,18 @@ def spray_of(
                 continue
             for i in range(column * channels, (column + 1) * channels):
                 wx, wy, wz = ways[i, 0], ways[i, 1], ways[i, 2]
-                gone, low, far = -(wx * cy + wy * sy), 0.0, distance[i]
-                for axis in range(3):
-                    if axis == 0:
-                        o, w, a, b = back, gone, 0.0, length
-                    elif axis == 1:
-                        o, w, a, b = left, wy * cy - wx * sy, -half, half
-                    else:
-                        o, w, a, b = up, wz, 0.0, high
-                    if abs(w) < 1e-9:
-                        if o < a or o > b:
-                            far = -1.0
-                        continue
-                    t0, t1 = (a - o) / w, (b - o) / w
-                    low, far = max(low, min(t0, t1)), min(far, max(t0, t1))
+                gone, aside = -(wx * cy + wy * sy), wy * cy - wx * sy
+                if _leaves(up, wz, 0.0, high) or _leaves(back, gone, 0.0, length):
+                    continue
+                if _leaves(left, aside, -half, half):
+                    continue
+                low, far = _cut(back, gone, 0.0, length, 0.0, distance[i])
+                if far <= low or not (met[i] or low < ANSWER_REACH):
+                    continue
+                low, far = _cut(up, wz, 0.0, high, low, far)
+                if far <= low:
+                    continue
+                low, far = _cut(left, aside, -half, half, low, far)
                 if far <= low:
                     continue
                 bits = scrambled(start + np.uint64(i * 64 + c) * np.uint64(16) * GOLDEN)
@@ -113,21 +134,25 @@ def spray_of(
                 tau, over = 0.0, min(ANSWERS, far - low)
                 mean = first * exp(-THIN * (back + gone * (low + jitter * step)) / length)
                 thins = exp(-THIN * gone * step / length)
+                strongest = power[i]
                 for s in range(STEPS):
                     t = low + (s + jitter) * step
                     bits += GOLDEN
-                    here = DENSER[int(unit(scrambled(bits)) * DENSER.size)] * mean
+                    here = DENSER[scrambled(bits) >> FIRST_BITS] * mean
                     tau += 0.5 * here * step
                     if NEAREST < t < ANSWER_REACH:
-                        overlap = min(max((t - MEETS[0]) / (MEETS[1] - MEETS[0]), 0.0), 1.0)
-                        answer = (
-                            pi * BACKSCATTER * here * over * overlap * exp(-2.0 * tau) / (t * t)
-                        )
-                        if answer > power[i]:
-                            power[i], where[i] = answer, t
+                        clear = (
+                            pi * BACKSCATTER * here * over
+                        )  # without its own cloud, at full overlap
+                        if clear > CERTAIN * max(strongest, least) * t * t:
+                            overlap = min(max((t - MEETS[0]) / (MEETS[1] - MEETS[0]), 0.0), 1.0)
+                            answer = clear * overlap * exp(-2.0 * tau) / (t * t)
+                            if answer > strongest:
+                                strongest, where[i] = answer, t
                     tau += 0.5 * here * step
                     mean *= thins
                 depth[i] += tau
+                power[i] = strongest
     return Sprayed(depth, power, where)
 
 
@@ -145,6 +170,8 @@ class SprayClouds:
         azimuth: Floats,
         ways: Floats,
         distance: Floats,
+        met: NDArray[np.bool_],
+        least: float,
         key: np.uint64,
         tick: int,
     ) -> Sprayed:
@@ -153,9 +180,8 @@ class SprayClouds:
         if not len(clouds):
             return no_spray()
         place = np.array([eye.x, eye.y, eye.z])
-        return spray_of(
-            clouds, place, azimuth + eye.yaw, ways @ eye.rotation().T, distance, key, tick
-        )
+        turned = ways @ eye.rotation().T
+        return spray_of(clouds, place, azimuth + eye.yaw, turned, distance, met, least, key, tick)
 
     def at(self, states: ActorStates) -> Floats:
         """Returns the clouds (k, 8) of this moment, as in `spray_of`, but those thinner than LEAST."""

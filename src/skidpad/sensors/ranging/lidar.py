@@ -8,6 +8,7 @@ which is CARLA's law at twice the rate, and a threshold takes the place of CARLA
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import pi
 
 import numpy as np
@@ -33,6 +34,12 @@ from skidpad.sensors.ranging.lidar_returns import BeamAir, ReturnModel, find_ret
 from skidpad.sensors.raster.live_scene import LiveScene
 
 
+def clean(speed: float) -> float:
+    """Returns the share of power that a clean window leaves: all of it."""
+    del speed
+    return 1.0
+
+
 class Lidar:
     """One lidar; `measure` returns the part of the turn that one tick covers."""
 
@@ -44,10 +51,11 @@ class Lidar:
         returns: ReturnModel | None = None,
         key: int = 0,
         spray: SprayClouds | None = None,
+        window: Callable[[float], float] = clean,
     ) -> None:
         """extinction: of light in the air, 1/m. returns: instead of it. key: of their random numbers.
 
-        spray: behind vehicles, with `returns`.
+        spray: behind vehicles, with `returns`. window: share of power left, by speed in m/s; likewise.
         """
         steepest = max(abs(spec.upper_fov_deg), abs(spec.lower_fov_deg))
         if steepest > STEEPEST_DEG:
@@ -56,7 +64,7 @@ class Lidar:
                 f"got {spec.lower_fov_deg:g} to {spec.upper_fov_deg:g}"
             )
         self.spec, self._extinction = spec, extinction
-        self._returns, self._key, self._spray = returns, key, spray
+        self._returns, self._key, self._spray, self._window = returns, key, spray, window
         self._sweep = 2.0 * pi * spec.rotation_hz * dt
         self._columns = max(1, round(spec.points_per_second * dt / spec.channels))
         angles = np.linspace(spec.upper_fov_deg, spec.lower_fov_deg, spec.channels)
@@ -72,7 +80,7 @@ class Lidar:
     ) -> LidarPoints:
         """Returns the points of one tick.
 
-        carrier: row of the actor that carries it unseen, or -1. states: of all, for their spray.
+        carrier: row of the actor that carries it unseen, or -1. states: of all, for spray and window.
         """
         turn = -(tick * self._sweep + self._sweep * np.arange(self._columns) / self._columns)
         azimuth = (turn + pi / SECTORS) % (2.0 * pi) - pi / SECTORS
@@ -83,10 +91,14 @@ class Lidar:
         pose = pose_world_carrier @ self.spec.mount
         seen = look_around(scene, pose, fan, self.spec.range, carrier)
         if self._returns is not None:
-            spray = no_spray()
+            speed = (
+                0.0 if states is None else float(np.hypot(states.vx[carrier], states.vy[carrier]))
+            )
+            window, spray = self._window(speed), no_spray()
             if self._spray is not None and states is not None:
-                spray = self._meet_spray(self._spray, states, pose, fan, seen, tick)
-            return self._through_weather(self._returns, fan, seen, tick, spray)
+                least = self._returns.least / window
+                spray = self._meet_spray(self._spray, states, pose, fan, seen, tick, least)
+            return self._through_weather(self._returns, fan, seen, tick, spray, window)
         return LidarPoints(
             (seen.direction * seen.distance[:, None]).astype(np.float32),
             np.exp(-self._extinction * seen.distance).astype(np.float32),
@@ -103,16 +115,23 @@ class Lidar:
         fan: Fan,
         seen: RayHits,
         tick: int,
+        least: float,
     ) -> Sprayed:
-        """Returns what spray does to every beam of a tick."""
+        """Returns what spray does to every beam of a tick; least: power that is just noticed."""
         n = len(fan.column)
-        distance = np.full(n, self.spec.range)
-        distance[seen.ray] = seen.distance
-        ways = directions(fan, np.arange(n))
-        return clouds.of_beams(states, eye, fan.azimuth, ways, distance, np.uint64(self._key), tick)
+        distance, met = np.full(n, self.spec.range), np.zeros(n, np.bool_)
+        distance[seen.ray], met[seen.ray] = seen.distance, True
+        ways, key = directions(fan, np.arange(n)), np.uint64(self._key)
+        return clouds.of_beams(states, eye, fan.azimuth, ways, distance, met, least, key, tick)
 
     def _through_weather(
-        self, model: ReturnModel, fan: Fan, seen: RayHits, tick: int, spray: Sprayed
+        self,
+        model: ReturnModel,
+        fan: Fan,
+        seen: RayHits,
+        tick: int,
+        spray: Sprayed,
+        window: float,
     ) -> LidarPoints:
         """Returns what is noticed of the beams of a tick; false returns have class 0 and no actor."""
         n = len(fan.column)
@@ -122,23 +141,28 @@ class Lidar:
         )  # fmt: skip
         aside = np.column_stack([np.cos(fan.azimuth), np.sin(fan.azimuth)])
         up = np.column_stack([np.cos(fan.elevation), np.sin(fan.elevation)])
-        m = scan_weather(model.air, fan, seen, aside, up, np.uint64(self._key), tick, out, spray)
+        m = scan_weather(
+            model.air, fan, seen, aside, up, np.uint64(self._key), tick, out, spray, window
+        )
         return LidarPoints._make(column[:m] for column in out)
 
 
 @kernel
 def scan_weather(
     air: BeamAir, fan: Fan, seen: RayHits, aside: Floats, up: Floats, key: np.uint64, tick: int,
-    out: LidarPoints, spray: Sprayed,
+    out: LidarPoints, spray: Sprayed, window: float,
 ) -> int:  # fmt: skip
     """Writes the beams of a tick of which something came back into `out`; returns their number.
 
     aside, up: cosine and sine of the fan's azimuths and elevations.
     """
     distance, label = np.full(fan.column.size, np.inf), np.zeros(fan.column.size, np.int64)
+    cosine = np.zeros(fan.column.size)
     for k in range(seen.ray.size):
         distance[seen.ray[k]], label[seen.ray[k]] = seen.distance[k], seen.label[k]
-    found, m, k = find_returns(air, distance, label, key, tick, spray), 0, 0
+        cosine[seen.ray[k]] = seen.cosine[k]
+    found = find_returns(air, distance, label, cosine, window, key, tick, spray)
+    m, k = 0, 0
     for i in range(distance.size):
         met = distance[i] < np.inf
         far = found.distance[i]

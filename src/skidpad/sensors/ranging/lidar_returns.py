@@ -29,6 +29,7 @@ from skidpad.core.splitmix import GOLDEN, scrambled, unit
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.physics.droplets import SMALLEST_MM, Drops
 from skidpad.physics.optics import LidarAir
+from skidpad.physics.wetted import wet_ground
 from skidpad.sensors.ranging.clouds import Sprayed, no_spray
 
 WHITE = 0.9  # reflectivity that is just noticed at the lidar's range (LISA)
@@ -49,6 +50,7 @@ GROUND = (
 # Reflectivities, incidence included: assumptions. Ground of a tenth: a lidar of 120 m range sees it
 # to 40 m; signs return more than a white surface.
 ON_GROUND, SIGN, OTHER = 0.1, 1.0, 0.5
+COSINES = 1025  # of the table of wet ground
 
 
 class BeamAir(NamedTuple):
@@ -68,6 +70,7 @@ class BeamAir(NamedTuple):
     log_power: Floats  # (P,)
     places: Floats  # (P, R) distribution of the distance of a drop of such power
     r: Floats  # (R,) m
+    wet: Floats  # (256, W) share that water leaves of a reflectivity, by label and cosine of incidence
 
 
 class Returns(NamedTuple):
@@ -105,16 +108,19 @@ def find_returns(
     m: BeamAir,
     distance: Floats,
     label: NDArray[np.int64],
+    cosine: Floats,
+    window: float,
     key: np.uint64,
     tick: int,
     spray: Sprayed,
 ) -> Returns:
     """Returns what beams bring back. distance: (n,) m of the surface in the way, inf: none.
 
-    label: (n,) of the surfaces. One loop: a call per beam that is handed the air's arrays would cost
-    more than all the rest.
+    label, cosine: (n,) of the surfaces, of incidence. window: share of power left behind it. One loop: a
+    call per beam that is handed the air's arrays would cost more than all the rest.
     """
     n, sprayed = distance.size, spray.depth.size > 0
+    least, wettable = m.least / window, m.wet.shape[1] - 1
     out, strengths, false = np.empty(n), np.empty(n), np.zeros(n, np.bool_)
     start = scrambled(key + np.uint64(tick) * GOLDEN)  # random bits of a lidar in one tick
     for i in range(n):
@@ -125,6 +131,8 @@ def find_returns(
             if sprayed:
                 depth += spray.depth[i]
             intensity = m.reflects[label[i]] * exp(-2.0 * depth)
+            if wettable > 0:
+                intensity *= m.wet[label[i], int(cosine[i] * wettable + 0.5)]
             power = intensity / (found * found)
         chance = unit(scrambled(bits))
         if chance < m.drop_share:
@@ -132,7 +140,7 @@ def find_returns(
             if strength > power and where < distance[i]:
                 power, found, false[i] = strength, where, True
                 intensity = strength * where * where
-        if m.fog_power >= m.least and m.fog_power > power and distance[i] > m.fog_distance:
+        if m.fog_power >= least and m.fog_power > power and distance[i] > m.fog_distance:
             at = int(unit(scrambled(bits + np.uint64(2) * GOLDEN)) * m.spread.size)
             power, false[i] = m.fog_power, True
             found = min(m.fog_distance + m.spread[at], distance[i])
@@ -140,13 +148,26 @@ def find_returns(
         if sprayed and spray.power[i] > power:
             power, found, false[i] = spray.power[i], spray.distance[i], True
             intensity = power * found * found
-        if power < m.least:
+        if power < least:
             found, intensity, false[i] = inf, 0.0, False
         elif not false[i]:
             at = int(unit(scrambled(bits + np.uint64(3) * GOLDEN)) * m.normal.size)
-            found += ACCURACY * sqrt(0.5 * m.least / power) * m.normal[at]
-        out[i], strengths[i] = found, intensity
+            found += ACCURACY * sqrt(0.5 * least / power) * m.normal[at]
+        out[i], strengths[i] = found, intensity * window
     return Returns(out, strengths, false)
+
+
+def wet_shares(cover: float) -> Floats:
+    """Returns what water leaves of reflectivities, as `BeamAir.wet`; (256, 1) where no ground is wet.
+
+    cover: share of the ground under water.
+    """
+    if cover <= 0.0:
+        return np.ones((256, 1))
+    table = np.ones((256, COSINES))
+    left = wet_ground(ON_GROUND, np.linspace(0.0, 1.0, COSINES))
+    table[[int(c) for c in GROUND]] = 1.0 - cover + cover * left
+    return table
 
 
 def reflectivities() -> Floats:
@@ -160,8 +181,8 @@ def reflectivities() -> Floats:
 class ReturnModel:
     """The returns of one lidar in one weather."""
 
-    def __init__(self, air: LidarAir, reach: float) -> None:
-        """reach: m at which a white surface is just noticed in clear air."""
+    def __init__(self, air: LidarAir, reach: float, cover: float = 0.0) -> None:
+        """reach: m at which a white surface is just noticed in clear air. cover: share of wet ground."""
         self.least = WHITE / reach**2
         fog_distance, fog_power = fog_response(air, reach)
         drops, quantiles = DropReturns(air, self.least), (np.arange(1024) + 0.5) / 1024
@@ -169,18 +190,19 @@ class ReturnModel:
             air.fog, air.fog_start, air.falling, self.least, fog_distance, fog_power,
             reflectivities(), FOG_SPREAD * beta.ppf(quantiles, *FOG_SHAPE), norm.ppf(quantiles),
             float(-np.expm1(-drops.mean[0])), drops.mean, np.log(drops.powers), drops.places,
-            drops.r,
+            drops.r, wet_shares(cover),
         )  # fmt: skip
 
     def measure(
         self, distance: Floats, label: NDArray[np.int64], key: int, tick: int = 0
     ) -> Returns:
-        """Returns what beams bring back without spray.
+        """Returns what beams bring back without spray, through a clean window, from dry ground.
 
         distance: (n,) m of their surfaces, inf: they meet none. label: (n,) of the surfaces.
         The same key and tick give the same returns.
         """
-        return find_returns(self.air, distance, label, np.uint64(key), tick, no_spray())
+        ones = np.ones(len(distance))
+        return find_returns(self.air, distance, label, ones, 1.0, np.uint64(key), tick, no_spray())
 
 
 def fog_response(air: LidarAir, reach: float) -> tuple[float, float]:

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from programs import needs_program
-from slow_tests import SlowTests, is_slow
+from support.programs import needs_program
+from support.slow_tests import SlowTests, is_slow
 
 # no test judges by the wall clock: a busy machine is no fault
 settings.register_profile("skidpad", deadline=None)

@@ -4,7 +4,7 @@ import subprocess
 
 import pytest
 
-from programs import find_program, needs_program, require_program
+from support.programs import find_program, needs_program, require_program
 
 
 def test_a_hidden_program_skips_its_test_and_says_which(monkeypatch, tmp_path):

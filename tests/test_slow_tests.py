@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from slow_tests import SlowTests, function_of, is_slow, slow_functions
+from support.slow_tests import SlowTests, function_of, is_slow, slow_functions
 
 TESTS = Path(__file__).parent
 
@@ -23,7 +23,7 @@ def test_every_slow_test_exists() -> None:
 
 
 def test_only_what_takes_long_is_written(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr("slow_tests.LIST", tmp_path / "slow_tests.txt")
+    monkeypatch.setattr("support.slow_tests.LIST", tmp_path / "slow_tests.txt")
     seen = SlowTests()
     for nodeid, seconds in (("a.py::t[1]", 1.5), ("a.py::t[2]", 1.0), ("b.py::u", 0.5)):
         seen.pytest_runtest_logreport(type("Report", (), {"nodeid": nodeid, "duration": seconds}))

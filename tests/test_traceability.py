@@ -45,4 +45,4 @@ def test_files_of_tests_have_names_of_their_own():
 
 def test_the_page_says_what_the_tests_say():
     if DOC.read_text(encoding="utf-8") != render():
-        pytest.fail("docs/requirements.md is out of date: run `python tests/traceability.py`")
+        pytest.fail("docs/requirements.md is out of date: run `python tools/traceability.py`")

@@ -4,7 +4,7 @@
     python tools/scenario_oracle.py record CORPUS --esmini DIR
     python tools/scenario_oracle.py compare CORPUS
 
-`references` plays our own cases (tests/scenarios/oracle/cases.py) with the programs `esmini` and
+`references` plays our own cases (tests/support/oracle/cases.py) with the programs `esmini` and
 `dat2csv` in DIR. `record` does so for files of others, `compare` plays those and prints a table;
 their references are stored by the file's hash, the files themselves are not. `compare` fails where a
 file of a stored reference is missing from CORPUS.
@@ -24,10 +24,14 @@ from pathlib import Path
 from unittest.mock import patch
 
 ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(ROOT)]
+sys.path[:0] = [str(ROOT / "tests")]
 
-from tests.scenarios.oracle.cases import CASES  # noqa: E402
-from tests.scenarios.oracle.reference import (  # noqa: E402
+from skidpad.core.errors import SkidpadError  # noqa: E402
+from skidpad.scenarios import registry  # noqa: E402
+from skidpad.scenarios.playing.stage import PlayedScenario, play_ideal  # noqa: E402
+from skidpad.scenarios.scenario import compile_scenario  # noqa: E402
+from support.oracle.cases import CASES  # noqa: E402
+from support.oracle.reference import (  # noqa: E402
     OTHERS,
     OWN,
     Reference,
@@ -37,11 +41,6 @@ from tests.scenarios.oracle.reference import (  # noqa: E402
     read_reference,
     write_case,
 )
-
-from skidpad.core.errors import SkidpadError  # noqa: E402
-from skidpad.scenarios import registry  # noqa: E402
-from skidpad.scenarios.playing.stage import PlayedScenario, play_ideal  # noqa: E402
-from skidpad.scenarios.scenario import compile_scenario  # noqa: E402
 
 STEP, SAMPLE = 0.05, 0.2  # s, of the players and of what is stored
 OPTIONS = f"--fixed_timestep {STEP} --disable_controllers"

@@ -21,9 +21,7 @@ from math import isfinite
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "tools")]
-
-from tests.scenarios.oracle.reference import deviations, file_hash  # noqa: E402
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tools")]
 
 from openscenario_corpus import breaks, content, lacking  # noqa: E402
 from scenario_oracle import LEAST_WAY, run_esmini  # noqa: E402
@@ -32,6 +30,7 @@ from skidpad.scenarios.playing.stage import PlayedScenario, play_ideal  # noqa: 
 from skidpad.scenarios.reading.document import parse  # noqa: E402
 from skidpad.scenarios.reading.findings import HARMLESS  # noqa: E402
 from skidpad.scenarios.scenario import check  # noqa: E402
+from support.oracle.reference import deviations, file_hash  # noqa: E402
 
 STEP, END = 0.05, 20.0  # s
 MOST = 60  # files of one repository

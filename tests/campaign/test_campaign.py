@@ -13,7 +13,7 @@ from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.vocabulary import Outcome
 from skidpad.recording.campaign.ledger import CAMPAIGN, read_ledger
 from skidpad.recording.campaign.results import read_results
-from toy_campaign import RECIPE, Toss
+from support.toy_campaign import RECIPE, Toss
 
 
 def here(jobs):

@@ -1,7 +1,6 @@
 import pytest
 from msgspec.structs import replace
 
-from runs import adas_run
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.cells.matrix import cross, published_drivers, sweep
 from skidpad.campaign.driving.run_setup import stage_of
@@ -13,6 +12,7 @@ from skidpad.core.run import Roads, RunSpec
 from skidpad.core.vocabulary import TrafficStart
 from skidpad.core.weather import Weather
 from skidpad.simulation.recovery import Supervisor
+from support.runs import adas_run
 
 RAIN = Weather(name="rain-noon", title="Heavy Rain - Noon", precipitation=100, wetness=100)
 CLEAR = Weather(name="clear-noon", title="Clear Sky - Noon")

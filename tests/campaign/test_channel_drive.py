@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from runs import segment_run
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.channels.drive import drive_segment
 from skidpad.campaign.channels.routes import chosen_routes, driven_routes
@@ -25,6 +24,7 @@ from skidpad.recording.channels.content_hash import recording_hash
 from skidpad.recording.channels.drives import read_outcomes
 from skidpad.recording.channels.mcap_files import McapRecording
 from skidpad.stack.channels.arbiter import Reason
+from support.runs import segment_run
 
 BOTH = ("lav_like", "tfuse_like")
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from runs import segment_run
 from skidpad.campaign.channels.drive import RISKY_JUMPS, Crew, drive_segment
 from skidpad.campaign.channels.routes import CONDITIONS, Condition, chosen_routes, driven_routes
 from skidpad.campaign.channels.world import segment_of
@@ -23,6 +22,7 @@ from skidpad.recording.channels.mcap_files import McapRecording
 from skidpad.sensors.channels.presets import senses_of
 from skidpad.simulation.world.stage import build_world
 from skidpad.simulation.world.traffic.variety import risky_character
+from support.runs import segment_run
 
 
 @pytest.mark.req("C-210")

@@ -1,15 +1,15 @@
 """Every campaign on a cluster: the same rows, deadlines that hold, deaths that cost one run."""
 
-import jobs as work
 import pytest
 
-from runs import adas_run, segment_run
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.recipes import channels, matrix
 from skidpad.campaign.workers.cluster import runner_of
 from skidpad.campaign.workers.worker import Finished, Job
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.vocabulary import Outcome
+from support import jobs as work
+from support.runs import adas_run, segment_run
 
 pytest.importorskip("distributed")
 

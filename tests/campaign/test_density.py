@@ -5,7 +5,6 @@ import pytest
 from msgspec import structs
 from typer.testing import CliRunner
 
-from runs import adas_run
 from skidpad.campaign.runs.desk_run import drive_at_desk
 from skidpad.campaign.runs.run import run
 from skidpad.campaign.takeover.desk import FROM_EGO, Density, Desk, Recorded
@@ -18,6 +17,7 @@ from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.vocabulary import SensorLevel, TrafficStart
 from skidpad.recording.run.inputs import decode_inputs, encode_inputs
 from skidpad.recording.run.log_files import log_hash
+from support.runs import adas_run
 
 INPUTS = [Timed(20, Crowd(4)), Timed(60, Crowd(9)), Timed(61, Crowd(12))]
 

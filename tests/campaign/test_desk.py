@@ -8,7 +8,6 @@ import pytest
 from msgspec import structs
 from typer.testing import CliRunner
 
-from runs import adas_run
 from skidpad.campaign.runs.desk_run import drive_at_desk
 from skidpad.campaign.runs.run import run
 from skidpad.campaign.runs.stored import read_run
@@ -41,6 +40,7 @@ from skidpad.physics.optics import visibility
 from skidpad.physics.presets import preset
 from skidpad.recording.run.inputs import INPUTS, decode_inputs, encode_inputs, read_inputs
 from skidpad.recording.run.log_files import log_hash, read_log
+from support.runs import adas_run
 
 
 def spec(sensors=SensorLevel.OBJECTS, duration=12.0, **changes):

@@ -12,7 +12,6 @@ import pytest
 from msgspec.structs import replace
 from PIL import Image
 
-from runs import adas_run
 from skidpad.campaign.runs.run import Run, drive
 from skidpad.campaign.runs.run import run as run_spec
 from skidpad.core.errors import ConfigError
@@ -28,7 +27,8 @@ from skidpad.recording.run.log_files import log_hash
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.embedded.engine import EmbeddedBackend
-from stadium import written
+from support.runs import adas_run
+from support.stadium import written
 
 
 class Gentle:

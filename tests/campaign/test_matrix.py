@@ -12,7 +12,6 @@ import pytest
 from msgspec.structs import replace
 from typer.testing import CliRunner
 
-from runs import adas_run
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.cells.matrix import cross, published_drivers
 from skidpad.campaign.recipes.matrix import RECIPE, warm_up
@@ -23,6 +22,7 @@ from skidpad.core.run import StackDriver
 from skidpad.physics.presets import find_weather
 from skidpad.recording.campaign.ledger import LEDGER
 from skidpad.recording.campaign.results import read_results
+from support.runs import adas_run
 
 ROOT = Path(__file__).resolve().parents[2]
 CALL = [sys.executable, "-m", "skidpad", "adas", "--sensors", "objects", "--duration", "6"]
@@ -82,10 +82,10 @@ def test_an_interrupted_campaign_resumes_to_the_same_content(tmp_path):
 
 
 def test_a_stack_that_kills_its_worker_costs_its_own_runs_only(tmp_path, monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(ROOT / "src")]))
-    monkeypatch.syspath_prepend(str(ROOT))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT / "tests"), str(ROOT / "src")]))
+    monkeypatch.syspath_prepend(str(ROOT / "tests"))
     (good,) = cells(numbers="1", weather=("clear-noon",))
-    bad = replace(good, driver=StackDriver("tests.campaign.jobs:Suicide", name="bad"))
+    bad = replace(good, driver=StackDriver("support.jobs:Suicide", name="bad"))
     summary = run([bad, good], tmp_path)
     results = read_results(tmp_path)
     assert summary.failed == 1
@@ -96,11 +96,11 @@ def test_a_stack_that_kills_its_worker_costs_its_own_runs_only(tmp_path, monkeyp
 
 @pytest.mark.req("L-7")
 def test_a_stack_that_raises_is_an_outcome_with_its_traceback(tmp_path, monkeypatch):
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(ROOT / "src")]))
-    monkeypatch.syspath_prepend(str(ROOT))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT / "tests"), str(ROOT / "src")]))
+    monkeypatch.syspath_prepend(str(ROOT / "tests"))
     (good,) = cells(numbers="1", weather=("clear-noon",))
     bad = [
-        replace(good, driver=StackDriver(f"tests.campaign.jobs:{name}", name=name))
+        replace(good, driver=StackDriver(f"support.jobs:{name}", name=name))
         for name in ("Raising", "Speechless")
     ]
     run(bad, tmp_path)

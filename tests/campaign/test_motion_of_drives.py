@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from runs import adas_run
 from skidpad.campaign.runs.run import run
 from skidpad.recording.run.motion import motion_hash
+from support.runs import adas_run
 
 
 def test_times_of_day_are_one_drive_and_rain_is_another() -> None:

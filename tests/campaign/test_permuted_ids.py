@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from runs import adas_run
 from skidpad.campaign.runs.run import run
 from skidpad.core.frames import Frame
 from skidpad.core.inputs import Outside
@@ -20,6 +19,7 @@ from skidpad.core.vocabulary import LightState, SensorLevel
 from skidpad.physics.presets import find_weather
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.simulation.sensing import CameraRadarReadings, Sensing, sensing_of
+from support.runs import adas_run
 
 
 class OtherNumbers:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from runs import scenario_run
 from skidpad.campaign.runs.play import run_to
 from skidpad.campaign.runs.run import run
 from skidpad.core.errors import OutputError
@@ -14,6 +13,7 @@ from skidpad.core.vocabulary import GripModel, Outcome, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.recording.run.log_files import log_hash, read_log
 from skidpad.scenarios.shipped import FOLDER
+from support.runs import scenario_run
 
 FILE = FOLDER / "lead_slowdown.xosc"
 SHORT = scenario_run(FILE, duration=1.0)

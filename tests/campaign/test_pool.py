@@ -5,12 +5,12 @@ import sys
 import time
 from pathlib import Path
 
-import jobs as work
 import pytest
 
 from skidpad.campaign.workers.pool import run_jobs
 from skidpad.campaign.workers.worker import Job
 from skidpad.core.vocabulary import Outcome
+from support import jobs as work
 
 
 def jobs(function, arguments, deadline=60.0):
@@ -77,8 +77,8 @@ def test_a_worker_that_dies_idle_is_replaced_and_costs_no_attempt(tmp_path):
 def test_children_leave_when_their_parent_is_killed(tmp_path, begin):
     pid_file = tmp_path / "pid"
     code = (
-        f"import sys; sys.path.insert(0, {str(Path(work.__file__).parent)!r})\n"
-        "import jobs\n"
+        f"import sys; sys.path.insert(0, {str(Path(work.__file__).parents[1])!r})\n"
+        "from support import jobs\n"
         "from functools import partial\n"
         "from skidpad.campaign.workers.pool import run_jobs, warm\n"
         "from skidpad.campaign.workers.worker import Job\n"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from runs import scenario_run
 from skidpad import drive
 from skidpad.campaign.cells.matrix import cross, matrix_drivers
 from skidpad.campaign.driving.run_setup import driver_of, stage_of
@@ -15,6 +14,7 @@ from skidpad.core.run import AdasDriver, ReferenceDriver, RunSpec, run_from_plai
 from skidpad.core.weather import Weather
 from skidpad.report.matrix.data import config_title
 from skidpad.stack.reference.person import person_of
+from support.runs import scenario_run
 
 
 def test_it_is_named_wherever_a_driver_is_chosen():

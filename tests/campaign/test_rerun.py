@@ -4,7 +4,6 @@ import polars as pl
 import pytest
 from typer.testing import CliRunner
 
-from runs import adas_run
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.driving.loop import Sink
 from skidpad.campaign.driving.pace import Pace
@@ -16,6 +15,7 @@ from skidpad.campaign.workers.pool import local
 from skidpad.cli.main import app
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.recording.campaign.results import read_results
+from support.runs import adas_run
 
 
 def cell(sensors=SensorLevel.OBJECTS, duration=6.0, **changes):

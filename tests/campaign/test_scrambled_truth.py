@@ -10,7 +10,6 @@ from types import BuiltinFunctionType, FunctionType, ModuleType
 import numpy as np
 import pytest
 
-from runs import segment_run
 from skidpad.campaign.channels.drive import Crew
 from skidpad.campaign.channels.world import segment_of
 from skidpad.campaign.driving.run_setup import StackAtWheel, stage_of, with_sensors
@@ -24,6 +23,7 @@ from skidpad.sensors.requested import AskedSensors
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.simulation.world.world import World
 from skidpad.stack.loading import GuardedStack
+from support.runs import segment_run
 
 REACH = 165.0  # m, beyond which no sensor of the listening stack measures: its radar reaches 150 m
 NEAR = 60.0  # m, within which it minds what its eyes see, of a moment ago

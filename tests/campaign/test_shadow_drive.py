@@ -6,9 +6,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from channel_worlds import Eyes, World
-from channel_worlds import drive as drive_channels
-from runs import adas_run, scenario_run
 from skidpad.campaign.runs.play import run_to
 from skidpad.campaign.runs.shadow import Shadowed, ride_along
 from skidpad.cli.main import app
@@ -23,6 +20,9 @@ from skidpad.recording.run.log_files import read_log
 from skidpad.scenarios.export.hazard_export import export_hazard
 from skidpad.scenarios.export.writer import OscVersion
 from skidpad.stack.configurations import functions_of
+from support.channel_worlds import Eyes, World
+from support.channel_worlds import drive as drive_channels
+from support.runs import adas_run, scenario_run
 
 REFERENCE = ReferenceDriver()
 NO_ADAS = AdasDriver(label="0", functions=functions_of(0))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from tests.scenarios.files import at, event, private, speed, story, time, to, write
 from typer.testing import CliRunner
 
 import skidpad
@@ -13,6 +12,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import VehicleCommand
 from skidpad.recording.run.log_files import log_hash, read_log
+from support.scenarios.files import at, event, private, speed, story, time, to, write
 
 
 @pytest.fixture

@@ -11,7 +11,6 @@ import yaml
 from msgspec.structs import replace
 from typer.testing import CliRunner
 
-from runs import adas_run, scenario_run, segment_run
 from scenario_tuning import Candidate, tuning_run
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.recipes.channels import RECIPE as CHANNELS
@@ -36,6 +35,7 @@ from skidpad.core.run import (
 )
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.recording.run.log_files import log_hash, read_log
+from support.runs import adas_run, scenario_run, segment_run
 
 SERVER = BackendChoice(
     backend=BackendKind.CARLA,

@@ -7,7 +7,7 @@ from typer.core import TyperOption
 from skidpad.cli.main import app
 from skidpad.cli.options.campaigns import CampaignOptions, Estimate
 from skidpad.core.errors import OutputError
-from toy_campaign import campaign
+from support.toy_campaign import campaign
 
 ROOT = typer.main.get_command(app)
 CAMPAIGNS = {"adas": "adas", "grip": "grip", "channels drive": "channels", "play": "play"}

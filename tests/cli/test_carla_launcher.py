@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from carla_programs import environment
 from skidpad.cli.carla_launcher import NAME, find_refused, translate_options
 from skidpad.cli.main import app
+from support.carla_programs import environment
 
 LIMIT = 600.0  # s
 

@@ -13,7 +13,6 @@ import pytest
 from lxml import etree
 from typer.testing import CliRunner
 
-from channel_worlds import Eyes, World, drive
 from skidpad.cli.main import app, main
 from skidpad.core.channels import Context
 from skidpad.core.errors import ConfigError
@@ -21,6 +20,7 @@ from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.evidence.channels.timing import time_by_objects, timing_statistics
 from skidpad.recording.channels.mcap_files import ChannelWriter
 from skidpad.recording.hazards.records import read_hazards
+from support.channel_worlds import Eyes, World, drive
 
 runner = CliRunner(env={"COLUMNS": "200"})
 WORLD = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(-11.0, 0, 0, 15.5, 0), (50.0, 3.5, 0, 15, 0)]))

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from skidpad.cli.main import app
 from skidpad.recording.run.log_files import read_log
-from stadium import stadium
+from support.stadium import stadium
 
 
 def driven(folder, *words: str):

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from skidpad.cli.main import app
 from skidpad.recording.run.log_files import log_hash, read_log
-from stadium import written
+from support.stadium import written
 
 RUNNER = CliRunner()
 DRIVEN = "--configs 0 --weather clear-noon --seeds 1 --duration 17 --sensors objects --workers 1"

@@ -2,7 +2,6 @@
 
 import pytest
 from lxml import etree
-from tests.scenarios.files import document
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
@@ -13,6 +12,7 @@ from skidpad.recording.campaign.grip import GripEntry
 from skidpad.recording.campaign.ledger import read_ledger
 from skidpad.recording.campaign.results import read_results
 from skidpad.scenarios.shipped import FOLDER
+from support.scenarios.files import document
 
 
 def play(*call):

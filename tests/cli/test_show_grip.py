@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 from typer.testing import CliRunner
 
-from runs import adas_run
 from skidpad.campaign.runs.play import run_to
 from skidpad.cli.main import app
 from skidpad.cli.runs.show import vehicle_grips
 from skidpad.core.run import Friction
 from skidpad.recording.run.log_files import read_log
+from support.runs import adas_run
 
 
 @pytest.mark.req("B-068")

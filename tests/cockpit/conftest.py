@@ -1,6 +1,6 @@
 import pytest
 
-from chromium import CHROMIUM, FLAGS
+from support.chromium import CHROMIUM, FLAGS
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,8 @@ from dataclasses import replace
 from time import sleep
 
 import pytest
-from commands import PATIENCE, running
 from PIL import Image
 
-from runs import adas_run
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.driving.loop import Timer
 from skidpad.campaign.driving.run_setup import stage_of
@@ -30,6 +28,8 @@ from skidpad.recording.campaign.folder import RUNS, SNAPSHOTS
 from skidpad.recording.campaign.ledger import LEDGER
 from skidpad.recording.run.inputs import read_inputs
 from skidpad.recording.run.log_files import log_hash, read_log
+from support.cockpit.commands import PATIENCE, running
+from support.runs import adas_run
 
 GAMEPAD = """() => { const pad = { connected: true, id: "pad", axes: [0.5, 0, 0, 0],
     buttons: Array.from({ length: 16 }, (_, i) => ({ value: i === 7 ? 0.4 : 0 })) };

@@ -12,10 +12,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from producers import Recorder, bridge
 from typer.testing import CliRunner
 
-from runs import adas_run
 from skidpad.campaign.driving.loop import Sink
 from skidpad.campaign.runs.run import run
 from skidpad.campaign.takeover.desk import Desk, Recorded
@@ -58,6 +56,8 @@ from skidpad.roads.bundled import load_map
 from skidpad.sensors.finish.extras import ALL_EXTRAS, NO_EXTRAS, Extra
 from skidpad.sensors.suite import PixelSuite
 from skidpad.simulation import pacing
+from support.cockpit.producers import Recorder, bridge
+from support.runs import adas_run
 
 PICTURES = os.environ.get("SKIDPAD_PICTURES")  # a folder for pictures, to be looked at
 

@@ -10,7 +10,6 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from runs import adas_run
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.driving.loop import Sink
 from skidpad.campaign.recipes.matrix import RECIPE
@@ -45,6 +44,7 @@ from skidpad.core.vocabulary import GripModel, RangeModel
 from skidpad.physics.presets import preset
 from skidpad.recording.campaign.folder import RUNS
 from skidpad.recording.run.log_files import EVENTS, TICKS
+from support.runs import adas_run
 
 INPUTS = [
     Timed(10, Functions((Function.ACC,))),

@@ -9,8 +9,6 @@ import polars as pl
 import pytest
 from typer.testing import CliRunner
 
-from channel_worlds import CAR, Eyes, World, drive, frame, traffic
-from runs import adas_run, scenario_run
 from skidpad.campaign.runs.desk_run import drive_at_desk
 from skidpad.campaign.takeover.desk import Desk, Recorded
 from skidpad.cli.main import app
@@ -38,6 +36,8 @@ from skidpad.recording.channels.mcap_files import ChannelWriter
 from skidpad.recording.hazards.records import HazardRecord, HazardWriter
 from skidpad.roads.bundled import load_map
 from skidpad.sensors.raster.view import camera_view
+from support.channel_worlds import CAR, Eyes, World, drive, frame, traffic
+from support.runs import adas_run, scenario_run
 
 MOMENTS = 12
 

@@ -2,12 +2,11 @@
 
 import os
 
-from commands import PATIENCE, running
-
 from skidpad.campaign.runs.stored import read_run
 from skidpad.core.inputs import Sky
 from skidpad.physics.grip import grip_params
 from skidpad.recording.run.inputs import read_inputs
+from support.cockpit.commands import PATIENCE, running
 
 STEPS = int(os.environ.get("SKIDPAD_WALK", "1000"))
 WAIT = 1000.0 * PATIENCE  # ms

@@ -6,7 +6,6 @@ from multiprocessing import Pipe
 import msgspec
 import numpy as np
 import pytest
-from producers import bridge
 
 from skidpad.cockpit.hud import stopping_distance
 from skidpad.cockpit.words import Link, Word, encode
@@ -15,6 +14,7 @@ from skidpad.core.run import Function
 from skidpad.core.vocabulary import GripModel, RangeModel
 from skidpad.physics.grip import grip_params, mu_at
 from skidpad.physics.presets import all_presets, preset
+from support.cockpit.producers import bridge
 
 FIELDS = (
     "precipitation",

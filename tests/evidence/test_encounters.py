@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis.strategies import floats
 
-from makelog import drive
 from skidpad.evidence.encounters import box_distance, encounter, time_to_meet
 from skidpad.evidence.pairs import Body
+from support.makelog import drive
 
 STEP = 0.005
 

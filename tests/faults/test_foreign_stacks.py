@@ -5,10 +5,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
-import stacks
-from waiting import waited
 
-import runs
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.cells.matrix import cross
 from skidpad.campaign.recipes.matrix import RECIPE
@@ -22,6 +19,9 @@ from skidpad.recording.campaign.ledger import read_ledger
 from skidpad.recording.campaign.matrix import MatrixEntry
 from skidpad.roads.bundled import load_map
 from skidpad.stack.loading import load_stack
+from support import runs
+from support.faults import stacks
+from support.faults.waiting import waited
 
 HERE = Path(stacks.__file__)
 

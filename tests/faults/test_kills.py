@@ -12,19 +12,19 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-import slow_campaign
 import yaml
-from readers import here
-from waiting import PATIENCE, waited
 
-import runs
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.recipes.matrix import RECIPE
 from skidpad.core.errors import OutputError
 from skidpad.recording.campaign.folder import RUNS
 from skidpad.recording.campaign.ledger import LEDGER
 from skidpad.recording.run.log_files import log_hash, read_log
-from toy_campaign import campaign as toy_campaign
+from support import runs
+from support.faults import slow_campaign
+from support.faults.readers import here
+from support.faults.waiting import PATIENCE, waited
+from support.toy_campaign import campaign as toy_campaign
 
 TESTS = Path(__file__).parents[1]
 TOSSES = 12
@@ -36,9 +36,7 @@ def lines(out):
 
 
 def started(out):
-    environment = os.environ | {
-        "PYTHONPATH": os.pathsep.join([str(TESTS), str(TESTS / "faults"), *sys.path])
-    }
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(TESTS), *sys.path])}
     return subprocess.Popen(
         [sys.executable, slow_campaign.__file__, str(out), str(TOSSES)],
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment,

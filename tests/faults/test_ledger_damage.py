@@ -7,7 +7,7 @@ import pytest
 from skidpad.campaign.campaign import Campaign
 from skidpad.core.errors import FileError, OutputError
 from skidpad.recording.campaign.ledger import DAMAGED, LEDGER, Ledger, read_ledger
-from toy_campaign import RECIPE, Toss, campaign, key
+from support.toy_campaign import RECIPE, Toss, campaign, key
 
 
 def here(jobs):

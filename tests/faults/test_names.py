@@ -7,7 +7,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import structs
 
-import runs
 from skidpad.campaign.runs.folder import fresh_folder
 from skidpad.core.errors import ConfigError
 from skidpad.core.names import LONGEST, inside, path_part, slug
@@ -16,6 +15,7 @@ from skidpad.core.weather import Weather
 from skidpad.recording.campaign.folder import RUNS, CampaignFolder
 from skidpad.recording.campaign.grip import read_series
 from skidpad.recording.campaign.matrix import MatrixEntry
+from support import runs
 
 BAD = [
     "../../victim",

@@ -9,14 +9,10 @@ import zlib
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import called_readers
-import channel_readers
-import kept_readers
-import more_readers
 import pytest
-import readers
 
 from skidpad.core.errors import InputError
+from support.faults import called_readers, channel_readers, kept_readers, more_readers, readers
 
 MODULES = (readers, channel_readers, more_readers, kept_readers, called_readers)
 READERS = {name: reader for module in MODULES for name, reader in module.READERS.items()}

@@ -4,11 +4,11 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-import runs
 from skidpad.cli.main import app
 from skidpad.core.errors import FileError
 from skidpad.core.run import AgentDriver, StackDriver
 from skidpad.core.simulator import BackendChoice, BackendKind
+from support import runs
 
 FOREIGN = (
     "from pathlib import Path\nPath(__file__).with_suffix('.ran').touch()\nclass S:\n    pass\n"

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from channel_worlds import Eyes, World, drive
 from skidpad.campaign.runs.rerun import Film
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError, OutputError
@@ -16,6 +15,7 @@ from skidpad.live.watch import watch_whole
 from skidpad.recording.channels.mcap_files import ChannelWriter
 from skidpad.recording.files import write_atomically, write_bytes
 from skidpad.recording.folders import ResultKind, prepare_files, require_kind
+from support.channel_worlds import Eyes, World, drive
 
 WORLD = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(50.0, 3.5, 0, 15, 0)]))
 EYES = (Eyes("left", 0.03), Eyes("right", 0.03))

@@ -5,8 +5,9 @@ from __future__ import annotations
 import random
 
 import numpy as np
-from readers import READERS, beside, story_of
-from scenario_mutation import mutated_story, seeds
+
+from support.faults.readers import READERS, beside, story_of
+from support.faults.scenario_mutation import mutated_story, seeds
 
 COMPILED = 0.5  # of the inputs at least
 

@@ -6,7 +6,7 @@ import pytest
 
 pytest.importorskip("fastapi", reason="skidpad[fleet] is not installed")
 
-from fleet_world import World, make_world, postgresql_server
+from support.fleet_world import World, make_world, postgresql_server
 
 
 @pytest.fixture(scope="session")

@@ -17,12 +17,12 @@ import pytest
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from typer.testing import CliRunner
 
-from channel_worlds import frame
-from fleet_world import Clock, make_world
 from skidpad.core.channels import Context
 from skidpad.core.errors import BackendError, FileError
 from skidpad.fleet.aboard import Aboard, pinned_key
 from skidpad.fleet.alerting.keeping import AlertText, Body, Kind, Scene
+from support.channel_worlds import frame
+from support.fleet_world import Clock, make_world
 
 ALERT = AlertText(Kind.HAZARD, "car ahead", Scene("town", Body(1.0, 2.0, 0.1), 8.0))
 LONG_S = 600.0  # a busy machine is no fault

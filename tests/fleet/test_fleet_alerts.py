@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-from fleet_world import NOW, Clock, mosquitto
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.fleet.alerting.dispatcher import Dispatcher
 from skidpad.fleet.alerting.hub import Hub
@@ -24,6 +23,7 @@ from skidpad.fleet.alerting.receiver import Receiver, Verdict
 from skidpad.fleet.alerting.relays import Mqtt, Webhook
 from skidpad.fleet.broker import Broker
 from skidpad.fleet.store.accounts import find_tenant
+from support.fleet_world import NOW, Clock, mosquitto
 
 SCENE = {"map": "town", "ego": {"x": 1.0, "y": 2.0, "heading": 0.1}, "v": 8.0}
 ALERT = {"kind": "hazard", "text": "car ahead stopped", "scene": SCENE}

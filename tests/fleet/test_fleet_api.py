@@ -11,11 +11,11 @@ import zlib
 import pytest
 from lxml import etree
 
-from fleet_world import packed, record, text_of
 from skidpad.fleet.api.guard import Needs
 from skidpad.fleet.service import Rate
 from skidpad.fleet.unpacking import unpack
 from skidpad.fleet.words import RIGHTS, Action, Limits, Refused, Role
+from support.fleet_world import packed, record, text_of
 
 OPEN = {"/api/v1/openapi.json"}  # describes the interface, holds no record
 

@@ -6,7 +6,6 @@ import re
 
 import pytest
 
-from fleet_world import record
 from skidpad.evidence.statistics import Interval
 from skidpad.fleet.alerting.keeping import Body
 from skidpad.fleet.insight.trends import Trend
@@ -24,6 +23,7 @@ from skidpad.fleet.site.drawing import (
     scene_svg,
     scene_text,
 )
+from support.fleet_world import record
 
 DAY = 86_400.0
 

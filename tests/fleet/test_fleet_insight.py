@@ -17,7 +17,6 @@ import polars as pl
 import pytest
 
 import channels_tables as tables
-from fleet_world import NOW, World, make_world, packed, record
 from skidpad.core.errors import FileError
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.statistics import linear_ratio_limits
@@ -29,6 +28,7 @@ from skidpad.fleet.service import Places, open_fleet
 from skidpad.fleet.site.drawing import KINDS
 from skidpad.fleet.store.accounts import add_vehicle
 from skidpad.fleet.warehouse import MANY_VEHICLES, TAKE, Warehouse
+from support.fleet_world import NOW, World, make_world, packed, record
 
 DRAWS = 2000
 

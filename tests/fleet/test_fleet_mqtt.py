@@ -8,8 +8,8 @@ from contextlib import closing
 
 import pytest
 
-from fleet_world import make_world, mosquitto, record, text_of
-from programs import require_program
+from support.fleet_world import make_world, mosquitto, record, text_of
+from support.programs import require_program
 
 pytest.importorskip("aiomqtt", reason="aiomqtt, for mosquitto, is not installed")
 from skidpad.cli.fleet.links import broker_of

@@ -17,8 +17,6 @@ from test_fleet_api import released
 from test_fleet_insight import row
 from test_fleet_upload import served
 
-from chromium import CHROMIUM, FLAGS
-from fleet_world import make_world, packed, record
 from skidpad.cli.fleet.links import map_lines, open_maps
 from skidpad.core.errors import FileError, InputError
 from skidpad.fleet.alerting.keeping import What
@@ -27,7 +25,9 @@ from skidpad.fleet.site.acting import click_analyse, click_answer, click_order
 from skidpad.fleet.site.build import pages_of
 from skidpad.fleet.site.login import log_in_page
 from skidpad.fleet.words import FIRST_PAGE, NOT_THERE, RIGHTS, Action, Refused
-from stadium import RADIUS, STRAIGHT, WIDTH, written
+from support.chromium import CHROMIUM, FLAGS
+from support.fleet_world import make_world, packed, record
+from support.stadium import RADIUS, STRAIGHT, WIDTH, written
 
 WAIT_MS = 120_000
 SCENE = {"map": "town", "ego": {"x": 1.0, "y": 2.0, "heading": 0.1}, "v": 8.0}

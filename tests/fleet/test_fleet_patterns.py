@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import settings as examples
 from hypothesis import strategies as st
 
-from fleet_world import NOW, packed, record
 from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import HazardType
 from skidpad.fleet.identity import digest
@@ -24,6 +23,7 @@ from skidpad.fleet.patterns.clusters import (
 )
 from skidpad.fleet.store.accounts import add_person, add_vehicle
 from skidpad.fleet.words import Role
+from support.fleet_world import NOW, packed, record
 
 N = len(SIGNALS)
 FALLING = np.tile(np.linspace(1.0, 0.0, POINTS)[:, None], (1, N))

@@ -12,7 +12,6 @@ import pytest
 from sqlalchemy import func, inspect, select, text
 from sqlalchemy.exc import DBAPIError, SQLAlchemyError
 
-from fleet_world import NOW, packed, record, text_of
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.fleet.batch import hazards_of
 from skidpad.fleet.blobs import Blobs
@@ -22,6 +21,7 @@ from skidpad.fleet.store.events import events_of
 from skidpad.fleet.store.intake import Batch
 from skidpad.fleet.store.tables import batches, hazards, metadata
 from skidpad.fleet.words import Kind, Limits, Refused
+from support.fleet_world import NOW, packed, record, text_of
 
 
 def count(world, table):

@@ -18,7 +18,6 @@ import yaml
 from tuf.api.metadata import Metadata
 from typer.testing import CliRunner
 
-from fleet_world import Clock, World, packed, record
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError, FileError, OutputError
 from skidpad.evidence.channels import hazards as hazards_module
@@ -32,6 +31,7 @@ from skidpad.fleet.updates.payloads import PayloadKind, payload_name, read_paylo
 from skidpad.fleet.updates.repository import SIGNED_AT
 from skidpad.fleet.upkeep import Upkeep
 from skidpad.fleet.words import Refused
+from support.fleet_world import Clock, World, packed, record
 
 
 def rules(limit: float = 3.2) -> bytes:

@@ -17,7 +17,6 @@ import pytest
 from sqlalchemy import select
 from typer.testing import CliRunner
 
-from fleet_world import record
 from skidpad.cli.main import app
 from skidpad.fleet.monitored import Lookout, hazard_batches, indicator_rows, spool_folder
 from skidpad.fleet.service import Places, open_store
@@ -29,6 +28,7 @@ from skidpad.fleet.words import Kind
 from skidpad.recording.channels.indicators import Column, IndicatorLog
 from skidpad.recording.channels.monitored import write_summary
 from skidpad.recording.hazards.records import HazardWriter
+from support.fleet_world import record
 
 RUN = CliRunner()
 

@@ -12,8 +12,6 @@ import numpy as np
 import polars as pl
 import pytest
 
-from channel_worlds import Eyes, Listed, World, drive
-from runs import segment_run
 from skidpad.campaign.channels.drive import drive_segment
 from skidpad.core.channels import ChannelFrame, Context
 from skidpad.evidence.channels.monitor import MonitorSettings
@@ -30,6 +28,8 @@ from skidpad.recording.channels.cycles import cycles
 from skidpad.recording.channels.indicators import read_indicators
 from skidpad.recording.channels.mcap_files import McapRecording
 from skidpad.recording.channels.monitored import read_summary, read_timing
+from support.channel_worlds import Eyes, Listed, World, drive
+from support.runs import segment_run
 
 FOLLOWED = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(-30.0, 0.0, 0.0, 16.5, 0.0)]))
 BLIND_BEHIND = (Eyes("lav", 0.02), Eyes("tfuse", 0.02, blind=(0,)))

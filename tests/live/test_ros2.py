@@ -17,8 +17,6 @@ pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 rosbags = pytest.importorskip("rosbags.typesys", reason="rosbags is not installed")
 from cyclonedds.core import DDSException  # noqa: E402
 
-from channel_worlds import Eyes, World, drive, frame  # noqa: E402
-from runs import segment_run  # noqa: E402
 from skidpad.campaign.channels.drive import drive_segment  # noqa: E402
 from skidpad.core.channels import ChannelFrame  # noqa: E402
 from skidpad.core.errors import FileError  # noqa: E402
@@ -33,6 +31,8 @@ from skidpad.live.watch import watch  # noqa: E402
 from skidpad.recording.channels.indicators import read_indicators  # noqa: E402
 from skidpad.recording.channels.mcap_files import McapRecording  # noqa: E402
 from skidpad.recording.formats.ros_bag import Mapping  # noqa: E402
+from support.channel_worlds import Eyes, World, drive, frame  # noqa: E402
+from support.runs import segment_run  # noqa: E402
 
 DOMAIN = 1 + os.getpid() % 99  # one per process of the tests; ports below those given at random
 PATIENCE = 900.0  # s; kernels may have to be compiled first

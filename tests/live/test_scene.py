@@ -12,9 +12,9 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 foxglove = pytest.importorskip("foxglove", reason="foxglove is not installed")
 from mcap.reader import make_reader  # noqa: E402
 
-from channel_worlds import frame  # noqa: E402
 from skidpad.core.channels import Decision  # noqa: E402
 from skidpad.live.scene import ScenePublisher  # noqa: E402
+from support.channel_worlds import frame  # noqa: E402
 
 EGO = (1.0, 2.0, np.pi / 2, 0.0, 5.0)
 

@@ -6,7 +6,6 @@ from math import cos, exp, pi, sin
 import numpy as np
 import pytest
 
-from runs import adas_run
 from skidpad.campaign.driving.run_setup import stage_of, wind_of
 from skidpad.campaign.runs.run import run
 from skidpad.core.errors import ConfigError
@@ -21,6 +20,7 @@ from skidpad.physics.vehicle import THROTTLE
 from skidpad.physics.wind import GUST_LENGTH, Gusts, side_coefficients, wind_of_intensity
 from skidpad.recording.run.log_files import log_hash
 from skidpad.simulation.embedded.engine import EmbeddedBackend
+from support.runs import adas_run
 
 CAR = vehicle_type("hatchback")
 

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from channel_worlds import Eyes, Listed, World, drive, frame, traffic
 from skidpad.core.channels import ChannelFrame, Context, Decision
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.recording.channels import channels_pb2 as pb
 from skidpad.recording.channels import codec
 from skidpad.recording.channels.cycles import cycles
 from skidpad.recording.channels.mcap_files import ChannelWriter, McapRecording
+from support.channel_worlds import Eyes, Listed, World, drive, frame, traffic
 
 WORLD = World(objects=traffic(5))
 EYES = (Eyes("left", 0.1), Eyes("right", 0.1, blind=(2,)))

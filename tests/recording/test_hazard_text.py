@@ -10,7 +10,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from channel_worlds import Eyes, World, drive, frame, traffic
 from skidpad.core.channels import Cycle
 from skidpad.core.errors import FileError
 from skidpad.core.vocabulary import HazardType
@@ -24,6 +23,7 @@ from skidpad.recording.hazards.records import (
     read_hazards,
     read_index,
 )
+from support.channel_worlds import Eyes, World, drive, frame, traffic
 
 
 def record(worlds, channels=("a", "b"), **more):

@@ -5,11 +5,11 @@ from __future__ import annotations
 import polars as pl
 import pytest
 
-import runs
 from skidpad.campaign.runs.run import run
 from skidpad.core.errors import FileError
 from skidpad.recording.files import read_parquet
 from skidpad.recording.run.log_files import TICKS, read_log, write_log
+from support import runs
 
 
 @pytest.fixture(scope="module")

@@ -8,13 +8,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from makelog import drive
 from skidpad.core.states import ContactEvent, StackReport, TrafficContact
 from skidpad.core.vocabulary import DetectionStatus
 from skidpad.recording.run.events import Notice, NoticeSource
 from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.log_files import log_hash
 from skidpad.recording.run.motion import motion_hash
+from support.makelog import drive
 
 TOUCH = ContactEvent(4, 1, "", 900.0, 3.0, 10.0, 0.0)
 

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from makelog import actor_table, drive, frame, pose, world
 from skidpad.core.errors import FileError, OutputError
 from skidpad.core.states import ContactEvent, LaneInvasion, StackReport, VehicleCommand
 from skidpad.core.vocabulary import (
@@ -41,6 +40,7 @@ from skidpad.recording.run.log_files import (
     write_log,
 )
 from skidpad.recording.run.ticks import TickLog
+from support.makelog import actor_table, drive, frame, pose, world
 
 CONTACT = ContactEvent(3, -1, "guardrail", 120.0, 2.5, 1.0, 2.0)
 INVASION = LaneInvasion(5, "solid", 7)

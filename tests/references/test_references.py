@@ -22,10 +22,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from columns import STRIDE, Columns, changes, digest, first_contact, sampled
-from drives import DRIVES
 
 from skidpad.recording.fingerprint import fingerprint
+from support.references.columns import STRIDE, Columns, changes, digest, first_contact, sampled
+from support.references.drives import DRIVES
 
 STORE = Path(__file__).with_name("stored")
 

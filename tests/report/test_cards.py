@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from PIL import Image as Picture
 
-from makelog import drive
 from skidpad.core.states import ContactEvent, StackReport
 from skidpad.core.vocabulary import ActorKind, DetectionStatus, Supervision, Tier
 from skidpad.evidence.drive.collisions import Crash, CrashKind, Striker, find_crashes
@@ -31,6 +30,7 @@ from skidpad.report.elements.page import Cards, Montage, Page, Section, render
 from skidpad.report.matrix.crashes import crash_sections, found_crashes, montages, worst_of_each
 from skidpad.report.matrix.data import load_matrix
 from skidpad.roads.bundled import load_map
+from support.makelog import drive
 
 KMH = 3.6
 

@@ -3,9 +3,7 @@ import json
 import msgspec
 import numpy as np
 import pytest
-from svg_values import curves_of, marks_of
 
-from channel_worlds import Eyes, World, drive
 from skidpad.core.errors import FileError, InputError
 from skidpad.evidence.channels.hazards import Signal
 from skidpad.evidence.channels.judging.evaluation import Evaluation
@@ -21,6 +19,8 @@ from skidpad.report.channels.evaluation.page import (
 )
 from skidpad.report.channels.evaluation.strata import precision_recall
 from skidpad.report.elements.figures import PALETTE
+from support.channel_worlds import Eyes, World, drive
+from support.svg_values import curves_of, marks_of
 
 EYES = (Eyes("a", 0.02), Eyes("b", 0.02, blind=(0,)))
 

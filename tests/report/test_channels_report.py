@@ -6,9 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import polars as pl
 import pytest
-from svg_values import curves_of
 
-from channel_worlds import Eyes, World, drive
 from skidpad.core.errors import InputError
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.evidence.channels.monitor import MonitorSettings
@@ -22,6 +20,8 @@ from skidpad.report.channels.page import drive_page, write_drive_report
 from skidpad.report.channels.worlds import UNIT, worlds_replay
 from skidpad.report.elements.figures import PALETTE
 from skidpad.report.elements.timeline import Mark, Strip, timelines
+from support.channel_worlds import Eyes, World, drive
+from support.svg_values import curves_of
 
 WORLD = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(-11.0, 0, 0, 15.5, 0), (50.0, 3.5, 0, 15, 0)]))
 EYES = (Eyes("lav", 0.03), Eyes("tfuse", 0.03, blind=(0,)))

@@ -7,11 +7,11 @@ import json
 import numpy as np
 import pytest
 
-from channel_worlds import Eyes, World, drive
 from skidpad.evidence.channels.judging.evaluation import Evaluation
 from skidpad.evidence.channels.judging.segments import judge
 from skidpad.recording.channels.cycles import cycles
 from skidpad.report.channels.evaluation.page import evaluation_page
+from support.channel_worlds import Eyes, World, drive
 
 EYES = (Eyes("a", 0.02), Eyes("b", 0.02, blind=(0,)))
 

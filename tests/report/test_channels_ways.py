@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import msgspec
 import numpy as np
 import pytest
-from svg_values import curves_of
 
 import channels_tables as tables
 from skidpad.campaign.channels.outcomes import Referee
@@ -17,6 +16,7 @@ from skidpad.recording.channels.drives import WAY_STEP, DriveOutcome, DriveRecor
 from skidpad.report.channels.evaluation.ways import draw_ways, lane_lines
 from skidpad.report.elements.figures import PALETTE
 from skidpad.roads.bundled import load_map
+from support.svg_values import curves_of
 
 WAYS = {
     "figure8": [((0.0, 0.0), (30.0, 40.0), (60.0, 0.0))],

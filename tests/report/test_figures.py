@@ -2,7 +2,6 @@ import re
 
 import pytest
 from lxml import etree
-from svg_values import bars, texts
 
 from skidpad.report.elements.figures import (
     INK,
@@ -15,6 +14,7 @@ from skidpad.report.elements.figures import (
     points_with_intervals,
     scatter,
 )
+from support.svg_values import bars, texts
 
 BARS = [
     Series("a", [1.0, None, 3.0], [0.5, None, 2.0], [2.0, None, 5.0], [1.5, 2.0, None]),

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import polars as pl
 import pytest
-from svg_values import curves_of, texts
 
 from skidpad.evidence.grip.study import METRICS, ORIGINAL, REDUCED, CellSeries, Distance, Pair
 from skidpad.evidence.statistics import Interval
@@ -17,6 +16,7 @@ from skidpad.report.grip.figures import across_weathers, both_modes, trajectorie
 from skidpad.report.grip.tables import completion_tables, distance_tables
 from skidpad.report.grip.weathers import weather_blocks
 from skidpad.report.published import Source, published_rows
+from support.svg_values import curves_of, texts
 
 N = 20
 

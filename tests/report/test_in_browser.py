@@ -7,11 +7,11 @@ import pytest
 from test_matrix_answers import campaign, clear_cut
 from test_page import page
 
-from chromium import CHROMIUM, FLAGS
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.report.channels.evaluation.routes import route_blocks
 from skidpad.report.elements.page import Cell, Page, Section, Table, Text, write_page
 from skidpad.report.matrix.page import write_report
+from support.chromium import CHROMIUM, FLAGS
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
 

@@ -6,7 +6,6 @@ from html import unescape
 import numpy as np
 import polars as pl
 import pytest
-from svg_values import bars, curves_of, frames, marks_of, shapes, texts
 from test_matrix_report import campaign, key
 
 from skidpad.evidence.statistics import Interval, mean_limits
@@ -28,6 +27,7 @@ from skidpad.report.matrix.tables import (
     possible_part,
 )
 from skidpad.report.published import Source, read_published
+from support.svg_values import bars, curves_of, frames, marks_of, shapes, texts
 
 CONFIGS = ("1", "2", "3", "4")
 

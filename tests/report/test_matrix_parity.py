@@ -6,7 +6,6 @@ import pytest
 from test_matrix_answers import metrics
 from test_matrix_report import key
 
-from runs import adas_run
 from skidpad.campaign.cells.matrix import cross, published_drivers
 from skidpad.cli.campaigns.adas_plan import on_pixels
 from skidpad.core.errors import ConfigError
@@ -17,6 +16,7 @@ from skidpad.recording.campaign.results import Timing
 from skidpad.report.matrix.comparisons.parity import load_parity, parity_section
 from skidpad.report.matrix.data import load_matrix
 from skidpad.report.matrix.page import build_page
+from support.runs import adas_run
 
 
 def row(config, seed, sensors, motion, **values):

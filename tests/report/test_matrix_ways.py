@@ -5,13 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from svg_values import texts
 from test_matrix_answers import campaign, metrics
 
 from skidpad.report.elements.figures import PALETTE
 from skidpad.report.matrix import ways as matrix_ways
 from skidpad.report.matrix.ways import broken_way, way_blocks
 from skidpad.roads.bundled import load_map
+from support.svg_values import texts
 
 
 def test_a_way_has_a_gap_wherever_the_car_was_put_somewhere_else():

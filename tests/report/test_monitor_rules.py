@@ -8,16 +8,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from svg_values import curves_of
 
 import channels_tables as tables
 import monitor_rules
 import monitor_variants
-from channel_worlds import Eyes, World, drive
 from skidpad.evidence.channels.judging.curves import Looked
 from skidpad.evidence.channels.tracked.tracks import Track
 from skidpad.report.elements.figures import PALETTE
 from skidpad.roads.bundled import load_map
+from support.channel_worlds import Eyes, World, drive
+from support.svg_values import curves_of
 
 TAILGATED = "ego_tailgated"
 FOLLOWED = World((0, 0, 0, 15.0, 0), np.array([(-10.5, 0, 0, 15.7, 0), (60.0, 3.5, 0, 15.0, 0)]))

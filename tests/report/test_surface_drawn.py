@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import makelog
 from skidpad.core.surface import SurfacePatch
 from skidpad.recording.run.surfaces import read_run_surface
 from skidpad.report.elements.replay import UNIT, replay, replay_run
 from skidpad.roads.bundled import load_map
 from skidpad.roads.surface_outlines import outline_patches
+from support import makelog
 
 ROAD = load_map("straight")
 LANE = int(np.flatnonzero((ROAD.lanes.road == 1) & (ROAD.lanes.lane_id == -2))[0])

@@ -7,13 +7,13 @@ import matplotlib as mpl
 import numpy as np
 import polars as pl
 import pytest
-from svg_values import curves_of, frames, marks_of, texts
 
 from skidpad.evidence.grip.threshold import situations
 from skidpad.report.elements.figures import PALETTE
 from skidpad.report.grip.threshold import _map as map_blocks
 from skidpad.report.grip.threshold import groups, title
 from skidpad.report.grip.threshold_figures import COLOURS, NOT_SHOWN, TOP, curve_figures, map_figure
+from support.svg_values import curves_of, frames, marks_of, texts
 
 LEVELS = (0.9, 0.6, 0.3, 0.1)
 SEEDS = range(1, 9)

@@ -5,11 +5,11 @@ import pytest
 from shapely import Polygon, affinity
 from typer.testing import CliRunner
 
-from channel_worlds import CAR, Eyes, World, drive, traffic
 from skidpad.cli.main import app
 from skidpad.core.errors import MissingExtra
 from skidpad.recording.channels.mcap_files import ChannelWriter
 from skidpad.report.channels.viewer import outline, require_rerun
+from support.channel_worlds import CAR, Eyes, World, drive, traffic
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from skidpad.roads.edge import AXLE, TRACK
 from skidpad.roads.opendrive.bake import bake
 from skidpad.roads.queries import RoadMap
-from stadium import RADIUS, STRAIGHT, WIDTH, stadium
+from support.stadium import RADIUS, STRAIGHT, WIDTH, stadium
 
 LENGTH, BREADTH = 4.5, 1.8  # m, of a car
 

@@ -10,7 +10,7 @@ from skidpad.roads.opendrive.bake import bake
 from skidpad.roads.opendrive.rails import add_rails
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.roadside import BarrierKind
-from stadium import RADIUS, STRAIGHT, WIDTH, stadium
+from support.stadium import RADIUS, STRAIGHT, WIDTH, stadium
 
 ASIDE = 0.3  # m
 

@@ -5,7 +5,15 @@ from __future__ import annotations
 from math import cos, hypot, radians, sin, sqrt
 
 import pytest
-from tests.scenarios.files import (
+
+from skidpad.core.run import ActorMode
+from skidpad.roads.bundled import load_map
+from skidpad.scenarios.movement.network import network_of
+from skidpad.scenarios.places.routes import random_roads
+from skidpad.scenarios.playing.player import Player
+from skidpad.scenarios.playing.stage import IdealWorld, play_ideal
+from skidpad.scenarios.scenario import check
+from support.scenarios.files import (
     at,
     by_value,
     compiled,
@@ -21,14 +29,6 @@ from tests.scenarios.files import (
     told,
     write,
 )
-
-from skidpad.core.run import ActorMode
-from skidpad.roads.bundled import load_map
-from skidpad.scenarios.movement.network import network_of
-from skidpad.scenarios.places.routes import random_roads
-from skidpad.scenarios.playing.player import Player
-from skidpad.scenarios.playing.stage import IdealWorld, play_ideal
-from skidpad.scenarios.scenario import check
 
 STOP = private(speed(to(0)))
 LIGHTS = """<RoadNetwork><LogicFile filepath="straight.xodr"/><TrafficSignals>

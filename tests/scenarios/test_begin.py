@@ -6,7 +6,11 @@ from math import pi
 from shutil import copyfile
 
 import pytest
-from tests.scenarios.files import (
+
+from skidpad.roads.bundled import FOLDER as MAPS
+from skidpad.scenarios.reading.findings import Kind, ScenarioError
+from skidpad.scenarios.scenario import check
+from support.scenarios.files import (
     at,
     compiled,
     condition,
@@ -21,10 +25,6 @@ from tests.scenarios.files import (
     vehicle,
     write,
 )
-
-from skidpad.roads.bundled import FOLDER as MAPS
-from skidpad.scenarios.reading.findings import Kind, ScenarioError
-from skidpad.scenarios.scenario import check
 
 
 def relative_speed(value, other, kind="delta", continuous="false"):

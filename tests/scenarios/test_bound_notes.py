@@ -3,7 +3,18 @@
 from __future__ import annotations
 
 import pytest
-from tests.scenarios.files import (
+
+from support.oracle.actions import (
+    beside,
+    gap,
+    lane_change,
+    lane_offset,
+    limits,
+    relative,
+    round_profile,
+    smooth_profile,
+)
+from support.scenarios.files import (
     at,
     compiled,
     event,
@@ -20,16 +31,6 @@ from tests.scenarios.files import (
     trajectory,
     vehicle,
     world,
-)
-from tests.scenarios.oracle.actions import (
-    beside,
-    gap,
-    lane_change,
-    lane_offset,
-    limits,
-    relative,
-    round_profile,
-    smooth_profile,
 )
 
 

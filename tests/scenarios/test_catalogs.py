@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from tests.scenarios.files import (
+
+from skidpad.scenarios.reading.findings import ScenarioError
+from support.scenarios.files import (
     VEHICLE,
     at,
     compiled,
@@ -16,8 +18,6 @@ from tests.scenarios.files import (
     told,
     vehicle,
 )
-
-from skidpad.scenarios.reading.findings import ScenarioError
 
 CATALOG = document('<Catalog name="{name}">{entries}</Catalog>')
 LONG = VEHICLE.format(x=1).replace('name="v"', 'name="long"').replace('length="4.2"', 'length="$L"')

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.scenarios.files import document, write
 
 from skidpad.core.errors import FileError
 from skidpad.scenarios.reading.distributions import choices, is_distribution
+from support.scenarios.files import document, write
 
 FILE = document(
     '<ParameterValueDistribution><ScenarioFile filepath="x.xosc"/>{}</ParameterValueDistribution>'

@@ -6,7 +6,15 @@ import re
 
 import numpy as np
 import pytest
-from tests.scenarios.files import (
+from typer.testing import CliRunner
+
+from skidpad.cli.main import app
+from skidpad.core.errors import FileError
+from skidpad.roads.opendrive.bake import bake
+from skidpad.scenarios.playing.stage import play_ideal
+from skidpad.scenarios.reading.findings import Kind, ScenarioError
+from skidpad.scenarios.scenario import check, compile_scenario
+from support.scenarios.files import (
     BRIDGE,
     at,
     compiled,
@@ -24,14 +32,6 @@ from tests.scenarios.files import (
     vehicle,
     write,
 )
-from typer.testing import CliRunner
-
-from skidpad.cli.main import app
-from skidpad.core.errors import FileError
-from skidpad.roads.opendrive.bake import bake
-from skidpad.scenarios.playing.stage import play_ideal
-from skidpad.scenarios.reading.findings import Kind, ScenarioError
-from skidpad.scenarios.scenario import check, compile_scenario
 
 CATALOG = """<?xml version='1.0'?><OpenSCENARIO><FileHeader revMajor="{0}" revMinor="{1}"
 date="2026-01-01T00:00:00" description="x" author="x"/><Catalog name="acts">{2}</Catalog>

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from tests.scenarios.files import at, compiled
 
 from skidpad.scenarios.reading.expressions import ExpressionError, evaluate
 from skidpad.scenarios.reading.findings import ScenarioError
+from support.scenarios.files import at, compiled
 
 SCOPE = {"a": "7", "b": "2.5", "word": "wet", "yes": "true"}
 

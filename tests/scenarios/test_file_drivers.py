@@ -3,7 +3,16 @@
 from __future__ import annotations
 
 import pytest
-from tests.scenarios.files import (
+from tests.scenarios.test_registered_names import ACTIVATE, with_controller
+
+from skidpad.campaign.driving.file_drivers import FollowingDriver
+from skidpad.campaign.driving.run_setup import load_scenario
+from skidpad.core.errors import ConfigError
+from skidpad.core.run import Scenario
+from skidpad.scenarios.playing.stage import play_ideal
+from skidpad.stack.reference.following import GAP_MIN
+from skidpad.stack.reference.person import person_of
+from support.scenarios.files import (
     at,
     event,
     init,
@@ -17,15 +26,6 @@ from tests.scenarios.files import (
     vehicle,
     write,
 )
-from tests.scenarios.test_registered_names import ACTIVATE, with_controller
-
-from skidpad.campaign.driving.file_drivers import FollowingDriver
-from skidpad.campaign.driving.run_setup import load_scenario
-from skidpad.core.errors import ConfigError
-from skidpad.core.run import Scenario
-from skidpad.scenarios.playing.stage import play_ideal
-from skidpad.stack.reference.following import GAP_MIN
-from skidpad.stack.reference.person import person_of
 
 LENGTH = 4.2  # m of both boxes
 

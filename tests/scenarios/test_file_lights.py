@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.scenarios.files import at, by_value, event, init, speed, story, teleport, time, to, write
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
@@ -16,6 +15,18 @@ from skidpad.recording.run.log_files import read_log
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import LanePoint
 from skidpad.scenarios.signals import read_signal_state
+from support.scenarios.files import (
+    at,
+    by_value,
+    event,
+    init,
+    speed,
+    story,
+    teleport,
+    time,
+    to,
+    write,
+)
 
 TOWN = '<LogicFile filepath="town.xodr"/>'
 LIGHT, BEFORE = 1001, 60.0  # signal of a crossing; m

@@ -6,7 +6,16 @@ from math import hypot
 from pathlib import Path
 
 import pytest
-from tests.scenarios.files import (
+from tests.scenarios.test_registered_names import with_controller
+
+import skidpad
+from skidpad.campaign.driving.run_setup import check_scenario
+from skidpad.core.errors import ConfigError
+from skidpad.core.run import Scenario
+from skidpad.core.states import VehicleCommand
+from skidpad.scenarios.registry import REGISTERED, Names
+from skidpad.scenarios.scenario import check
+from support.scenarios.files import (
     at,
     event,
     init,
@@ -20,15 +29,6 @@ from tests.scenarios.files import (
     vehicle,
     write,
 )
-from tests.scenarios.test_registered_names import with_controller
-
-import skidpad
-from skidpad.campaign.driving.run_setup import check_scenario
-from skidpad.core.errors import ConfigError
-from skidpad.core.run import Scenario
-from skidpad.core.states import VehicleCommand
-from skidpad.scenarios.registry import REGISTERED, Names
-from skidpad.scenarios.scenario import check
 
 NAME = "SkidpadStack"
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.scenarios.files import at, event, story, time, write
 from typer.testing import CliRunner
 
 from skidpad.campaign.driving.outdoors import sun_at, weather_of
@@ -16,6 +15,7 @@ from skidpad.physics.grip import rain_rate
 from skidpad.physics.optics import sight
 from skidpad.recording.run.log_files import read_log
 from skidpad.scenarios.reading.environment import Environment, Fall, Wetness
+from support.scenarios.files import at, event, story, time, write
 
 
 def environment(friction: float | None = None, rain: float = 0.0, clouds: str = "sixOktas") -> str:

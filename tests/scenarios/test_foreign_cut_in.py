@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.scenarios.files import FILE, ROAD, VEHICLE, document
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
 from skidpad.recording.run.log_files import read_log
+from support.scenarios.files import FILE, ROAD, VEHICLE, document
 
 CATALOG = document('<Catalog name="VehicleCatalog">{entries}</Catalog>', minor=1)
 CAR = VEHICLE.format(x=1.4).replace('name="v"', 'name="{name}"')

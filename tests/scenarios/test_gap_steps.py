@@ -6,7 +6,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from tests.scenarios.files import (
+from typer.testing import CliRunner
+
+from skidpad.cli.main import app
+from skidpad.recording.run.events import NoticeSource
+from skidpad.recording.run.log_files import read_log
+from support.scenarios.files import (
     at,
     by_entity,
     event,
@@ -18,11 +23,6 @@ from tests.scenarios.files import (
     told,
     write,
 )
-from typer.testing import CliRunner
-
-from skidpad.cli.main import app
-from skidpad.recording.run.events import NoticeSource
-from skidpad.recording.run.log_files import read_log
 
 SIDES = ("leadingReferencedEntity", "trailingReferencedEntity")
 

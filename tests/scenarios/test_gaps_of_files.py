@@ -5,7 +5,11 @@ from __future__ import annotations
 from math import atan, hypot
 
 import pytest
-from tests.scenarios.files import (
+
+from skidpad.core.errors import FileError
+from skidpad.scenarios.reading.document import parse
+from skidpad.scenarios.scenario import check
+from support.scenarios.files import (
     at,
     by_entity,
     by_value,
@@ -24,10 +28,6 @@ from tests.scenarios.files import (
     vehicle,
     write,
 )
-
-from skidpad.core.errors import FileError
-from skidpad.scenarios.reading.document import parse
-from skidpad.scenarios.scenario import check
 
 STOP = private(speed(to(0)))
 

@@ -12,7 +12,6 @@ import pytest
 from lxml import etree
 from typer.testing import CliRunner
 
-from channel_worlds import Eyes, World, drive, traffic
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError, InputError
 from skidpad.core.vocabulary import HazardType
@@ -25,8 +24,9 @@ from skidpad.recording.hazards.records import (
 )
 from skidpad.scenarios.export.hazard_export import export_hazard
 from skidpad.scenarios.export.writer import OscVersion
+from support.channel_worlds import Eyes, World, drive, traffic
 
-CHECKER = Path(__file__).with_name("asam_check.py")
+CHECKER = Path(__file__).parents[1] / "support" / "scenarios" / "asam_check.py"
 JUNCTION_RULE = 1  # of two junction rules that exclude each other, one is always skipped
 
 

@@ -7,9 +7,9 @@ from itertools import pairwise
 from math import inf, sqrt
 
 import pytest
-from tests.scenarios.files import event, private, speed, story, time, to, told, vehicle
 
 from skidpad.scenarios.actions.jerk import Jerk, pieces_over, settle, smooth_pieces
+from support.scenarios.files import event, private, speed, story, time, to, told, vehicle
 
 
 def ends(pieces):

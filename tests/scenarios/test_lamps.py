@@ -6,21 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.runs import scenario_run
-from tests.scenarios.files import (
-    compiled,
-    event,
-    init,
-    on_lane,
-    private,
-    speed,
-    story,
-    teleport,
-    time,
-    to,
-    told,
-    write,
-)
 from typer.testing import CliRunner
 
 from skidpad.campaign.driving.outdoors import FileChanges
@@ -35,6 +20,21 @@ from skidpad.recording.run.lamps import FILE, Lamp, LampChange, LampMode, read_l
 from skidpad.scenarios.actions.lights import beam_of_ego
 from skidpad.scenarios.reading.findings import ScenarioError
 from skidpad.simulation.embedded.engine import EmbeddedBackend
+from support.runs import scenario_run
+from support.scenarios.files import (
+    compiled,
+    event,
+    init,
+    on_lane,
+    private,
+    speed,
+    story,
+    teleport,
+    time,
+    to,
+    told,
+    write,
+)
 
 
 def lamp(name: str, mode: str = "on", **more: object) -> str:

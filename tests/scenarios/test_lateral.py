@@ -6,7 +6,9 @@ import itertools
 from math import atan2, cos, hypot, sin
 
 import pytest
-from tests.scenarios.files import (
+
+from support.oracle.roads import network, road
+from support.scenarios.files import (
     at,
     event,
     init,
@@ -19,7 +21,6 @@ from tests.scenarios.files import (
     to,
     told,
 )
-from tests.scenarios.oracle.roads import network, road
 
 
 def lane_change(target, shape="sinusoidal", value=4, dimension="time", offset=0.0):

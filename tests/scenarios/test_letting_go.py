@@ -1,7 +1,15 @@
 """What a stopped action leaves behind, which of two actions wins, and whom actions refer to."""
 
 import pytest
-from tests.scenarios.files import (
+
+from skidpad.core.geometry import Pose
+from skidpad.core.run import ActorMode
+from skidpad.core.setup import DT, ActorCommand
+from skidpad.scenarios.movement.motion import Guide
+from skidpad.scenarios.playing.player import Player
+from skidpad.scenarios.playing.stage import IdealWorld
+from skidpad.simulation.scripted import Motion
+from support.scenarios.files import (
     at,
     by_entity,
     compiled,
@@ -17,14 +25,6 @@ from tests.scenarios.files import (
     to,
     told,
 )
-
-from skidpad.core.geometry import Pose
-from skidpad.core.run import ActorMode
-from skidpad.core.setup import DT, ActorCommand
-from skidpad.scenarios.movement.motion import Guide
-from skidpad.scenarios.playing.player import Player
-from skidpad.scenarios.playing.stage import IdealWorld
-from skidpad.simulation.scripted import Motion
 
 V_EGO = 20.0  # m/s, twice what its file says
 Y_EGO = -5.25  # m, the lane -2, where its file says -3

@@ -5,7 +5,8 @@ from __future__ import annotations
 import itertools
 
 import pytest
-from tests.scenarios.files import at, event, on_lane, private, speed, story, time, to, told
+
+from support.scenarios.files import at, event, on_lane, private, speed, story, time, to, told
 
 
 def rows_of(tmp_path, action, name="other", end=12.0, **parts):

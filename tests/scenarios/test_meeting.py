@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from tests.scenarios.files import (
+
+from support.scenarios.files import (
     BRIDGE,
     at,
     event,

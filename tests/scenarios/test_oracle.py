@@ -1,7 +1,7 @@
 """Files of ours against trajectories that esmini has computed: place, heading and speed.
 
 `python tools/scenario_oracle.py references --esmini DIR` computes the trajectories anew; the table of
-files is tests/scenarios/oracle/cases.py.
+files is tests/support/oracle/cases.py.
 """
 
 from __future__ import annotations
@@ -9,11 +9,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from tests.scenarios.oracle.cases import CASES
-from tests.scenarios.oracle.reference import OWN, deviations, file_hash, read_reference, write_case
 
 from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.scenarios.scenario import compile_scenario
+from support.oracle.cases import CASES
+from support.oracle.reference import OWN, deviations, file_hash, read_reference, write_case
 
 DOCS = Path(__file__).parents[2] / "docs" / "openscenario.md"
 # where the standard decides against esmini; docs/openscenario.md names what decides

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.scenarios.files import at, write
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
 from skidpad.recording.run.log_files import read_log
+from support.scenarios.files import at, write
 
 
 @pytest.mark.parametrize("v", [4.0, 13.33, 30.0])

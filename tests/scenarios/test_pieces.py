@@ -6,10 +6,8 @@ from datetime import datetime
 
 import numpy as np
 import pytest
-from merging_player import led, merged, place
 from test_hazard_export import a_record
 
-from runs import scenario_run
 from skidpad.campaign.runs.run import run
 from skidpad.core.run import ActorMode, Passenger, Scenario
 from skidpad.core.vocabulary import Outcome, SemanticClass
@@ -18,6 +16,8 @@ from skidpad.scenarios.export.tracks import Track, tracks
 from skidpad.scenarios.export.writer import OscVersion, Sheet, write_element, write_scenario
 from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.scenarios.scenario import compile_scenario
+from support.runs import scenario_run
+from support.scenarios.merging_player import led, merged, place
 
 T = np.round(np.arange(0.0, 12.01, 0.1), 3)
 MOTIONS = {

@@ -8,7 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lxml import etree
-from tests.scenarios.files import (
+from typer.testing import CliRunner
+
+from skidpad.cli.main import app
+from skidpad.recording.run.log_files import read_log
+from support.scenarios.files import (
     BRIDGE,
     at,
     event,
@@ -23,10 +27,6 @@ from tests.scenarios.files import (
     vehicle,
     write,
 )
-from typer.testing import CliRunner
-
-from skidpad.cli.main import app
-from skidpad.recording.run.log_files import read_log
 
 RIDE = ["--stack", "ideal", "--actors", "ideal"]
 
@@ -152,7 +152,7 @@ def test_a_folder_has_crash_cards_and_a_verdict_for_each_run(tmp_path):
     junit = tmp_path / "junit.xml"
     done = play(
         tmp_path / "in", "--out", tmp_path / "out", "--workers", 1, "--stack",
-        "blind:Blind", "--expect", "no-collision", "--junit", junit,
+        "support.scenarios.blind:Blind", "--expect", "no-collision", "--junit", junit,
     )  # fmt: skip
     assert done.exit_code == 1, done.output
     cases = {c.get("name"): len(c) for c in etree.parse(str(junit)).getroot()}
@@ -169,7 +169,7 @@ def test_a_folder_has_crash_cards_and_a_verdict_for_each_run(tmp_path):
 def test_a_single_run_has_crash_cards_too(tmp_path):
     (tmp_path / "in").mkdir()
     file = a_braking_lead(tmp_path / "in", 12.0)
-    done = play(file, "--out", tmp_path / "out", "--stack", "blind:Blind")
+    done = play(file, "--out", tmp_path / "out", "--stack", "support.scenarios.blind:Blind")
     assert done.exit_code == 1, done.output
     assert "skidpad rerun" in done.output
     assert "One crash" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")

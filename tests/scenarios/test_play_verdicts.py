@@ -8,7 +8,11 @@ from pathlib import Path
 
 import pytest
 from lxml import etree
-from tests.scenarios.files import (
+from typer.testing import CliRunner
+
+from skidpad.cli.main import app
+from skidpad.recording.run.staging import read_staging
+from support.scenarios.files import (
     at,
     by_entity,
     by_value,
@@ -26,12 +30,8 @@ from tests.scenarios.files import (
     vehicle,
     write,
 )
-from typer.testing import CliRunner
 
-from skidpad.cli.main import app
-from skidpad.recording.run.staging import read_staging
-
-BLIND = ("--stack", "blind:Blind", "--actors", "ideal")
+BLIND = ("--stack", "support.scenarios.blind:Blind", "--actors", "ideal")
 NO_HIT = ("--expect", "no-collision")
 LANE_Y = -1.75  # of lane -1 of the straight road
 RIDE = ("--stack", "ideal", "--actors", "ideal")

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 from lxml import etree
-from tests.scenarios.files import BRIDGE, init, on_lane, speed, teleport, to, write
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
 from skidpad.core.errors import FileError
+from support.scenarios.files import BRIDGE, init, on_lane, speed, teleport, to, write
 
 RIDE = ["--stack", "ideal", "--actors", "ideal"]
 ROAD = '<LogicFile filepath="roads/lane.xodr"/>'

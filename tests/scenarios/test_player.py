@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runs import scenario_run
 from skidpad.campaign.runs.run import run
 from skidpad.core.errors import FileError
 from skidpad.core.run import ActorMode, Passenger, Scenario, StackDriver
@@ -18,6 +17,7 @@ from skidpad.physics.presets import preset
 from skidpad.scenarios.movement.motion import Shape, Transition
 from skidpad.scenarios.reading.findings import HARMLESS, Kind
 from skidpad.scenarios.scenario import check, compile_scenario
+from support.runs import scenario_run
 
 HEAD = """<?xml version='1.0'?>
 <OpenSCENARIO>
@@ -277,7 +277,7 @@ def test_the_ghost_merges_at_its_distance_whatever_the_ego_does():
 def test_a_collision_ends_the_run():
     # without a driver's brakes: the ego rolls on into the wreck
     course = Scenario(end_on_collision=True)
-    blind = StackDriver("tests.scenarios.blind:Blind")
+    blind = StackDriver("support.scenarios.blind:Blind")
     result = run(scenario_run("front_accident", course=course, driver=blind))
     assert result.outcome is Outcome.COLLISION
     assert len(result.log.contacts) == 1

@@ -7,7 +7,18 @@ from math import sqrt
 from pathlib import Path
 
 import pytest
-from tests.scenarios.files import (
+from typer.testing import CliRunner
+
+from skidpad.campaign.driving.run_setup import load_scenario
+from skidpad.cli.main import app
+from skidpad.core.errors import ConfigError
+from skidpad.core.run import RunSpec, Scenario
+from skidpad.scenarios.playing.stage import play_ideal
+from skidpad.scenarios.reading.findings import ScenarioError
+from skidpad.scenarios.registry import Acc, Names
+from skidpad.scenarios.scenario import check
+from skidpad.simulation.world.traffic.idm import GAP_MIN, Character
+from support.scenarios.files import (
     VEHICLE,
     at,
     by_value,
@@ -23,17 +34,6 @@ from tests.scenarios.files import (
     vehicle,
     write,
 )
-from typer.testing import CliRunner
-
-from skidpad.campaign.driving.run_setup import load_scenario
-from skidpad.cli.main import app
-from skidpad.core.errors import ConfigError
-from skidpad.core.run import RunSpec, Scenario
-from skidpad.scenarios.playing.stage import play_ideal
-from skidpad.scenarios.reading.findings import ScenarioError
-from skidpad.scenarios.registry import Acc, Names
-from skidpad.scenarios.scenario import check
-from skidpad.simulation.world.traffic.idm import GAP_MIN, Character
 
 ACTIVATE = """<ControllerAction><ActivateControllerAction longitudinal="true" lateral="false"/>
 </ControllerAction>"""

@@ -6,7 +6,10 @@ from math import cos, hypot, pi, sin
 
 import numpy as np
 import pytest
-from tests.scenarios.files import (
+
+import skidpad
+from skidpad.simulation.scripted import ActorDriver, Demand, Motion
+from support.scenarios.files import (
     at,
     event,
     init,
@@ -21,9 +24,6 @@ from tests.scenarios.files import (
     vehicle,
     write,
 )
-
-import skidpad
-from skidpad.simulation.scripted import ActorDriver, Demand, Motion
 
 
 def rows_of(folder, name="other", *, stack="ideal", **parts):

@@ -11,11 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lxml import etree
-from merging_player import led, place
 from test_hazard_export import CHECKER
 from typer.testing import CliRunner
 
-from runs import adas_run, scenario_run
 from skidpad.campaign.runs.play import run_to
 from skidpad.cli.main import app
 from skidpad.core.run import Passenger, Roads
@@ -23,6 +21,8 @@ from skidpad.recording.run.log_files import read_log
 from skidpad.scenarios.export.run_export import log_tracks, road_of
 from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.scenarios.scenario import compile_scenario
+from support.runs import adas_run, scenario_run
+from support.scenarios.merging_player import led, place
 
 
 def exported(folder: Path, *options: str) -> Path:

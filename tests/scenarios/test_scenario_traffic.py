@@ -5,10 +5,20 @@ from itertools import pairwise
 from math import hypot
 
 import pytest
-from tests.scenarios.files import at, compiled, condition, event, on_lane, story, time, told, write
 
 from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.scenarios.scenario import check
+from support.scenarios.files import (
+    at,
+    compiled,
+    condition,
+    event,
+    on_lane,
+    story,
+    time,
+    told,
+    write,
+)
 
 CARS = """<TrafficDefinition name="t"><VehicleCategoryDistribution><VehicleCategoryDistributionEntry
 category="car" weight="3"/><VehicleCategoryDistributionEntry category="truck" weight="1"/>

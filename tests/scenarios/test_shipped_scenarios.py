@@ -26,7 +26,7 @@ from skidpad.scenarios.variation import (
     variations,
 )
 
-CHECKER = Path(__file__).with_name("asam_check.py")
+CHECKER = Path(__file__).parents[1] / "support" / "scenarios" / "asam_check.py"
 FILES = [FOLDER / file_name(s.name, v) for s in SCENARIOS for v in OscVersion]
 
 

@@ -10,7 +10,10 @@ from itertools import pairwise
 from math import cos, exp, hypot, pi, sin, tan
 
 import pytest
-from tests.scenarios.files import (
+
+import skidpad
+from skidpad.core.geometry import wrap_angle
+from support.scenarios.files import (
     at,
     compiled,
     event,
@@ -29,9 +32,6 @@ from tests.scenarios.files import (
     world,
     write,
 )
-
-import skidpad
-from skidpad.core.geometry import wrap_angle
 
 RADIUS_MIN = 2.7 / tan(0.5)
 RELATIVE = '<Timing domainAbsoluteRelative="relative" scale="1" offset="0"/>'

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.scenarios.files import at, compiled, event, private, story, time, write
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
@@ -16,6 +15,7 @@ from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.log_files import read_log
 from skidpad.scenarios.playing.player import Player
 from skidpad.scenarios.playing.stage import IdealWorld
+from support.scenarios.files import at, compiled, event, private, story, time, write
 
 HIDE = private('<VisibilityAction graphics="true" sensors="{}" traffic="true"/>')
 

@@ -5,7 +5,11 @@ from __future__ import annotations
 from math import asin, cos, hypot, pi, sin
 
 import pytest
-from tests.scenarios.files import (
+
+from skidpad.core.geometry import Pose
+from skidpad.scenarios.reading.entities import Body, Box, Coupling, Entity
+from skidpad.scenarios.trailers import towed_pose
+from support.scenarios.files import (
     VEHICLE,
     event,
     init,
@@ -19,10 +23,6 @@ from tests.scenarios.files import (
     told,
     vehicle,
 )
-
-from skidpad.core.geometry import Pose
-from skidpad.scenarios.reading.entities import Body, Box, Coupling, Entity
-from skidpad.scenarios.trailers import towed_pose
 
 HITCH, COUPLER = -1.1, 3.2
 

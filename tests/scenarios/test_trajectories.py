@@ -7,7 +7,11 @@ import re
 from math import cos, hypot, pi, sin, sqrt
 
 import pytest
-from tests.scenarios.files import (
+
+from skidpad.core.errors import InputError
+from skidpad.core.geometry import wrap_angle
+from support.oracle.actions import timing
+from support.scenarios.files import (
     at,
     compiled,
     event,
@@ -21,10 +25,6 @@ from tests.scenarios.files import (
     to,
     told,
 )
-from tests.scenarios.oracle.actions import timing
-
-from skidpad.core.errors import InputError
-from skidpad.core.geometry import wrap_angle
 
 ABSOLUTE = '<Timing domainAbsoluteRelative="absolute" scale="1" offset="0"/>'
 RELATIVE = '<Timing domainAbsoluteRelative="relative" scale="2" offset="0.5"/>'

@@ -6,7 +6,8 @@ from __future__ import annotations
 from math import pi
 
 import pytest
-from tests.scenarios.files import (
+
+from support.scenarios.files import (
     BRIDGE,
     at,
     by_entity,

@@ -1,10 +1,10 @@
 """The property `tyres` of a vehicle names its tyres, and a wrong name is one sentence."""
 
 import pytest
-from tests.scenarios.files import at, compiled, vehicle
 
 from skidpad.scenarios.playing.player import setups
 from skidpad.scenarios.reading.findings import ScenarioError
+from support.scenarios.files import at, compiled, vehicle
 
 
 def shod(name, tyres):

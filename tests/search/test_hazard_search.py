@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from channel_worlds import Eyes, World, drive
 from skidpad.cli.main import app
 from skidpad.core.errors import InputError
 from skidpad.core.vocabulary import HazardType
@@ -14,6 +13,7 @@ from skidpad.recording.hazards.records import HazardRecord, HazardWriter, encode
 from skidpad.recording.hazards.searched import read_searches
 from skidpad.scenarios.export.hazard_export import export_hazard
 from skidpad.search.hazard import prepare_scene
+from support.channel_worlds import Eyes, World, drive
 
 # The ego is at x = 49 after 4.9 s. The other comes from the right at 12 m/s and is there after 4 s.
 CROSSING = World(

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import makelog
 from skidpad.core.states import ContactEvent
 from skidpad.roads.bundled import load_map
 from skidpad.search.avoidance import find_run_avoidance
+from support import makelog
 
 ROAD = load_map("straight")
 LANE, V, BEGIN = -1.75, 20.0, 300.0

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from raytracer import pixel_directions, trace
 
 from skidpad.core.weather import Weather
 from skidpad.roads.bundled import load_map
@@ -11,6 +10,7 @@ from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.sensors.raster.rasteriser import AUTO_LEVEL
 from skidpad.sensors.raster.view import camera_view
 from skidpad.sensors.suite import PixelSettings, PixelSuite
+from support.sensors.raytracer import pixel_directions, trace
 
 PLACES = (0.0, 700.0, 1500.0, 2400.0)  # m after the start
 CAMERAS = ("depth_roof", "depth_bumper")

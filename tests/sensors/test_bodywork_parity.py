@@ -8,7 +8,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from worlds import states_at, straight
 
 from skidpad.core.specs import CameraSpec
 from skidpad.core.states import ActorTable
@@ -25,6 +24,7 @@ from skidpad.stack.perception.fusion import (
     fuse,
     roof_corridor,
 )
+from support.sensors.worlds import states_at, straight
 
 DISTANCES = np.geomspace(4.0, 74.0, 9)  # m between the bumpers
 PLACES = [(left, yaw) for left in (0.0, 1.0) for yaw in (0.0, 0.12)]

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from worlds import states_at, straight, table_of
 
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Beam, Outside
@@ -18,6 +17,7 @@ from skidpad.sensors.finish.outline import MOST, spans
 from skidpad.sensors.raster.view import camera_view
 from skidpad.sensors.scene.materials import Material
 from skidpad.sensors.suite import PixelSettings, PixelSuite
+from support.sensors.worlds import states_at, straight, table_of
 
 DRIVER = Pose(0.5, 0.0, 1.4, 0.0, 0.0, 0.0)
 SIGN = Box(SemanticClass.TRAFFIC_SIGN, 130.0, -15.0, 2.0, 0.0, 0.1, 1.5, 1.5, rgb=(200, 200, 210))

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from worlds import states_at, straight, table_of
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
@@ -11,6 +10,7 @@ from skidpad.core.vocabulary import ActorKind, SemanticClass
 from skidpad.core.weather import Weather
 from skidpad.sensors.ranging.lidar import Lidar
 from skidpad.sensors.suite import PixelSuite
+from support.sensors.worlds import states_at, straight, table_of
 
 SPEC = LidarSpec("l", Pose(0.0, 0.0, 2.4), channels=16, range=60.0, rotation_hz=20.0)
 

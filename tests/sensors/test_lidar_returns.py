@@ -5,7 +5,6 @@ from time import process_time
 
 import numpy as np
 import pytest
-from worlds import states_at, straight, table_of
 
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import LidarSpec
@@ -31,6 +30,7 @@ from skidpad.sensors.ranging.lidar_returns import (
     ReturnModel,
 )
 from skidpad.sensors.suite import PixelSuite
+from support.sensors.worlds import states_at, straight, table_of
 
 CAR, ROAD = int(SemanticClass.CAR), int(SemanticClass.ROAD)
 RAIN, FOG = Weather(precipitation=50.0), Weather(fog_density=95.0)

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from worlds import World, lanes_along, states_at, table_of
 
 from skidpad.core.vocabulary import ActorKind, SemanticClass
 from skidpad.core.weather import Weather
 from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.sensors.suite import PixelSettings, PixelSuite
+from support.sensors.worlds import World, lanes_along, states_at, table_of
 
 
 def crossing(rise=8.0):

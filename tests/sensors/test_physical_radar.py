@@ -10,7 +10,6 @@ import numba
 import numpy as np
 import pytest
 
-from runs import adas_run
 from sensors.test_objects import RADAR, world
 from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.core.states import VehicleCommand
@@ -37,6 +36,7 @@ from skidpad.sensors.physical_radar.echoes import lobe_section
 from skidpad.sensors.physical_radar.radar import PhysicalRadar
 from skidpad.sensors.physical_radar.targets import BACK, FRONT, LEFT
 from skidpad.simulation.embedded.engine import EmbeddedBackend
+from support.runs import adas_run
 
 HEAVY = Weather(precipitation=50.0)  # 25 mm/h
 TABLE = Path(__file__).parents[2] / "docs" / "radar-weather.csv"

@@ -7,7 +7,6 @@ import numba
 import numpy as np
 import pytest
 
-from runs import adas_run
 from sensors.test_objects import RADAR, world
 from sensors.test_physical_radar import measured
 from skidpad.campaign.driving.run_setup import stage_of
@@ -17,6 +16,7 @@ from skidpad.roads.roadside import Box, Roadside
 from skidpad.sensors.physical_radar import tracks as tracking
 from skidpad.sensors.physical_radar.radar import PhysicalRadar
 from skidpad.simulation.embedded.engine import EmbeddedBackend
+from support.runs import adas_run
 
 DT = 0.05
 

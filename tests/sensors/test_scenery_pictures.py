@@ -5,7 +5,6 @@ from __future__ import annotations
 import cv2
 import numpy as np
 import pytest
-from worlds import states_at, table_of
 
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import CameraSpec, Modality
@@ -23,6 +22,7 @@ from skidpad.sensors.scene.shapes import shape_levels
 from skidpad.sensors.scene.static import build_scene
 from skidpad.sensors.scene.street_light import NO_STREET_LIGHT, street_light_of
 from skidpad.sensors.suite import PixelSettings, PixelSuite
+from support.sensors.worlds import states_at, table_of
 
 EYE = Pose(0.5, 0.0, 1.5)
 

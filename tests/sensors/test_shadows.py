@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from worlds import states_at, straight, table_of
 
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import CameraSpec, Modality
@@ -11,6 +10,7 @@ from skidpad.core.weather import Weather
 from skidpad.physics.presets import preset
 from skidpad.sensors.finish.extras import NO_EXTRAS, Extra
 from skidpad.sensors.suite import PixelSettings, PixelSuite
+from support.sensors.worlds import states_at, straight, table_of
 
 # from straight above, 20 m over the road: 400 px show 2 * 20 m, so 10 px are a metre
 ABOVE = Pose(0.0, 0.0, 20.0, 0.0, np.pi / 2, 0.0)

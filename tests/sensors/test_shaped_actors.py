@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from msgspec import structs
-from worlds import states_at, straight
 
 from skidpad.core.geometry import Pose
 from skidpad.core.run import AdasDriver, Roads, RunSpec, run_from_plain
@@ -16,6 +15,7 @@ from skidpad.sensors.raster.shaped_actors import FAR, ShapedActors
 from skidpad.sensors.raster.view import camera_view
 from skidpad.sensors.scene.materials import Material
 from skidpad.sensors.suite import PixelSettings, PixelSuite
+from support.sensors.worlds import states_at, straight
 
 CAMERA = CameraSpec("rgb", Modality.RGB, 400, 300, 60.0, Pose(0.5, 0.0, 1.4))
 

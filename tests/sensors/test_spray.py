@@ -4,7 +4,6 @@ from math import exp, pi
 
 import numpy as np
 import pytest
-from worlds import states_at, straight, table_of
 
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import LidarSpec
@@ -17,6 +16,7 @@ from skidpad.sensors.ranging.clouds import THIN, SprayClouds, no_spray, spray_of
 from skidpad.sensors.ranging.lidar import Lidar
 from skidpad.sensors.ranging.lidar_returns import ReturnModel
 from skidpad.sensors.suite import PixelSuite
+from support.sensors.worlds import states_at, straight, table_of
 
 KEY = np.uint64(11)
 SPEC = LidarSpec("l", Pose(0.0, 0.0, 1.8), channels=32, range=100.0, rotation_hz=20.0,

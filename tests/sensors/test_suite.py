@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from worlds import states_at, straight, table_of, traffic
 
 from skidpad.core.errors import BackendError
 from skidpad.core.geometry import Pose
@@ -12,6 +11,7 @@ from skidpad.core.weather import Weather
 from skidpad.roads.roadside import Box
 from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.sensors.suite import PixelSettings, PixelSuite
+from support.sensors.worlds import states_at, straight, table_of, traffic
 
 LEVEL = Pose(0.0, 0.0, 1.5)
 DEPTH = CameraSpec("d", Modality.DEPTH, 160, 120, 90.0, LEVEL)

@@ -4,7 +4,6 @@ import colorsys
 
 import numpy as np
 import pytest
-from worlds import World, lanes_along, states_at, straight, table_of, traffic
 
 from skidpad.cockpit.studio import SENSOR, Looks, Studio, plane
 from skidpad.core.geometry import Pose
@@ -33,6 +32,7 @@ from skidpad.sensors.pictures.degradation import (
 from skidpad.sensors.pictures.perception_noise import PerceptionNoise
 from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.sensors.suite import PixelSettings, PixelSuite
+from support.sensors.worlds import World, lanes_along, states_at, straight, table_of, traffic
 
 SIX = ("clear-sunrise", "clear-noon", "clear-night", "rain-sunrise", "rain-noon", "rain-night")
 GREY = 110

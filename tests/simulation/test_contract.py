@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from backend_contract import CHECKS, Make
 from skidpad.simulation.embedded.engine import EmbeddedBackend
+from support.backend_contract import CHECKS, Make
 
 
 @pytest.mark.req("L-4")

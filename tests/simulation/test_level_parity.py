@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from runs import adas_run
 from skidpad.campaign.driving.loop import Moment, Sink
 from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.campaign.runs.run import run
@@ -18,6 +17,7 @@ from skidpad.core.states import StackReport
 from skidpad.core.vocabulary import DetectionStatus, SensorLevel, Supervision, Tier
 from skidpad.simulation.sensing import Objects
 from skidpad.stack.adas import AdasStack
+from support.runs import adas_run
 
 SEEING = (DetectionStatus.FUSION_DETECT, DetectionStatus.FUSION_PERSIST)
 TO_A_LEAD = frozenset(

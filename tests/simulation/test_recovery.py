@@ -32,7 +32,7 @@ from skidpad.simulation.recovery import (
     RecoverySettings,
     Supervisor,
 )
-from stadium import WIDTH, stadium
+from support.stadium import WIDTH, stadium
 
 MAP = load_map("figure8")
 assert MAP.ego_start is not None

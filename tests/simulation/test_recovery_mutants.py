@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from guards import Guard, survivors_of
+from support.guards import Guard, survivors_of
 
 RECOVERY, METRICS = "simulation/test_recovery.py", "evidence/drive/test_metrics.py"
 MANNER = "evidence/drive/test_manner.py"

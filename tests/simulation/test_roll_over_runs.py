@@ -7,8 +7,6 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-import makelog
-from runs import adas_run
 from skidpad.campaign.driving.run_setup import Stage, stage_of
 from skidpad.campaign.runs.run import outcome_of
 from skidpad.core.settings import Settings
@@ -17,6 +15,8 @@ from skidpad.core.vocabulary import Outcome
 from skidpad.evidence.grip.scores import grip_metrics
 from skidpad.recording.run.events import RolledOver, decode_events, encode_events
 from skidpad.simulation.embedded.engine import EmbeddedBackend
+from support import makelog
+from support.runs import adas_run
 
 
 def test_the_world_tells_a_roll_over_once_and_a_new_place_ends_it() -> None:

@@ -5,7 +5,6 @@ from functools import partial
 
 import pytest
 
-from runs import template
 from skidpad.campaign.driving.loop import Sink
 from skidpad.campaign.runs.run import run
 from skidpad.core.errors import ConfigError
@@ -15,6 +14,7 @@ from skidpad.core.specs import PointSensorSpec
 from skidpad.core.vocabulary import Outcome
 from skidpad.stack.configurations import parse_functions
 from skidpad.stack.functions import FUNCTIONS, AddedFunctions, FunctionType
+from support.runs import template
 
 OWN = frozenset({Function.ACC, Function.LCA})
 

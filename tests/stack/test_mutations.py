@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from guards import Guard, module_of, run, survivors_of
+from support.guards import Guard, module_of, run, survivors_of
 
 TIERS, DETAILS = "stack/control/test_tiers.py", "stack/control/test_tier_details.py"
 CAPS, FUSION = "stack/control/test_lateral_and_caps.py", "stack/perception/test_fusion.py"

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from runs import adas_run
 from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.core.setup import ActorSetup
 from skidpad.core.states import VehicleCommand, WorldTruth
@@ -17,6 +16,7 @@ from skidpad.core.vocabulary import Control, SensorLevel
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.stack.adas import AdasStack
+from support.runs import adas_run
 
 AHEAD = 100.0  # m: room to reach the cruise speed before the obstacle is seen
 SEEN_BY_THE_PUBLISHED_STACK = ["mini_cooper_s"]

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from stackfakes import LANE_WIDTH, RED, SPECS, ArcMap, Car, draw, ego_at, frame
 
 import skidpad.stack
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import Supervision, Tier
 from skidpad.stack.adas import AdasStack
+from support.stackfakes import LANE_WIDTH, RED, SPECS, ArcMap, Car, draw, ego_at, frame
 
 approx = pytest.approx
 EMERGENCIES = {Tier.HARD_STOP, Tier.STOPPED_TOO_CLOSE, Tier.EMERGENCY}

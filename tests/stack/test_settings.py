@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from stackfakes import SPECS, ArcMap, frame
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app, main
@@ -30,6 +29,7 @@ from skidpad.core.vocabulary import GripModel
 from skidpad.stack.adas import AdasConfig
 from skidpad.stack.configurations import functions_of, parse_functions
 from skidpad.stack.loading import GuardedStack, load_stack
+from support.stackfakes import SPECS, ArcMap, frame
 
 RUNNER = CliRunner()
 

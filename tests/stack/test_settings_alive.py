@@ -11,21 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from stackfakes import (
-    BUMPER_DEPTH,
-    LANE_WIDTH,
-    RED,
-    ROOF_DEPTH,
-    SPECS,
-    ArcMap,
-    Car,
-    as_segments,
-    ego_at,
-    frame,
-)
 
-import makelog
-from runs import adas_run
 from skidpad.campaign.driving.run_setup import recovery_settings, stage_of
 from skidpad.campaign.recipes.matrix import metric_settings
 from skidpad.campaign.runs.run import run
@@ -44,6 +30,20 @@ from skidpad.roads.queries import RoadMap
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.simulation.recovery import Supervisor
 from skidpad.stack.adas import AdasStack
+from support import makelog
+from support.runs import adas_run
+from support.stackfakes import (
+    BUMPER_DEPTH,
+    LANE_WIDTH,
+    RED,
+    ROOF_DEPTH,
+    SPECS,
+    ArcMap,
+    Car,
+    as_segments,
+    ego_at,
+    frame,
+)
 
 Outcome = Callable[[Settings], Any]
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from stackfakes import SPECS, ArcMap, Car, ego_at, frame
 
 from skidpad.core.vocabulary import DetectionStatus, Tier
 from skidpad.stack.adas import AdasStack
+from support.stackfakes import SPECS, ArcMap, Car, ego_at, frame
 
 
 def drive(stack, level, n=80, v=20.0, v_lead=10.0, gap=40.0, **options):

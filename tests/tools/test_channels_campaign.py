@@ -9,10 +9,10 @@ import pytest
 
 import channels_campaign as campaign
 import channels_tables as tables
-from channel_worlds import Eyes, World, drive
 from skidpad.evidence.channels.judging.evaluation import Evaluation
 from skidpad.evidence.channels.judging.segments import judge
 from skidpad.recording.channels.cycles import cycles
+from support.channel_worlds import Eyes, World, drive
 
 EYES = (Eyes("a", 0.02), Eyes("b", 0.02, blind=(0,)))
 

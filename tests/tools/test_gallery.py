@@ -8,9 +8,9 @@ import shutil
 import pytest
 from typer.main import get_command
 
-from chromium import CHROMIUM, FLAGS
 from gallery import CSS, DATA, ROOT, gallery_page, make, player, read_list, words_of
 from skidpad.cli.main import app
+from support.chromium import CHROMIUM, FLAGS
 
 ENTRIES = read_list()
 MOST_BYTES = 3_000_000

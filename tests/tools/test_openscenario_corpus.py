@@ -5,10 +5,10 @@ from __future__ import annotations
 import sys
 
 import pytest
-from tests.scenarios.files import event as happens
-from tests.scenarios.files import private, speed, story, time, to, write
 
 import openscenario_corpus as corpus
+from support.scenarios.files import event as happens
+from support.scenarios.files import private, speed, story, time, to, write
 
 GOOD = {"end": 2.0}
 REFUSED = {"stories": story(happens("e", private(speed(to(4))), time(1.0)), actor="nobody")}

@@ -15,7 +15,6 @@ from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import maximum_bipartite_matching
 
-from channel_worlds import frame
 from skidpad.core.errors import ConfigError
 from skidpad.evidence.channels.frames import usable
 from skidpad.evidence.channels.indicators import comfort, prediction, similarity
@@ -32,6 +31,7 @@ from skidpad.evidence.channels.indicators.comfort import Form
 from skidpad.evidence.channels.indicators.layout import IndicatorReadings
 from skidpad.evidence.channels.indicators.panel import IndicatorPanel
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
+from support.channel_worlds import frame
 
 coordinates = st.floats(-1e3, 1e3)
 angles = st.floats(-10.0, 10.0)

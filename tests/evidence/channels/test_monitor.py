@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from channel_worlds import Eyes, Listed, World, drive, frame, traffic, truth
 from skidpad.core.channels import Context, Cycle
 from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import HazardType
@@ -22,6 +21,7 @@ from skidpad.evidence.channels.recorder import WORLD_LIMIT
 from skidpad.evidence.channels.timefilter import TimeFilter
 from skidpad.recording.channels.cycles import cycles
 from skidpad.recording.channels.mcap_files import ChannelWriter, McapRecording
+from support.channel_worlds import Eyes, Listed, World, drive, frame, traffic, truth
 
 NAN = float("nan")
 FOLLOWER = (-30.0, 0, 0, 16.5, 0)  # 4.8 m and 3.2 s from a collision after 13.8 s

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import affinity
 
-from channel_worlds import CAR, frame
 from skidpad.evidence.channels.risk import (
     HORIZON,
     MISS_MOST,
@@ -21,6 +20,7 @@ from skidpad.evidence.channels.risk import (
     risk_matrix,
     safety_scores,
 )
+from support.channel_worlds import CAR, frame
 
 EGO = (0.0, 0.0, 0.0, 10.0, 0.0)
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from channel_worlds import Listed, frame
-from runs import segment_run
 from skidpad.campaign.channels.drive import drive_segment
 from skidpad.cli.runs.shadow import channel_lines
 from skidpad.core.channels import Decision
@@ -14,6 +12,8 @@ from skidpad.core.errors import ConfigError
 from skidpad.evidence.channels.shadow import planned_braking, plans_of
 from skidpad.evidence.shadow import partings, share_apart
 from skidpad.recording.channels.cycles import cycles
+from support.channel_worlds import Listed, frame
+from support.runs import segment_run
 
 TIMES = np.arange(16) * 0.2
 

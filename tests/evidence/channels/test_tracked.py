@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from channel_worlds import Eyes, World, drive, frame
 from skidpad.core.channels import Cycle
 from skidpad.core.constants import G
 from skidpad.core.errors import ConfigError
@@ -20,6 +19,7 @@ from skidpad.evidence.channels.tracked.grip import OwnGrip, planned_acceleration
 from skidpad.evidence.channels.tracked.tracks import Lookout, Tracks
 from skidpad.evidence.channels.tracked.vote import CHI2_LIMIT, Tracked, parting
 from skidpad.recording.channels.cycles import cycles
+from support.channel_worlds import Eyes, World, drive, frame
 
 TAILGATED, TAILGATING = HazardType.EGO_TAILGATED, HazardType.EGO_TAILGATING
 LOCALISATION, UNSEEN = HazardType.INCONSISTENT_LOCALISATION, HazardType.UNSEEN_BY_A_CHANNEL

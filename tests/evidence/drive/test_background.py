@@ -9,11 +9,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-import makelog
 from skidpad.core.states import ContactEvent, TrafficContact
 from skidpad.evidence.drive.background import UNSEEN, background
 from skidpad.recording.run.events import MovedOn, PutBack, RolledOver
 from skidpad.recording.run.log import RunLog
+from support import makelog
 
 TICKS = 1000  # 50 s
 

@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from makelog import DT, drive, pose
 from skidpad.core.states import ContactEvent, StackReport
 from skidpad.core.vocabulary import RelocationReason, Supervision, Tier
 from skidpad.evidence.drive import manner
 from skidpad.recording.run.events import Relocation
 from skidpad.recording.run.log import RunLog
+from support.makelog import DT, drive, pose
 
 
 def tiers(*stretches: tuple[Tier, int], throttle: float = 0.5, far: float = 100.0) -> RunLog:

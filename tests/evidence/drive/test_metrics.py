@@ -11,8 +11,6 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from makelog import DT, drive, pose
-from makemap import Lane, TestMap, line, ring_map, straight_map
 from skidpad.core.geometry import footprint
 from skidpad.core.states import ContactEvent, LaneInvasion, StackReport
 from skidpad.core.vocabulary import DetectionStatus, RelocationReason, Supervision, Tier
@@ -27,6 +25,8 @@ from skidpad.recording.run.events import Relocation
 from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.log_files import read_log, write_log
 from skidpad.recording.run.ticks import TickLog
+from support.makelog import DT, drive, pose
+from support.makemap import Lane, TestMap, line, ring_map, straight_map
 
 SEEN = StackReport(
     status=DetectionStatus.FUSION_DETECT, tier=Tier.ACC_HOLD, detected=True, distance=30.0

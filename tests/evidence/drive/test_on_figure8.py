@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from makelog import drive
 from skidpad.core.states import StackReport
 from skidpad.core.vocabulary import DetectionStatus
 from skidpad.evidence.drive.lanematch import DRIVEN, LaneIndex
@@ -13,6 +12,7 @@ from skidpad.evidence.drive.metrics import run_metrics
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import LanePoint, RoadMap
+from support.makelog import drive
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from makelog import DT, actor_table, drive, pose
-from makemap import straight_map
 from skidpad.core.states import ContactEvent
 from skidpad.core.vocabulary import ActorKind, RelocationReason, Supervision
 from skidpad.evidence.drive.metrics import run_metrics, weather_metrics
@@ -17,6 +15,8 @@ from skidpad.evidence.drive.severity import Contact, Measure, Severity, graded_c
 from skidpad.recording.campaign.matrix import Metrics
 from skidpad.recording.run.events import Relocation
 from skidpad.recording.run.log import RunLog
+from support.makelog import DT, actor_table, drive, pose
+from support.makemap import straight_map
 
 KMH = 3.6
 TICK = 10

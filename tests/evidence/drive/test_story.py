@@ -8,8 +8,6 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from makelog import DT, actor_table, drive, pose
-from makemap import WIDTH, straight_map
 from skidpad.core.states import ContactEvent, StackReport
 from skidpad.core.vocabulary import (
     ActorKind,
@@ -23,6 +21,8 @@ from skidpad.evidence.drive.prepared import Drive, prepare
 from skidpad.evidence.drive.story import Arrival, Story, tell_story
 from skidpad.recording.run.events import Relocation
 from skidpad.recording.run.log import RunLog
+from support.makelog import DT, actor_table, drive, pose
+from support.makemap import WIDTH, straight_map
 
 HIT = 100  # tick of the contact
 V, LENGTH = 20.0, 4.0

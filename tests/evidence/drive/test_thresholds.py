@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
-from makelog import DT, drive
-from makemap import ring_map, straight_map
 from skidpad.core.states import ContactEvent, LaneInvasion, StackReport
 from skidpad.core.vocabulary import DetectionStatus, Supervision, Tier
 from skidpad.evidence.drive.collisions import Crash, find_crashes
 from skidpad.evidence.drive.metrics import count_invasions, run_metrics
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.recording.campaign.matrix import Metrics
+from support.makelog import DT, drive
+from support.makemap import ring_map, straight_map
 
 SEEN = StackReport(
     status=DetectionStatus.FUSION_DETECT, tier=Tier.ACC_HOLD, detected=True, distance=10.0

@@ -7,7 +7,6 @@ import pytest
 from shapely.affinity import rotate, translate
 from shapely.geometry import box
 
-from makelog import DT, drive
 from skidpad.core.states import ContactEvent
 from skidpad.core.vocabulary import Outcome
 from skidpad.evidence.grip.scores import (
@@ -21,6 +20,7 @@ from skidpad.evidence.grip.scores import (
 )
 from skidpad.evidence.grip.study import METRICS, CellSeries, delays, distances
 from skidpad.recording.campaign.grip import COLUMNS
+from support.makelog import DT, drive
 
 
 def going(x=0.0, y=0.0, v=10.0, yaw=0.0, vy=0.0):

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from carla_programs import run_program
 from skidpad.simulation.carla_server.process import ServerProcess
+from support.carla_programs import run_program
 
 BARE = (
     "--scenery",

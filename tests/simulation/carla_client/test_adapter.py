@@ -15,15 +15,15 @@ import polars as pl
 import pytest
 from msgspec.structs import replace
 
-from backend_contract import CHECKS
-from carla_programs import HERE, environment
-from runs import adas_run
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.recipes.matrix import RECIPE
 from skidpad.campaign.workers.pool import local
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.recording.campaign.matrix import MatrixEntry
 from skidpad.simulation.carla_server.process import ServerProcess
+from support.backend_contract import CHECKS
+from support.carla_programs import HERE, environment
+from support.runs import adas_run
 
 pytest.importorskip("carla")
 Serve = Callable[..., ServerProcess]
@@ -34,7 +34,7 @@ LIMIT = 600.0  # s
 
 @pytest.fixture(scope="module")
 def verdicts(serve: Serve) -> dict[str, str]:
-    from carla_programs import run_program
+    from support.carla_programs import run_program
 
     failed: dict[str, str] = run_program("contract_on_carla", serve("--mu-ref", "0.9").port)
     return failed

@@ -12,7 +12,6 @@ import numpy as np
 import polars as pl
 import pytest
 
-from carla_programs import environment
 from skidpad.core.channels import ChannelFrame, TruthFrame
 from skidpad.recording.channels.drives import read_outcomes
 from skidpad.recording.channels.mcap_files import McapRecording
@@ -20,6 +19,7 @@ from skidpad.recording.run.log_files import read_log
 from skidpad.recording.sources import recordings_below
 from skidpad.scenarios.shipped import FOLDER
 from skidpad.simulation.carla_server.process import ServerProcess
+from support.carla_programs import environment
 
 pytest.importorskip("carla")
 Serve = Callable[..., ServerProcess]

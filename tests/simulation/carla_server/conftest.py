@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from carla_preface import PREFACE
 from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.process import ServerProcess
 from skidpad.simulation.carla_server.protocol.streams import StreamHub
 from skidpad.simulation.carla_server.served import Served
+from support.carla_preface import PREFACE
 
 CLIENT_LIMIT = 600.0  # s
 

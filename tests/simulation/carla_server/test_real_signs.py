@@ -8,12 +8,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from mutated_server import MUTANTS
 
-from carla_preface import PREFACE
+from support.carla.mutated_server import MUTANTS
+from support.carla_preface import PREFACE
 
 pytest.importorskip("carla")
-HERE = Path(__file__).parent
+MUTATED = Path(__file__).parents[2] / "support" / "carla" / "mutated_server.py"
 READY = re.compile(r"ready: CARLA \S+ on \S+:(\d+)")
 LIMIT = 600.0  # s
 
@@ -106,7 +106,7 @@ def caught(mutant: str) -> str:
     server = subprocess.Popen(
         [
             sys.executable,
-            str(HERE / "mutated_server.py"),
+            str(MUTATED),
             mutant,
             "--port",
             "0",

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from friction_rule import FRICTION_RULE
 
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.geometry import Pose
@@ -19,6 +18,7 @@ from skidpad.roads.bundled import FOLDER
 from skidpad.roads.opendrive.materials import read_materials
 from skidpad.simulation.world.patches import FrictionZone
 from skidpad.simulation.world.stage import build_world
+from support.friction_rule import FRICTION_RULE
 
 V, MU, MATERIAL, SCALE, SHARE, THIN, OTHER = 20.0, 0.7, 0.6, 0.8, 0.5, 0.3, 0.45
 TYRES, WET, DEEP = "summer_4mm", Weather(wetness=100.0), 1.5

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from runs import segment_run
 from skidpad.campaign.channels.world import segment_of
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import LightState
@@ -13,6 +12,7 @@ from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.simulation.world.lights import Lights
 from skidpad.simulation.world.traffic.manager import priority_of
 from skidpad.simulation.world.traffic.priority import STOP, YIELD
+from support.runs import segment_run
 
 TOWN = load_map("town")
 

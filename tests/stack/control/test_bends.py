@@ -7,7 +7,6 @@ from math import inf
 import pytest
 from hypothesis import given
 from hypothesis.strategies import floats
-from stackfakes import SPECS, ArcMap, ego_at, frame
 
 from skidpad.campaign.runs.run import run
 from skidpad.core.run import AdasDriver, Function, Roads, RunSpec
@@ -16,6 +15,7 @@ from skidpad.roads.bundled import load_map
 from skidpad.stack.adas import AdasStack
 from skidpad.stack.control.bends import BendSpeed, bend_speed, slow_for_bend, speed_before
 from skidpad.stack.control.tiers import Request
+from support.stackfakes import SPECS, ArcMap, ego_at, frame
 
 
 def test_speeds_by_hand() -> None:

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from stackfakes import LANE_WIDTH, RED, SPECS, ArcMap, Car, ego_at, frame
 
 from skidpad.core.geometry import Pose
 from skidpad.core.settings import Settings
@@ -27,6 +26,7 @@ from skidpad.stack.control.steering import (
     steering_of,
 )
 from skidpad.stack.perception.lane_view import FirstBranchRoute, HighwayRoute, LaneTracker
+from support.stackfakes import LANE_WIDTH, RED, SPECS, ArcMap, Car, ego_at, frame
 
 approx = pytest.approx
 

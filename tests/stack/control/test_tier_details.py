@@ -8,7 +8,6 @@ from math import sqrt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from stackfakes import GREEN, RED, SPECS, ArcMap, Car, ego_at, frame
 
 from skidpad.core.settings import Settings
 from skidpad.core.stack_settings import StackSettings
@@ -24,6 +23,7 @@ from skidpad.stack.configurations import (
 from skidpad.stack.control.pid import DISTANCE_GAINS, SPEED_GAINS, Pid
 from skidpad.stack.control.text import LABELS, mode_text
 from skidpad.stack.control.tiers import Hierarchy, Lead, Request, Situation, time_gap, zones
+from support.stackfakes import GREEN, RED, SPECS, ArcMap, Car, ego_at, frame
 
 approx = pytest.approx
 

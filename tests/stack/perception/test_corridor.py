@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from stackfakes import BUMPER_SEMANTIC, ROOF_SEMANTIC, ArcMap, Car, draw
 
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import SemanticClass
@@ -26,6 +25,7 @@ from skidpad.stack.perception.corridor import (
 )
 from skidpad.stack.perception.fusion import bumper_corridor, roof_corridor
 from skidpad.stack.perception.lane_view import FirstBranchRoute, HighwayRoute, LaneTracker
+from support.stackfakes import BUMPER_SEMANTIC, ROOF_SEMANTIC, ArcMap, Car, draw
 
 approx = pytest.approx
 CAR = int(SemanticClass.CAR)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from stackfakes import BUMPER_DEPTH, BUMPER_SEMANTIC, ROOF_DEPTH, ROOF_SEMANTIC, SPECS, Car, frame
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import CameraImage
@@ -22,6 +21,15 @@ from skidpad.stack.perception.fusion import (
     camera_pair,
     fuse,
     roof_corridor,
+)
+from support.stackfakes import (
+    BUMPER_DEPTH,
+    BUMPER_SEMANTIC,
+    ROOF_DEPTH,
+    ROOF_SEMANTIC,
+    SPECS,
+    Car,
+    frame,
 )
 
 approx = pytest.approx

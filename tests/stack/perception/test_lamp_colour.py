@@ -7,11 +7,11 @@ import colorsys
 import cv2
 import numpy as np
 import pytest
-from stackfakes import GREEN, RED, SPECS, YELLOW, ArcMap, ego_at, frame
 
 from skidpad.core.frames import CameraImage
 from skidpad.stack.adas import AdasStack
 from skidpad.stack.perception.hsv import detect_lamp
+from support.stackfakes import GREEN, RED, SPECS, YELLOW, ArcMap, ego_at, frame
 
 SKY = (96, 110, 120)
 

@@ -6,7 +6,6 @@ from math import hypot
 
 import numpy as np
 import pytest
-from stackfakes import GREEN, RED, SPECS, YELLOW, ArcMap, ego_at, frame
 
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import LightSource, LightState
@@ -22,6 +21,7 @@ from skidpad.stack.perception.lights import (
     StopRequest,
     scan_distance,
 )
+from support.stackfakes import GREEN, RED, SPECS, YELLOW, ArcMap, ego_at, frame
 
 approx = pytest.approx
 ONE = ((7, 0, 300.0),)  # light 7 governs the rightmost lane at s 300 m

@@ -7,7 +7,6 @@ import time
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from stackfakes import SPECS, ArcMap, Car, ego_at, frame
 
 from skidpad.core.stack_settings import RadarCloseCheck
 from skidpad.core.vocabulary import DetectionStatus, Tier
@@ -15,6 +14,7 @@ from skidpad.stack.adas import AdasStack
 from skidpad.stack.perception.fusion import MedianFilter
 from skidpad.stack.perception.persistence import NOTHING_DETECTED, Persistence
 from skidpad.stack.perception.radar import NO_RADAR, RadarReading
+from support.stackfakes import SPECS, ArcMap, Car, ego_at, frame
 
 approx = pytest.approx
 NO, SEEN, HELD, RADAR, SAFE = (

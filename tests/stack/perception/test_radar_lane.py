@@ -6,7 +6,6 @@ from math import cos, radians, sin
 
 import numpy as np
 import pytest
-from stackfakes import LANE_WIDTH, SPECS, ArcMap, Car, ego_at, frame, radar_points
 
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import DetectionStatus
@@ -24,6 +23,7 @@ from skidpad.stack.perception.radar import (
     Radar,
     velocity_limit,
 )
+from support.stackfakes import LANE_WIDTH, SPECS, ArcMap, Car, ego_at, frame, radar_points
 
 approx = pytest.approx
 STRAIGHT = LaneView(None, None, 0.0, 0.0)

@@ -3,7 +3,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from channel_worlds import Eyes, World, drive
 from skidpad.core.errors import FileError
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels import identifier
@@ -30,6 +29,7 @@ from skidpad.evidence.channels.judging.segments import judge
 from skidpad.evidence.channels.matching import Span
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
 from skidpad.recording.channels.cycles import cycles
+from support.channel_worlds import Eyes, World, drive
 
 TAILGATED = HazardType.EGO_TAILGATED
 

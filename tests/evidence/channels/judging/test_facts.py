@@ -4,7 +4,6 @@ import numpy as np
 import polars as pl
 import pytest
 
-from channel_worlds import Eyes, World, drive
 from skidpad.evidence.channels.judging.causes import ego_motion
 from skidpad.evidence.channels.judging.facts import (
     COMPARED,
@@ -15,6 +14,7 @@ from skidpad.evidence.channels.judging.facts import (
 )
 from skidpad.evidence.channels.monitor import Monitor
 from skidpad.recording.channels.cycles import cycles
+from support.channel_worlds import Eyes, World, drive
 
 
 def facts(world, eyes, seconds=12.0, change=None):

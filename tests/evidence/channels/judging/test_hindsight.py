@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from channel_worlds import Eyes, World, drive
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.judging.reference import (
     NAME,
@@ -17,6 +16,7 @@ from skidpad.evidence.channels.judging.reference import (
 from skidpad.evidence.channels.judging.segments import TOLD, judge
 from skidpad.evidence.channels.matching import tally
 from skidpad.recording.channels.cycles import cycles
+from support.channel_worlds import Eyes, World, drive
 
 TAILGATED = HazardType.EGO_TAILGATED
 LOCALISATION = HazardType.INCONSISTENT_LOCALISATION

@@ -7,12 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
-from channel_worlds import Eyes, World, drive
 from skidpad.evidence.channels.hazards import Signal
 from skidpad.evidence.channels.judging.evaluation import Evaluation
 from skidpad.evidence.channels.judging.kept import code_hash, segment_bytes, segment_from
 from skidpad.evidence.channels.judging.segments import Segment, judge
 from skidpad.recording.channels.cycles import cycles
+from support.channel_worlds import Eyes, World, drive
 
 MADE_BY = {"code": "a", "curve": "gap"}
 

@@ -7,7 +7,6 @@ import json
 import numpy as np
 import pytest
 
-from channel_worlds import Eyes, World, drive
 from skidpad.core.errors import FileError
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.hazards import Profile, Signal, load_rules
@@ -26,6 +25,7 @@ from skidpad.evidence.channels.judging.truth import marks
 from skidpad.evidence.channels.matching import Span, Weighed, score, tally
 from skidpad.evidence.channels.timefilter import TimeFilter
 from skidpad.recording.channels.cycles import cycles
+from support.channel_worlds import Eyes, World, drive
 
 TAILGATED = HazardType.EGO_TAILGATED
 EYES = (Eyes("a", 0.02), Eyes("b", 0.02, blind=(0,)))

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from channel_worlds import CAR, Eyes, World, drive, frame, truth
 from skidpad.core.channels import Cycle
 from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import HazardType
@@ -36,6 +35,7 @@ from skidpad.evidence.channels.matching import (
     tally,
 )
 from skidpad.recording.channels.cycles import cycles
+from support.channel_worlds import CAR, Eyes, World, drive, frame, truth
 
 TAILGATED, TAILGATING = HazardType.EGO_TAILGATED, HazardType.EGO_TAILGATING
 LOCALISATION = HazardType.INCONSISTENT_LOCALISATION

@@ -1,1 +1,0 @@
-"""Makes `stackfakes` importable for the tests below this folder."""

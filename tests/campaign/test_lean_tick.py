@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from core.test_refcounts import counts_references
 from skidpad.campaign.runs.run import run
 from skidpad.recording.run import ticks
 from skidpad.sensors.object_level import objects
 from skidpad.simulation import recovery
 from skidpad.simulation.world import feel, step
 from skidpad.stack.perception import radar
+from support.refcounts import counts_references
 from support.runs import adas_run
 
 

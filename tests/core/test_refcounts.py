@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import gc
 import sys
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba.core.dispatcher import Dispatcher
 from numpy.typing import NDArray
 
 from skidpad.core.jit import Held, hold, inner_kernel, kernel
 from skidpad.core.refcounts import (
-    COUNTING,
-    FUNCTION,
     allocates,
-    is_runtime,
-    is_wrapper,
     without_counting,
 )
+from support.refcounts import counts_references
 
 Floats = NDArray[np.float64]
 
@@ -60,15 +56,6 @@ def double(held: Held[Pair]) -> float:
     """Allocates."""
     twice = swap(held.value).one * 2.0
     return float(twice[0]) + pick_row(held.value, 0)
-
-
-def counts_references(compiled: Any) -> bool:
-    """Whether machine code of a kernel, wrappers aside, still counts."""
-    assert isinstance(compiled, Dispatcher)
-    (result,) = compiled.overloads.values()
-    text = str(result.library._get_module_for_linking())
-    kernels = (f[0] for f in FUNCTION.finditer(text) if not is_wrapper(f[0]))
-    return any(COUNTING.search(f) for f in kernels if not is_runtime(f))
 
 
 def pair() -> Pair:

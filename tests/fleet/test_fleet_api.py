@@ -15,6 +15,7 @@ from skidpad.fleet.api.guard import Needs
 from skidpad.fleet.service import Rate
 from skidpad.fleet.unpacking import unpack
 from skidpad.fleet.words import RIGHTS, Action, Limits, Refused, Role
+from support.fleet_maker import released
 from support.fleet_world import packed, record, text_of
 
 OPEN = {"/api/v1/openapi.json"}  # describes the interface, holds no record
@@ -72,15 +73,6 @@ def others(world) -> tuple[str, str, str]:
     assert world.send("red-2", more).status_code == 200
     world.post("axle", "/api/v1/analyses")
     return alert, order, world.get("axle", "/api/v1/clusters").json()[0]["id"]
-
-
-def released(world, folder, hazard: str) -> tuple[str, str]:
-    """A change of the red vehicles' maker, and its release."""
-    from test_fleet_updates import CONTENT, NAME, Maker
-
-    maker = Maker(world, folder)
-    change = maker.change(CONTENT, [hazard]).json()["change"]
-    return change, maker.release(change, maker.signed(NAME, CONTENT)).json()["release"]
 
 
 @pytest.mark.req("C-195")

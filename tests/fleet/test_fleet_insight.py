@@ -28,14 +28,9 @@ from skidpad.fleet.service import Places, open_fleet
 from skidpad.fleet.site.drawing import KINDS
 from skidpad.fleet.store.accounts import add_vehicle
 from skidpad.fleet.warehouse import MANY_VEHICLES, TAKE, Warehouse
-from support.fleet_world import NOW, World, make_world, packed, record
+from support.fleet_world import NOW, World, indicator_row, make_world, packed, record
 
 DRAWS = 2000
-
-
-def row(minute=0, violated=0, n=600, indicator="ego_location_similarity", mean=0.9) -> dict:
-    return {"minute": minute, "subject": "a+b", "indicator": indicator, "n": n,
-            "violated": violated, "mean": mean, "least": 0.1, "greatest": 1.0}  # fmt: skip
 
 
 def send_rows(world: World, vehicle: str, key: str, *rows: dict) -> None:
@@ -45,9 +40,9 @@ def send_rows(world: World, vehicle: str, key: str, *rows: dict) -> None:
 
 @pytest.mark.req("C-194")
 def test_trends_hold_what_was_sent_and_no_more_than_ones_own(world):
-    send_rows(world, "red-1", "key-aaaa-1", row(0, 60), row(1, 0, mean=0.5))
-    send_rows(world, "red-2", "key-aaaa-2", row(0, 240))
-    send_rows(world, "blue-1", "key-aaaa-3", row(0, 600))
+    send_rows(world, "red-1", "key-aaaa-1", indicator_row(0, 60), indicator_row(1, 0, mean=0.5))
+    send_rows(world, "red-2", "key-aaaa-2", indicator_row(0, 240))
+    send_rows(world, "blue-1", "key-aaaa-3", indicator_row(0, 600))
     assert compact(world.fleet) == 3
     assert compact(world.fleet) == 0
     (trend,) = world.get("red operator", "/api/v1/trends").json()["indicators"]
@@ -58,7 +53,7 @@ def test_trends_hold_what_was_sent_and_no_more_than_ones_own(world):
     (blue,) = world.get("bolt", "/api/v1/trends").json()["indicators"]
     assert blue["share"] == 1.0
     world.clock.now += 3 * 86400.0
-    send_rows(world, "red-1", "key-aaaa-4", row(0, 0))
+    send_rows(world, "red-1", "key-aaaa-4", indicator_row(0, 0))
     later = world.get("axle", "/api/v1/trends").json()["indicators"]
     assert [t["share"] for t in later] == [300 / 1800, 0.0]
 
@@ -86,7 +81,7 @@ def test_every_vehicle_is_told_of_where_they_are_few_and_only_there(lite):
 
 
 def test_a_kill_while_batches_are_summed_up_counts_nothing_twice(lite, monkeypatch):
-    send_rows(lite, "red-1", "key-aaaa-1", row(0, 60))
+    send_rows(lite, "red-1", "key-aaaa-1", indicator_row(0, 60))
     monkeypatch.setattr("skidpad.fleet.warehouse.TAKE", TAKE + "; SELECT error('killed')")
     with pytest.raises(duckdb.Error):
         compact(lite.fleet)
@@ -97,7 +92,7 @@ def test_a_kill_while_batches_are_summed_up_counts_nothing_twice(lite, monkeypat
 
 def test_without_its_file_the_trends_are_made_again(tmp_path):
     with closing(make_world(tmp_path / "data", None)) as one:
-        send_rows(one, "red-1", "key-aaaa-1", row(0, 60))
+        send_rows(one, "red-1", "key-aaaa-1", indicator_row(0, 60))
         before = one.get("axle", "/api/v1/trends").json()
     (tmp_path / "data" / "trends.duckdb").unlink()
     with closing(open_fleet(Places(data=tmp_path / "data"))) as fleet:
@@ -129,10 +124,10 @@ def test_a_damaged_or_taken_file_of_trends_is_one_sentence(tmp_path):
 
 def test_a_batch_from_before_the_clock_went_back_is_found_at_the_next_start(tmp_path):
     with closing(make_world(tmp_path / "data", None)) as one:
-        send_rows(one, "red-1", "key-aaaa-1", row(0, 60))
+        send_rows(one, "red-1", "key-aaaa-1", indicator_row(0, 60))
         assert compact(one.fleet) == 1
         one.clock.now -= 10 * 86400.0
-        send_rows(one, "red-1", "key-aaaa-2", row(0, 60))
+        send_rows(one, "red-1", "key-aaaa-2", indicator_row(0, 60))
         assert compact(one.fleet) == 0
     with closing(open_fleet(Places(data=tmp_path / "data"))) as fleet:
         assert compact(fleet) == 1
@@ -363,7 +358,10 @@ def test_who_knows_all_vehicles_but_one_learns_at_a_step_only_and_nothing_from_a
     assert len(sure) == 18  # of 48, as docs/fleet.md tells
 
 
-HALF = row(0, 300), row(0, 0, indicator="object_location_similarity")  # of 600 cycles each
+HALF = (
+    indicator_row(0, 300),
+    indicator_row(0, 0, indicator="object_location_similarity"),
+)  # of 600 cycles each
 
 
 def test_the_safety_case_says_what_is_known_and_how_sure(lite):
@@ -380,7 +378,10 @@ def test_the_safety_case_says_what_is_known_and_how_sure(lite):
 def test_eight_vehicles_that_nearly_agree_challenge_a_claim(tmp_path):
     with crowd(tmp_path, 8) as many:
         for k in range(8):
-            rows = row(0, 300 + k), row(0, 0, indicator="object_location_similarity")
+            rows = (
+                indicator_row(0, 300 + k),
+                indicator_row(0, 0, indicator="object_location_similarity"),
+            )
             send_rows(many, f"car-{k}", f"car-key-{k}", *rows)
         found = {c["id"]: c for c in many.get("axle", "/api/v1/safety-case").json()}
         assert (found["S1"]["verdict"], found["S4"]["verdict"]) == ("challenged", "open")
@@ -406,7 +407,7 @@ def test_an_interval_over_vehicles_holds_the_share_that_they_were_drawn_with():
 def test_nothing_seen_in_few_vehicles_is_no_proof(tmp_path):
     with crowd(tmp_path, 7) as many:
         for k in range(7):
-            send_rows(many, f"car-{k}", f"car-key-{k}", row(0, 0))
+            send_rows(many, f"car-{k}", f"car-key-{k}", indicator_row(0, 0))
         (trend,) = many.get("axle", "/api/v1/trends").json()["indicators"]
     assert trend["interval"] == [0.0, pytest.approx(1.0 - 0.025 ** (1 / 7))]
 

@@ -13,9 +13,6 @@ from pathlib import Path
 
 import httpx
 import pytest
-from test_fleet_api import released
-from test_fleet_insight import row
-from test_fleet_upload import served
 
 from skidpad.cli.fleet.links import map_lines, open_maps
 from skidpad.core.errors import FileError, InputError
@@ -26,7 +23,9 @@ from skidpad.fleet.site.build import pages_of
 from skidpad.fleet.site.login import log_in_page
 from skidpad.fleet.words import FIRST_PAGE, NOT_THERE, RIGHTS, Action, Refused
 from support.chromium import CHROMIUM, FLAGS
-from support.fleet_world import make_world, packed, record
+from support.fleet_maker import released
+from support.fleet_server import start_fleet
+from support.fleet_world import indicator_row, make_world, packed, record
 from support.stadium import RADIUS, STRAIGHT, WIDTH, written
 
 WAIT_MS = 120_000
@@ -77,7 +76,7 @@ def filled(data: Path) -> dict[str, str]:
         name = ("red-1", "red-2", "blue-1")[k]
         hazards = [record(10 * k + i, (120.0 + i, 30.0)) for i in range(3)]
         assert world.send(name, packed(*hazards), f"batch-key-{k}").status_code == 200
-        rows = gzip.compress(json.dumps(row(0, 200 + 20 * k)).encode())
+        rows = gzip.compress(json.dumps(indicator_row(0, 200 + 20 * k)).encode())
         assert world.send(name, rows, f"rows-key-{k}", "indicators").status_code == 200
     world.post("red operator", "/api/v1/analyses")
     tokens = {name: account.token for name, account in world.accounts.items()}
@@ -131,7 +130,7 @@ def test_every_page_for_every_role_and_foreign_id(tmp_path):
     shown = {"/": RED, "/replay/{hazard}": RED, "/alerts": RED, "/changes": name}
     pages = pages_of(None, None)  # what they read and draw is not asked for here
     assert set(shown) | {"/places", "/case", "/research", "/work"} == set(pages)
-    child, address = served(tmp_path / "data")
+    child, address = start_fleet(tmp_path / "data")
     with child:
         try:
             for path in pages:
@@ -211,7 +210,7 @@ def test_the_dashboard_draws_a_map_of_ones_own(tmp_path):
     token = world.accounts["axle"].token
     world.close()
     for words, drawn in ((), False), (("--maps", str(tmp_path / "maps")), True):
-        child, address = served(tmp_path / "data", *words)
+        child, address = start_fleet(tmp_path / "data", *words)
         with child:
             try:
                 with someone(address, token) as client:
@@ -230,7 +229,7 @@ def test_the_pages_in_a_browser(tmp_path):
         "playwright.sync_api", reason="playwright, for chromium, is not installed"
     )
     tokens = filled(tmp_path / "data")
-    child, address = served(tmp_path / "data")
+    child, address = start_fleet(tmp_path / "data")
     with child, playwright.sync_playwright() as driver:
         try:
             browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS, timeout=WAIT_MS)

@@ -6,7 +6,6 @@ import base64
 import gzip
 import io
 import json
-import time
 from contextlib import nullcontext
 from datetime import timedelta
 from pathlib import Path
@@ -14,13 +13,11 @@ from pathlib import Path
 import httpx
 import numpy as np
 import pytest
-import yaml
 from tuf.api.metadata import Metadata
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError, FileError, OutputError
-from skidpad.evidence.channels import hazards as hazards_module
 from skidpad.evidence.channels.identifier import model as model_module
 from skidpad.evidence.channels.indicators import catalogue
 from skidpad.fleet.loop import rollout
@@ -31,44 +28,8 @@ from skidpad.fleet.updates.payloads import PayloadKind, payload_name, read_paylo
 from skidpad.fleet.updates.repository import SIGNED_AT
 from skidpad.fleet.upkeep import Upkeep
 from skidpad.fleet.words import Refused
+from support.fleet_maker import CONTENT, NAME, Maker, rules
 from support.fleet_world import Clock, World, packed, record
-
-
-def rules(limit: float = 3.2) -> bytes:
-    """The practical rules with another limit of the time to collision; no anchors."""
-    table = yaml.safe_load(Path(hazards_module.__file__).with_name("hazard_rules.yaml").read_text())
-    text = json.dumps({"practical": table["practical"]})
-    assert "ttc_ahead < 3.2" in text
-    return text.replace("ttc_ahead < 3.2", f"ttc_ahead < {limit}").encode()
-
-
-class Maker:
-    """A maker's off-line keys and what it does with them, in a fleet whose clock is the real one."""
-
-    def __init__(self, world: World, folder: Path, name: str = "axle") -> None:
-        self.world, self.name = world, name
-        world.clock.now = time.time()  # python-tuf goes by the system's clock
-        self.keys = signing.make_offline_keys(folder / f"offline {name}", folder / "data")
-        tenant = world.accounts[name].principal.tenant
-        self.repository = world.fleet.repository(tenant)
-        online = signing.new_key(world.fleet.online_key(tenant))
-        self.root = signing.make_root(self.keys, online, world.clock.now)
-        first = signing.empty_targets(self.keys["targets"][:2], world.clock.now)
-        self.repository.begin(self.root, first)
-
-    def signed(self, name: str, content: bytes, signers=None) -> bytes:
-        signers = self.keys["targets"][1:] if signers is None else signers
-        current = self.repository.targets()
-        return signing.add_target(current, (name, content), {}, signers, self.world.clock.now)
-
-    def change(self, content: bytes, hazards: list[str], kind: str = "rules"):
-        text = {"kind": kind, "payload": base64.b64encode(content).decode(), "reason": "a test",
-                "hazards": hazards}  # fmt: skip
-        return self.world.post(self.name, "/api/v1/changes", content=json.dumps(text))
-
-    def release(self, change: str, targets: bytes, **plan):
-        text = {"change": change, "targets": base64.b64encode(targets).decode(), "plan": plan}
-        return self.world.post(self.name, "/api/v1/releases", content=json.dumps(text))
 
 
 class Car:
@@ -85,9 +46,6 @@ class Car:
 @pytest.fixture
 def maker(lite, tmp_path) -> Maker:
     return Maker(lite, tmp_path)
-
-
-NAME, CONTENT = payload_name(PayloadKind.RULES, rules()), rules()
 
 
 def test_a_signed_update_arrives_as_it_was(maker, tmp_path):

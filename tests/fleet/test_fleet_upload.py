@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -28,6 +27,7 @@ from skidpad.fleet.words import Kind
 from skidpad.recording.channels.indicators import Column, IndicatorLog
 from skidpad.recording.channels.monitored import write_summary
 from skidpad.recording.hazards.records import HazardWriter
+from support.fleet_server import start_fleet
 from support.fleet_world import record
 
 RUN = CliRunner()
@@ -189,17 +189,6 @@ def test_a_killed_vehicle_keeps_what_it_had_spooled(tmp_path):
     assert not list(spool.waiting.glob("*.damaged"))
 
 
-def served(data: Path, *words: str) -> tuple[subprocess.Popen, str]:
-    """`skidpad fleet serve` as a process, and its address once it says it."""
-    child = subprocess.Popen(
-        [sys.executable, "-m", "skidpad", "fleet", "serve", "--data", str(data), "--port", "0", *words],
-        stdout=subprocess.PIPE, text=True,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(p for p in sys.path if p)},
-    )  # fmt: skip
-    line = child.stdout.readline()
-    return child, re.search(r"https?://\S+", line).group(0)
-
-
 def invoke(*words: str):
     result = RUN.invoke(app, ["fleet", *words])
     assert result.exit_code == 0, (result.output, result.exception)
@@ -227,7 +216,7 @@ def test_a_server_killed_at_any_moment_keeps_what_it_acknowledged(tmp_path):
     folders = [str(monitored(tmp_path / f"m{k}", seed=k)) for k in range(6)]
     words = ("--certificate", str(tls / "server.pem"), "--key", str(tls / "server.key"))
     for first in (0, 2, 4):
-        child, address = served(data, *words)
+        child, address = start_fleet(data, *words)
         with child:
             try:
                 stranger = invoke(

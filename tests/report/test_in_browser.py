@@ -4,14 +4,14 @@ import re
 import subprocess
 
 import pytest
-from test_matrix_answers import campaign, clear_cut
-from test_page import page
 
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.report.channels.evaluation.routes import route_blocks
 from skidpad.report.elements.page import Cell, Page, Section, Table, Text, write_page
 from skidpad.report.matrix.page import write_report
 from support.chromium import CHROMIUM, FLAGS
+from support.matrix_made import campaign, clear_cut
+from support.report_page import page
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
 

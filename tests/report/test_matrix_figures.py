@@ -6,7 +6,6 @@ from html import unescape
 import numpy as np
 import polars as pl
 import pytest
-from test_matrix_report import campaign, key
 
 from skidpad.evidence.statistics import Interval, mean_limits
 from skidpad.recording.campaign.matrix import MATRIX, Metrics
@@ -27,6 +26,7 @@ from skidpad.report.matrix.tables import (
     possible_part,
 )
 from skidpad.report.published import Source, read_published
+from support.matrix_drawn import key, write_drawn_campaign
 from support.svg_values import bars, curves_of, frames, marks_of, shapes, texts
 
 CONFIGS = ("1", "2", "3", "4")
@@ -35,7 +35,7 @@ CONFIGS = ("1", "2", "3", "4")
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
     folder = tmp_path_factory.mktemp("seven")
-    campaign(folder, seeds=3)
+    write_drawn_campaign(folder, seeds=3)
     html = write_report(folder).read_text(encoding="utf-8")
     rows = pl.read_parquet(folder / "results.parquet")
     return html, rows.with_columns(crashes=pl.col("fatal_collisions"))  # no contact is graded here
@@ -110,7 +110,7 @@ def test_published_numbers_stand_in_their_own_section_with_what_differs_said_fir
 @pytest.mark.req("A-259")
 def test_two_configurations_stand_side_by_side_with_their_difference(page, tmp_path):
     _, rows = page
-    rows_of = campaign(tmp_path, seeds=3)
+    rows_of = write_drawn_campaign(tmp_path, seeds=3)
     assert len(rows_of) == len(rows)
     one, figure_one, two, _ = side_blocks(load_matrix(tmp_path))
     assert [title for title, _ in one.columns] == [

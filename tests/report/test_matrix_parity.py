@@ -3,8 +3,6 @@
 from dataclasses import replace
 
 import pytest
-from test_matrix_answers import metrics
-from test_matrix_report import key
 
 from skidpad.campaign.cells.matrix import cross, published_drivers
 from skidpad.cli.campaigns.adas_plan import on_pixels
@@ -16,6 +14,8 @@ from skidpad.recording.campaign.results import Timing
 from skidpad.report.matrix.comparisons.parity import load_parity, parity_section
 from skidpad.report.matrix.data import load_matrix
 from skidpad.report.matrix.page import build_page
+from support.matrix_drawn import key
+from support.matrix_made import metrics
 from support.runs import adas_run
 
 

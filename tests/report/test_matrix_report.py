@@ -1,12 +1,10 @@
 import re
 from dataclasses import fields
 
-import numpy as np
 import polars as pl
 import pytest
 
-from skidpad.recording.campaign.matrix import MATRIX, Metrics, RunKey
-from skidpad.recording.campaign.results import Timing
+from skidpad.recording.campaign.matrix import MATRIX, Metrics
 from skidpad.recording.files import write_parquet
 from skidpad.report.elements.tables import number
 from skidpad.report.matrix.data import (
@@ -19,74 +17,16 @@ from skidpad.report.matrix.data import (
 from skidpad.report.matrix.headline import headline_numbers, headline_tables
 from skidpad.report.matrix.page import build_page, write_report
 from skidpad.report.matrix.tables import per_weather
+from support.matrix_drawn import RATES, key, write_drawn_campaign
 
 NONE_OF_9 = f"in at most {100 * (1 - 0.05 ** (1 / 9)):.0f} % of seeds"
-RATES = {"0": 3.0, "1": 0.5, "2": 1.0, "3": 1.5, "4": 0.0}
-
-
-def key(config, weather, seed, outcome="completed", log_hash=None):
-    kind, time = weather.split("-")
-    return RunKey(
-        config=config,
-        weather=weather,
-        precipitation_kind=kind,
-        time_of_day=time,
-        seed=seed,
-        profile="recommended",
-        map="figure8",
-        sensors="objects",
-        grip="physical",
-        range="physical",
-        outcome=outcome,
-        version="0",
-        log_hash=log_hash or f"{config}{weather}{seed}",
-    )
-
-
-def campaign(folder, seeds=3, **changes):
-    rng = np.random.default_rng(1)
-    rows, timing = [], []
-    for config, rate in RATES.items():
-        for weather in WEATHERS:
-            for seed in range(1, seeds + 1):
-                n = int(rng.poisson(rate))
-                values = {
-                    "fatal_collisions": n,
-                    "collisions_vehicle": n,
-                    "crashes_vehicle": n,
-                    "road_departures": 0,
-                    "off_road": 0,
-                    "fatal_first": min(n, 1),
-                    "first_fatal_s": 400.0 / n if n else None,
-                    "collisions_static": 0,
-                    "wrong_way": 0,
-                    "contacts": n,
-                    "rear_ended": 0,
-                    "bend_exits": 0,
-                    "stuck_relocations": 0,
-                    "lane_invasions": int(rng.poisson(1)),
-                    "dropout_pct": float(rng.uniform(5, 12)),
-                    "mean_error_m": float(rng.uniform(1, 4)),
-                    "headway_variance_m2": float(rng.uniform(10, 90)),
-                    "radar_fpr_pct": 50.0,
-                    "mean_speed_kmh": float(rng.normal(50, 3)),
-                    "p95_speed_kmh": 90.0,
-                    "bend_speed_kmh": 70.0,
-                    "ttc_below_1_5_s": 3.0,
-                    "distance_km": 7.0,
-                    "duration_s": 500.0,
-                }
-                rows.append((key(config, weather, seed, **changes), Metrics(**values)))
-                timing.append(Timing(wall_s=9, cpu_s=8, rtf=55))
-    MATRIX.write(folder, rows, timing)
-    return rows
 
 
 @pytest.fixture(scope="module")
 def html(tmp_path_factory):
     """The page of a campaign of three seeds."""
     folder = tmp_path_factory.mktemp("three")
-    campaign(folder)
+    write_drawn_campaign(folder)
     return write_report(folder).read_text(encoding="utf-8")
 
 
@@ -114,7 +54,7 @@ def test_the_report_admits_which_rule_was_settled_after_results(html):
 
 
 def test_counts_in_the_matrix_are_those_of_the_results(tmp_path):
-    rows = campaign(tmp_path)
+    rows = write_drawn_campaign(tmp_path)
     matrix = load_matrix(tmp_path)
     for config in RATES:
         for weather in WEATHERS:
@@ -174,7 +114,7 @@ def test_runs_of_one_seed_are_one_unit_of_a_rate_over_all_weathers():
 
 @pytest.mark.req("A-256")
 def test_every_metric_has_its_mean_in_a_table_per_configuration_with_all_weathers(tmp_path):
-    rows = campaign(tmp_path)
+    rows = write_drawn_campaign(tmp_path)
     matrix = load_matrix(tmp_path)
     tables = per_weather(matrix)
     assert len(tables) == len(matrix.configs)
@@ -199,7 +139,7 @@ def test_every_metric_has_its_mean_in_a_table_per_configuration_with_all_weather
 
 @pytest.mark.req("R-6", "R-7")
 def test_crashes_departures_and_the_time_to_the_first_lead_the_page(tmp_path):
-    rows = campaign(tmp_path, seeds=7)
+    rows = write_drawn_campaign(tmp_path, seeds=7)
     matrix = load_matrix(tmp_path)
     hits = sum(m.crashes_vehicle for k, m in rows if k.config != "0")
     numbers = headline_numbers(matrix).items
@@ -223,7 +163,7 @@ def test_crashes_departures_and_the_time_to_the_first_lead_the_page(tmp_path):
 
 
 def test_a_cell_of_the_headline_tells_one_number_with_its_bound(tmp_path):
-    campaign(tmp_path, seeds=9)
+    write_drawn_campaign(tmp_path, seeds=9)
     matrix = load_matrix(tmp_path)
     per_run, per_100_km = headline_tables(matrix)
     assert not per_run.folded
@@ -239,7 +179,7 @@ def test_a_cell_of_the_headline_tells_one_number_with_its_bound(tmp_path):
 
 
 def test_a_campaign_of_an_older_version_can_still_be_shown(tmp_path):
-    campaign(tmp_path)
+    write_drawn_campaign(tmp_path)
     path = tmp_path / "results.parquet"
     new = ["crashes_vehicle", "road_departures", "off_road", "fatal_first", "first_fatal_s"]
     old = pl.read_parquet(path).drop(*new, "off_lanes_pct")

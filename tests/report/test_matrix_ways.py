@@ -5,12 +5,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_matrix_answers import campaign, metrics
 
 from skidpad.report.elements.figures import PALETTE
 from skidpad.report.matrix import ways as matrix_ways
 from skidpad.report.matrix.ways import broken_way, way_blocks
 from skidpad.roads.bundled import load_map
+from support.matrix_made import campaign, metrics
 from support.svg_values import texts
 
 

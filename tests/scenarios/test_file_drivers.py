@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from tests.scenarios.test_registered_names import ACTIVATE, with_controller
 
 from skidpad.campaign.driving.file_drivers import FollowingDriver
 from skidpad.campaign.driving.run_setup import load_scenario
@@ -13,6 +12,7 @@ from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.stack.reference.following import GAP_MIN
 from skidpad.stack.reference.person import person_of
 from support.scenarios.files import (
+    ACTIVATE,
     at,
     event,
     init,
@@ -24,6 +24,7 @@ from support.scenarios.files import (
     time,
     to,
     vehicle,
+    with_controller,
     write,
 )
 

@@ -6,7 +6,6 @@ from math import hypot
 from pathlib import Path
 
 import pytest
-from tests.scenarios.test_registered_names import with_controller
 
 import skidpad
 from skidpad.campaign.driving.run_setup import check_scenario
@@ -27,6 +26,7 @@ from support.scenarios.files import (
     time,
     to,
     vehicle,
+    with_controller,
     write,
 )
 

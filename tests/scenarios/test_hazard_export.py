@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
-from pathlib import Path
-
 import numpy as np
 import pytest
 from lxml import etree
@@ -14,47 +9,18 @@ from typer.testing import CliRunner
 
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError, InputError
-from skidpad.core.vocabulary import HazardType
 from skidpad.recording.channels.cycles import cycles
 from skidpad.recording.hazards.records import (
     HazardRecord,
     HazardWriter,
-    decode_record,
-    encode_record,
 )
 from skidpad.scenarios.export.hazard_export import export_hazard
 from skidpad.scenarios.export.writer import OscVersion
+from support.asam import asam_verdicts, require_asam_python
 from support.channel_worlds import Eyes, World, drive, traffic
+from support.hazard_record import a_record, unwritten
 
-CHECKER = Path(__file__).parents[1] / "support" / "scenarios" / "asam_check.py"
 JUNCTION_RULE = 1  # of two junction rules that exclude each other, one is always skipped
-
-
-def a_record(n=4, seconds=11.0, late=False, noise=0.05) -> HazardRecord:
-    eyes = (Eyes("lav", noise), Eyes("tfuse", noise, blind=(1,)))
-    worlds = [
-        c._replace(truth=None) for c in cycles(drive(World(objects=traffic(n)), eyes, seconds))
-    ]
-    if late:  # object 0 of the first channel is there from 3 s to 6 s only
-        for k, cycle in enumerate(worlds):
-            f = cycle.frames[0]
-            if 3.0 <= cycle.t <= 6.0:
-                continue
-            rest = f._replace(
-                objects=f.objects[1:], polygons=f.polygons[1:], polygon_size=f.polygon_size[1:],
-                predictions=f.predictions[1:], ids=f.ids[1:], classes=f.classes[1:],
-            )  # fmt: skip
-            worlds[k] = cycle._replace(frames=(rest, cycle.frames[1]))
-    return decode_record(encode_record(unwritten(worlds)))
-
-
-def unwritten(worlds) -> HazardRecord:
-    """A record as a monitor holds it, before it is text."""
-    return HazardRecord(
-        id="h0001", type=HazardType.EGO_TAILGATED, profile="practical", forms="corrected",
-        t_start=5.0, t_end=6.0, t_worst=5.5, count=11, extremes={}, channels=("lav", "tfuse"),
-        driving="tfuse", involved=("lav",), context={}, worlds=tuple(worlds),
-    )  # fmt: skip
 
 
 def vertices(path):
@@ -205,17 +171,12 @@ def test_export_is_repeatable(tmp_path):
 
 @pytest.mark.req("C-154", "C-156")
 def test_the_asam_checkers_find_nothing(tmp_path):
-    python = os.environ.get("SKIDPAD_ASAM_PYTHON")
-    if not python or not Path(python).exists():
-        pytest.skip("SKIDPAD_ASAM_PYTHON names no environment with the ASAM checkers")
+    require_asam_python()
     record = a_record(late=True)
-    files = [str(p) for p in export_hazard(record, tmp_path)]
+    files = export_hazard(record, tmp_path)
     old, _ = export_hazard(record, tmp_path / "old", OscVersion.V1_0)
-    done = subprocess.run(
-        [python, str(CHECKER), *files, str(old)], capture_output=True, text=True, check=True
-    )
-    verdict = json.loads(next(r for r in done.stdout.splitlines() if r.startswith("ASAM "))[5:])
-    new_xosc, xodr = (verdict[f] for f in files)
+    verdict = asam_verdicts(*files, old)
+    new_xosc, xodr = (verdict[str(f)] for f in files)
     assert new_xosc["issues"] == [] == new_xosc["skipped"]
     assert any("valid_schema" in c for c in new_xosc["completed"])
     assert xodr["issues"] == []

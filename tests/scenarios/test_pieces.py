@@ -6,7 +6,6 @@ from datetime import datetime
 
 import numpy as np
 import pytest
-from test_hazard_export import a_record
 
 from skidpad.campaign.runs.run import run
 from skidpad.core.run import ActorMode, Passenger, Scenario
@@ -16,6 +15,7 @@ from skidpad.scenarios.export.tracks import Track, tracks
 from skidpad.scenarios.export.writer import OscVersion, Sheet, write_element, write_scenario
 from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.scenarios.scenario import compile_scenario
+from support.hazard_record import a_record
 from support.runs import scenario_run
 from support.scenarios.merging_player import led, merged, place
 

@@ -19,7 +19,7 @@ from skidpad.scenarios.registry import Acc, Names
 from skidpad.scenarios.scenario import check
 from skidpad.simulation.world.traffic.idm import GAP_MIN, Character
 from support.scenarios.files import (
-    VEHICLE,
+    ACTIVATE,
     at,
     by_value,
     event,
@@ -32,11 +32,9 @@ from support.scenarios.files import (
     time,
     to,
     vehicle,
+    with_controller,
     write,
 )
-
-ACTIVATE = """<ControllerAction><ActivateControllerAction longitudinal="true" lateral="false"/>
-</ControllerAction>"""
 
 
 class Ramp:
@@ -60,14 +58,6 @@ class Counter:
 
     def value(self, scene):
         return len(self.texts)
-
-
-def with_controller(name: str, **properties: object) -> str:
-    given = "".join(f'<Property name="{k}" value="{v}"/>' for k, v in properties.items())
-    controller = f"""<ObjectController><Controller name="{name}"><Properties>{given}</Properties>
-</Controller></ObjectController>"""
-    body = VEHICLE.format(x=0.0)
-    return f'<ScenarioObject name="other">{body}{controller}</ScenarioObject>'
 
 
 def file_of(folder: Path, controller: str, **parts: object) -> Path:

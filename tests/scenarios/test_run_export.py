@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lxml import etree
-from test_hazard_export import CHECKER
 from typer.testing import CliRunner
 
 from skidpad.campaign.runs.play import run_to
@@ -21,6 +18,7 @@ from skidpad.recording.run.log_files import read_log
 from skidpad.scenarios.export.run_export import log_tracks, road_of
 from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.scenarios.scenario import compile_scenario
+from support.asam import asam_verdicts, require_asam_python
 from support.runs import adas_run, scenario_run
 from support.scenarios.merging_player import led, place
 
@@ -105,9 +103,7 @@ def test_a_folder_without_a_run_is_one_sentence(tmp_path):
 
 
 def test_the_asam_checkers_accept_exported_runs(drives, tmp_path):
-    python = os.environ.get("SKIDPAD_ASAM_PYTHON")
-    if not python or not Path(python).exists():
-        pytest.skip("SKIDPAD_ASAM_PYTHON names no environment with the ASAM checkers")
+    require_asam_python()
     new = exported(drives / "scenario")
     done = CliRunner().invoke(
         app, ["export", str(drives / "scenario"), "--osc", "1.0", "--out", str(tmp_path)]
@@ -115,10 +111,7 @@ def test_the_asam_checkers_accept_exported_runs(drives, tmp_path):
     assert done.exit_code == 0, done.output
     (old,) = tmp_path.glob("*.xosc")
     assert etree.parse(str(old)).getroot().find("FileHeader").get("revMinor") == "0"
-    checked = subprocess.run(
-        [python, str(CHECKER), str(new), str(old)], capture_output=True, text=True, check=True
-    )
-    verdict = json.loads(next(r for r in checked.stdout.splitlines() if r.startswith("ASAM "))[5:])
+    verdict = asam_verdicts(new, old)
     for file in (new, old):
         assert verdict[str(file)]["issues"] == []
         assert any("valid_schema" in c for c in verdict[str(file)]["completed"])

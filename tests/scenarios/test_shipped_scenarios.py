@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import os
 import subprocess
 from pathlib import Path
 
@@ -25,18 +23,9 @@ from skidpad.scenarios.variation import (
     variant_parameters,
     variations,
 )
+from support.asam import asam_verdicts, require_asam_python
 
-CHECKER = Path(__file__).parents[1] / "support" / "scenarios" / "asam_check.py"
 FILES = [FOLDER / file_name(s.name, v) for s in SCENARIOS for v in OscVersion]
-
-
-@pytest.fixture(scope="module")
-def asam_python() -> str:
-    """Python of the environment with the ASAM checkers."""
-    python = os.environ.get("SKIDPAD_ASAM_PYTHON")
-    if not python or not Path(python).exists():
-        pytest.skip("SKIDPAD_ASAM_PYTHON names no environment with the ASAM checkers")
-    return python
 
 
 @pytest.mark.req("B-090", "B-091", "B-092")
@@ -46,11 +35,8 @@ def test_the_files_are_what_their_source_writes(tmp_path):
 
 
 @pytest.mark.req("B-090", "B-091", "B-092")
-def test_the_asam_checkers_accept_every_file(asam_python):
-    done = subprocess.run(
-        [asam_python, str(CHECKER), *map(str, FILES)], capture_output=True, text=True, check=True
-    )
-    verdicts = json.loads(next(r for r in done.stdout.splitlines() if r.startswith("ASAM "))[5:])
+def test_the_asam_checkers_accept_every_file():
+    verdicts = asam_verdicts(*FILES)
     for path in FILES:
         verdict = verdicts[str(path)]
         assert verdict["issues"] == [], path.name
@@ -60,12 +46,9 @@ def test_the_asam_checkers_accept_every_file(asam_python):
 
 
 @pytest.mark.req("B-090", "M-15")
-def test_the_asam_checkers_accept_every_map(asam_python):
+def test_the_asam_checkers_accept_every_map():
     maps = sorted([*MAPS.glob("*.xodr"), *FOLDER.glob("*.xodr")])
-    done = subprocess.run(
-        [asam_python, str(CHECKER), *map(str, maps)], capture_output=True, text=True, check=True
-    )
-    verdicts = json.loads(next(r for r in done.stdout.splitlines() if r.startswith("ASAM "))[5:])
+    verdicts = asam_verdicts(*maps)
     for path in maps:
         verdict = verdicts[str(path)]
         assert verdict["issues"] == [], path.name
@@ -75,9 +58,11 @@ def test_the_asam_checkers_accept_every_map(asam_python):
         assert verdict["skipped"] == later, path.name
 
 
-def test_the_1_0_files_are_valid_by_the_schema_of_1_0(asam_python):
+def test_the_1_0_files_are_valid_by_the_schema_of_1_0():
     ask = "import qc_openscenario, pathlib; print(pathlib.Path(qc_openscenario.__file__).parent)"
-    done = subprocess.run([asam_python, "-c", ask], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [require_asam_python(), "-c", ask], capture_output=True, text=True, check=True
+    )
     folder = Path(done.stdout.strip()) / "schema" / "1.0.0"
     schema = etree.XMLSchema(etree.parse(str(next(folder.glob("*.xsd")))))
     for path in FILES:

@@ -6,11 +6,11 @@ from math import pi
 import numpy as np
 import pytest
 
-from sensors.test_objects import BUMPER, RADAR, ROOF, world
 from skidpad.roads.roadside import Barrier, BarrierKind, Box, Roadside
 from skidpad.sensors.object_level.boxes import Boxes
 from skidpad.sensors.object_level.objects import ObjectSuite
 from support.sensors import plain_objects
+from support.sensors.cars import BUMPER, RADAR, ROOF, world
 
 SLOPE = np.array([0.02, -0.01])
 

@@ -10,8 +10,6 @@ import numba
 import numpy as np
 import pytest
 
-from sensors.test_objects import RADAR, world
-from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import ActorKind, RadarModel, RangeModel, SensorLevel
 from skidpad.core.weather import Weather
@@ -35,8 +33,8 @@ from skidpad.sensors.physical_radar.cells import (
 from skidpad.sensors.physical_radar.echoes import lobe_section
 from skidpad.sensors.physical_radar.radar import PhysicalRadar
 from skidpad.sensors.physical_radar.targets import BACK, FRONT, LEFT
-from skidpad.simulation.embedded.engine import EmbeddedBackend
-from support.runs import adas_run
+from support.sensors.cars import RADAR, world
+from support.sensors.driven_radar import measured
 
 HEAVY = Weather(precipitation=50.0)  # 25 mm/h
 TABLE = Path(__file__).parents[2] / "docs" / "radar-weather.csv"
@@ -224,14 +222,6 @@ def test_the_same_seed_and_tick_give_the_same_bytes_whatever_came_before():
     assert again[0] == again[1]
     third = PhysicalRadar(RADAR, Roadside(), table, 6)
     assert np.column_stack(third.measure(7, states)).tobytes() != again[0]
-
-
-def measured(level=SensorLevel.OBJECTS, model=RadarModel.PHYSICAL, weather="rain-noon", **changes):
-    """A backend at the start of a run, and its first frame."""
-    settings = {"radar_model": model.value, **changes}
-    ready = adas_run(2, weather, settings=settings, seed=3, sensors=level)
-    backend = EmbeddedBackend()
-    return backend, backend.reset(stage_of(ready).setup, ready.seed)
 
 
 def radar_bytes(frame):

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from sensors.test_objects import RADAR, world
 from skidpad.core.vocabulary import ActorKind
 from skidpad.physics import mirrors as physics
 from skidpad.physics.optics import RADAR_GHZ
 from skidpad.roads.roadside import Barrier, BarrierKind, Box, Roadside, Shape
 from skidpad.sensors.physical_radar.mirrors import mirrors_of, reflect
 from skidpad.sensors.physical_radar.radar import PhysicalRadar
+from support.sensors.cars import RADAR, world
 
 K = 2.0 * pi * RADAR_GHZ * 1e9 / 299_792_458.0
 RAIL_Y = 10.0

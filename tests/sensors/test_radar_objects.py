@@ -7,8 +7,6 @@ import numba
 import numpy as np
 import pytest
 
-from sensors.test_objects import RADAR, world
-from sensors.test_physical_radar import measured
 from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import RadarOutput
@@ -17,6 +15,8 @@ from skidpad.sensors.physical_radar import tracks as tracking
 from skidpad.sensors.physical_radar.radar import PhysicalRadar
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 from support.runs import adas_run
+from support.sensors.cars import RADAR, world
+from support.sensors.driven_radar import measured
 
 DT = 0.05
 

@@ -211,3 +211,10 @@ def mosquitto(folder, more="allow_anonymous true\n"):
                 drain.join()
             return
     raise AssertionError("mosquitto did not start")
+
+
+def indicator_row(
+    minute=0, violated=0, n=600, indicator="ego_location_similarity", mean=0.9
+) -> dict:
+    return {"minute": minute, "subject": "a+b", "indicator": indicator, "n": n,
+            "violated": violated, "mean": mean, "least": 0.1, "greatest": 1.0}  # fmt: skip

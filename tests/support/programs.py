@@ -34,7 +34,7 @@ def require_program(name: str, package: str) -> str:
 
 
 CALLS = re.compile(
-    r"""require_program|mosquitto\(|postgresql|CHROMIUM|ASAM_PYTHON|"mount"|(?:run|Popen)\(\s*\[f?["']"""
+    r"""require_program|mosquitto\(|postgresql|CHROMIUM|asam_python|asam_verdicts|"mount"|(?:run|Popen)\(\s*\[f?["']"""
 )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_served import Kept
 
 from skidpad.core.geometry import Pose
 from skidpad.sensors.raster.view import View
@@ -19,6 +18,7 @@ from skidpad.simulation.carla_server.sensing.occlusion import RADIUS, ambient_oc
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.snapshot import SensorType
 from skidpad.simulation.carla_server.weather import PACKED
+from support.carla_streams import Kept
 
 WIDTH, HEIGHT, EYE = 64, 48, 1.6
 ROAD = 1  # tag

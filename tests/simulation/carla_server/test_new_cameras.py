@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_served import Kept
 
 from skidpad.core.geometry import Pose
 from skidpad.sensors.raster.view import View, world_to_camera
@@ -15,6 +14,7 @@ from skidpad.simulation.carla_server.sensing.events_camera import EVENT, Retina,
 from skidpad.simulation.carla_server.sensing.flow import compute_flow
 from skidpad.simulation.carla_server.sensing.normals import world_normals
 from skidpad.simulation.carla_server.served import Served
+from support.carla_streams import Kept
 
 
 def view(pose: Pose) -> View:

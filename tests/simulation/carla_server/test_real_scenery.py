@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from test_real_sensors import STAGE
+from support.carla_preface import STAGE
 
 Serve = Callable[..., Any]
 

@@ -7,42 +7,9 @@ from typing import Any
 
 import pytest
 
+from support.carla_preface import STAGE
+
 Serve = Callable[..., Any]
-
-STAGE = """
-import numpy as np
-synchronous()
-library, roads = world.get_blueprint_library(), world.get_map()
-first = roads.get_waypoint(roads.get_spawn_points()[0].location).get_right_lane()
-
-def spawn(name, transform):
-    return world.spawn_actor(library.find(name), transform)
-
-ego = spawn("vehicle.tesla.model3", first.transform)
-lead = spawn("vehicle.audi.etron", first.next(25.0)[0].transform)
-aside = spawn("vehicle.carlamotors.carlacola", first.next(20.0)[0].get_right_lane().transform)
-foot = first.next(12.0)[0].transform
-left = foot.get_right_vector() * -1.5
-walker = spawn("walker.pedestrian.0001",
-               carla.Transform(foot.location + left + carla.Location(z=1.0), foot.rotation))
-world.tick()
-
-def tick(times=1):
-    for _ in range(times):
-        frame = world.tick()
-    return frame
-
-def at(sensor, frame):
-    while True:
-        data = heard[sensor.id].get(timeout=120.0)
-        if data.frame >= frame:
-            assert data.frame == frame
-            return data
-
-def seen_from(transform, actor):
-    p = actor.get_transform().transform(actor.bounding_box.location)
-    return np.array(transform.get_inverse_matrix()) @ np.array([p.x, p.y, p.z, 1.0])
-"""
 
 
 def test_images_agree_with_the_public_projection(serve: Serve) -> None:

@@ -20,22 +20,9 @@ from skidpad.simulation.carla_server.protocol.streams import StreamHub
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.snapshot import HEADER
 from skidpad.simulation.carla_server.vehicles.control import Control
+from support.carla_streams import Kept
 
 CAR = "vehicle.tesla.model3"
-
-
-class Kept(StreamHub):
-    """Keeps the payloads of all streams."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.told: dict[int, list[bytes]] = {}
-
-    def has_listeners(self, stream: int) -> bool:
-        return self.exists(stream)
-
-    def publish(self, stream: int, *parts: bytes | memoryview) -> None:
-        self.told.setdefault(stream, []).append(b"".join(bytes(p) for p in parts))
 
 
 def sensor_on_car(served: Served, kind: str, **attributes: str) -> Actor:

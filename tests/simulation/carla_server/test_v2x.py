@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_served import Kept
 
 from skidpad.core.geometry import Pose
 from skidpad.simulation.carla_server.actors.registry import Attachment, Box
@@ -27,6 +26,7 @@ from skidpad.simulation.carla_server.sensing.radio import (
 )
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.snapshot import HEADER
+from support.carla_streams import Kept
 
 RADIO = Radio("Default", 5.9, 21.5, -99.0, 10.0, "highway", 2.7, 1.0, 500.0, None, False)
 

@@ -189,3 +189,15 @@ def compiled(folder: Path, **parts: object) -> Scenario:
 def told(folder: Path, **parts: object) -> PlayedScenario:
     """The file played by itself, everything ideal."""
     return play_ideal(compiled(folder, **parts), 60.0)
+
+
+ACTIVATE = """<ControllerAction><ActivateControllerAction longitudinal="true" lateral="false"/>
+</ControllerAction>"""
+
+
+def with_controller(name: str, **properties: object) -> str:
+    given = "".join(f'<Property name="{k}" value="{v}"/>' for k, v in properties.items())
+    controller = f"""<ObjectController><Controller name="{name}"><Properties>{given}</Properties>
+</Controller></ObjectController>"""
+    body = VEHICLE.format(x=0.0)
+    return f'<ScenarioObject name="other">{body}{controller}</ScenarioObject>'

@@ -27,9 +27,10 @@ published: $(VENV)/.installed
 results: $(VENV)/.installed
 	$(BIN)/python tools/campaigns.py --again $(RESULTS_ARGS)
 
-# the quick tests; those that were measured to take long are left to test-all, which is what CI runs
+# the quick tests, properties with a fifth of their examples; those that were measured to take long are
+# left to test-all, which is what CI runs
 test: $(VENV)/.tested-with
-	$(BIN)/python -m pytest -n 2 -m "not slow" $(TEST_ARGS)
+	$(BIN)/python -m pytest -n 2 -m "not slow" --hypothesis-profile quick $(TEST_ARGS)
 
 test-all: $(VENV)/.tested-with
 	$(BIN)/python -m pytest -n 2 $(TEST_ARGS)

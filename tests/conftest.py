@@ -6,14 +6,12 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
 
+from support.examples import register_profiles
 from support.programs import needs_program
 from support.slow_tests import SlowTests, is_slow
 
-# no test judges by the wall clock: a busy machine is no fault
-settings.register_profile("skidpad", deadline=None)
-settings.load_profile("skidpad")
+register_profiles()
 
 TOWNS = Path(__file__).resolve().parents[2] / "shared" / "maps"
 # Words in a reason to skip that CI does not accept, because it has installed for them.

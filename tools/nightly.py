@@ -41,6 +41,14 @@ PROOFS = (
         "no reader is brought down by damaged files: 10^5 inputs each, in bounded time",
     ),
     Proof(
+        "properties",
+        (
+            sys.executable,
+            *("-m", "pytest", "-n", "2", "-m", "hypothesis", "--hypothesis-profile", "nightly"),
+        ),
+        "properties hold with twenty times the examples of CI",
+    ),
+    Proof(
         "coverage",
         (sys.executable, "tools/coverage_table.py", "--draws", "20000"),
         "printed intervals hold the truth given that they are printed: every cell with 20 000 draws",

@@ -11,6 +11,7 @@ from hypothesis.strategies import floats
 
 from skidpad.evidence.encounters import box_distance, encounter, time_to_meet
 from skidpad.evidence.pairs import Body
+from support.examples import examples
 from support.makelog import drive
 
 STEP = 0.005
@@ -37,7 +38,7 @@ def edge_points(one: Body) -> np.ndarray:
     return turned + np.array([one.x[0], one.y[0]])
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(
     floats(-40.0, 40.0), floats(-40.0, 40.0), floats(-pi, pi), floats(0.0, 20.0), floats(0.0, 20.0)
 )
@@ -55,7 +56,7 @@ def test_the_time_to_meet_is_when_the_boxes_first_touch_if_both_go_on(x, y, yaw,
             assert box_distance(moved(one, before), moved(other, before))[0] > 0.0
 
 
-@settings(max_examples=40)
+@settings(max_examples=examples(40))
 @given(floats(-9.0, 9.0), floats(-9.0, 9.0), floats(-pi, pi))
 def test_the_distance_of_boxes_is_that_of_their_nearest_points(x, y, yaw):
     one, other = body(0.0, 0.0, -0.4, 0.0), body(x, y, yaw, 0.0, 2.0, 1.0)

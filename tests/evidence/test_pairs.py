@@ -21,6 +21,7 @@ from skidpad.evidence.pairs import (
     required_deceleration,
     together,
 )
+from support.examples import examples
 
 L, W = 4.0, 1.8
 STEP = 1e-3
@@ -62,7 +63,7 @@ def test_a_gap_is_from_bumper_to_bumper_in_any_direction():
     assert across.gap[0] == pytest.approx(20.0 - L / 2 - W / 2)
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=examples(25), derandomize=True)
 @given(gap=floats(2.0, 40.0), v=floats(5.0, 30.0), dv=floats(3.0, 15.0))
 def test_ttc_and_drac_are_what_carrying_on_gives(gap, v, dv):
     pair = only_pair(a_body([0.0] * 2, 0.0, 0.0, v + dv), a_body([gap + L] * 2, 0.0, 0.0, v))
@@ -71,7 +72,7 @@ def test_ttc_and_drac_are_what_carrying_on_gives(gap, v, dv):
     assert until_contact(gap, v + dv, -0.98 * pair.max_drac_mps2, v, 0.0) is not None
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=examples(25), derandomize=True)
 @given(h=floats(-3.0, 3.0), gap=floats(2.0, 40.0), v=floats(5.0, 30.0), a=floats(0.0, 3.0))
 def test_headway_is_when_the_follower_passes_where_the_lead_is(h, gap, v, a):
     """Read off the follower's own way, for a lead that draws away, so that the first tick is least."""
@@ -91,7 +92,7 @@ def test_one_who_creeps_has_no_headway(v, some):
     assert (pair.min_thw_s is not None) == some
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=examples(25), derandomize=True)
 @given(gap=floats(10.0, 60.0), v=floats(25.0, 35.0), dv=floats(1.0, 8.0), a=floats(0.2, 2.0))
 def test_the_required_deceleration_is_enough_behind_one_that_brakes(gap, v, dv, a):
     needed = float(required_deceleration(np.array(gap), np.array(dv), np.array(-a)))

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import settings as examples
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from skidpad.core.errors import ConfigError
@@ -23,6 +22,7 @@ from skidpad.fleet.patterns.clusters import (
 )
 from skidpad.fleet.store.accounts import add_person, add_vehicle
 from skidpad.fleet.words import Role
+from support.examples import examples
 from support.fleet_world import NOW, packed, record
 
 N = len(SIGNALS)
@@ -63,7 +63,7 @@ def test_what_recurs_is_found_and_strangers_are_left_alone():
         assert list(cluster.distances) == sorted(cluster.distances)
 
 
-@examples(max_examples=10)
+@settings(max_examples=examples(10))
 @given(st.permutations(range(21)))
 def test_the_order_in_which_hazards_came_changes_nothing(order):
     cases = crowd()

@@ -12,6 +12,7 @@ from skidpad.core.states import ActorStates
 from skidpad.physics import contact, segments
 from skidpad.physics.contact import CONTACT_LAW, Contacts, bodies, resolve_contacts
 from skidpad.physics.segments import static_segments
+from support.examples import examples
 
 DT = 0.05
 
@@ -64,7 +65,7 @@ def outline(states, i):
     return translate(box, states.x[i], states.y[i])
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @given(floats(-5, 5), floats(-5, 5), floats(-pi, pi), floats(-pi, pi))
 def test_boxes_touch_exactly_when_polygons_do(x, y, yaw_a, yaw_b):
     states, b = cars((0, 0, yaw_a, 0, 0), (x, y, yaw_b, 0, 0))
@@ -84,7 +85,7 @@ def test_boxes_touch_exactly_when_polygons_do(x, y, yaw_a, yaw_b):
         assert found == 0
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @given(floats(-3.5, 3.5), floats(-2, 2), floats(-pi, pi), floats(-30, 30), floats(-30, 30))
 def test_impulses_conserve_momentum_and_never_make_energy(x, y, yaw, vx, vy):
     states, b = cars((0, 0, 0, 10, 0), (x, y, yaw, vx, vy))

@@ -16,6 +16,7 @@ from skidpad.recording.channels import codec
 from skidpad.recording.channels.cycles import cycles
 from skidpad.recording.channels.mcap_files import ChannelWriter, McapRecording
 from support.channel_worlds import Eyes, Listed, World, drive, frame, traffic
+from support.examples import examples
 
 WORLD = World(objects=traffic(5))
 EYES = (Eyes("left", 0.1), Eyes("right", 0.1, blind=(2,)))
@@ -136,7 +137,7 @@ def test_a_damaged_chunk_costs_only_itself(recording, tmp_path):
     assert len(read) > 100
 
 
-@settings(max_examples=150)
+@settings(max_examples=examples(150))
 @given(data=st.data())
 def test_no_damage_makes_the_reader_raise_anything_but_its_own_error(
     recording, tmp_path_factory, data
@@ -153,7 +154,7 @@ def test_no_damage_makes_the_reader_raise_anything_but_its_own_error(
         pass
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @given(st.binary(max_size=400))
 def test_message_content_never_raises_anything_but_its_own_error(data):
     from google.protobuf.message import DecodeError

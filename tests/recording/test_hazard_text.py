@@ -24,6 +24,7 @@ from skidpad.recording.hazards.records import (
     read_index,
 )
 from support.channel_worlds import Eyes, World, drive, frame, traffic
+from support.examples import examples
 
 
 def record(worlds, channels=("a", "b"), **more):
@@ -108,7 +109,7 @@ def strange_frames(draw, t):
 
 @given(st.data())
 @settings(
-    max_examples=60,
+    max_examples=examples(60),
     suppress_health_check=[HealthCheck.too_slow],
     report_multiple_bugs=False,
 )
@@ -161,7 +162,7 @@ def test_times_that_no_clock_shows_are_refused(t):
 
 
 @given(st.data())
-@settings(max_examples=300)
+@settings(max_examples=examples(300))
 def test_no_damage_makes_the_text_reader_raise_anything_but_its_own_error(data):
     text = list(TEXT)
     for _ in range(data.draw(st.integers(1, 5))):

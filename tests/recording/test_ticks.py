@@ -40,6 +40,7 @@ from skidpad.recording.run.log_files import (
     write_log,
 )
 from skidpad.recording.run.ticks import TickLog
+from support.examples import examples
 from support.makelog import actor_table, drive, frame, pose, world
 
 CONTACT = ContactEvent(3, -1, "guardrail", 120.0, 2.5, 1.0, 2.0)
@@ -151,7 +152,7 @@ def test_the_recorder_keeps_copies_because_frames_are_reused() -> None:
     assert np.all(log.finish().mu == np.float32(0.9))
 
 
-@settings(max_examples=20)
+@settings(max_examples=examples(20))
 @given(st.floats(-1e3, 1e3).filter(lambda v: abs(v) > 1e-3))
 def test_hash_sees_any_change_of_a_value(change: float) -> None:
     log = some_log()

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from skidpad.roads.edge import AXLE, TRACK
 from skidpad.roads.opendrive.bake import bake
 from skidpad.roads.queries import RoadMap
+from support.examples import examples
 from support.stadium import RADIUS, STRAIGHT, WIDTH, stadium
 
 LENGTH, BREADTH = 4.5, 1.8  # m, of a car
@@ -61,7 +62,7 @@ def test_far_away_above_and_nowhere_there_is_no_road() -> None:
     assert beyond(TOWN, np.nan, 0.0) == np.inf
 
 
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(
     st.floats(-70.0, STRAIGHT + 70.0), st.floats(-30.0, 2.0 * RADIUS + 30.0), st.floats(-3.2, 3.2)
 )

@@ -16,12 +16,13 @@ from skidpad.roads.opendrive.bake import bake
 from skidpad.roads.opendrive.document import Reader, _element
 from skidpad.roads.opendrive.reference_line import Clothoid, Element, Parametric, ReferenceLine
 from skidpad.roads.queries import RoadMap
+from support.examples import examples
 
 curvatures = st.floats(-0.1, 0.1)
 
 
 @given(curvatures, curvatures, st.floats(1.0, 120.0), st.floats(-pi, pi))
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_spirals_are_what_integration_of_their_curvature_gives(
     k0: float, k1: float, length: float, heading: float
 ) -> None:

@@ -14,6 +14,7 @@ from skidpad.core.errors import FileError
 from skidpad.roads.bundled import FOLDER
 from skidpad.roads.opendrive.bake import bake
 from skidpad.roads.queries import RoadMap
+from support.examples import examples
 
 ROOT = etree.fromstring((FOLDER / "town.xodr").read_bytes())
 for surplus in ROOT.findall("road")[12:]:
@@ -22,7 +23,7 @@ TEXTS = st.sampled_from(["", "x", "nan", "inf", "-1", "0", "1e308", "99999999999
 
 
 @given(st.data())
-@settings(max_examples=150, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(150), suppress_health_check=list(HealthCheck))
 def test_damaged_files_are_refused_or_baked(data: st.DataObject) -> None:
     root = copy.deepcopy(ROOT)
     nodes = list(root.iter())

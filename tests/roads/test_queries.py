@@ -15,6 +15,7 @@ from skidpad.core.errors import ConfigError
 from skidpad.roads import kernels
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import LanePoint, RoadMap
+from support.examples import examples
 
 MAP = load_map("figure8")
 DRIVING = np.flatnonzero(MAP.arrays.drivable)
@@ -37,7 +38,7 @@ def beside(point: LanePoint, left: float, up: float = 0.0) -> tuple[float, float
 
 
 @given(places(), st.floats(0.0, 4000.0))
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @pytest.mark.req("A-078")
 def test_behind_undoes_ahead(point: LanePoint, distance: float) -> None:
     there = MAP.ahead(point, distance)
@@ -49,7 +50,7 @@ def test_behind_undoes_ahead(point: LanePoint, distance: float) -> None:
 
 
 @given(places())
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @pytest.mark.req("A-077", "A-204")
 def test_left_and_right_are_inverse_and_one_lane_away(point: LanePoint) -> None:
     left = MAP.left(point)
@@ -63,7 +64,7 @@ def test_left_and_right_are_inverse_and_one_lane_away(point: LanePoint) -> None:
 
 
 @given(places(), st.floats(-1.7, 1.7), st.floats(-0.5, 0.5))
-@settings(max_examples=400)
+@settings(max_examples=examples(400))
 def test_projection_finds_the_place_again(point: LanePoint, left: float, up: float) -> None:
     assume(MAP.lanes.junction[point.lane] < 0)
     found = MAP.project(*beside(point, left, up))
@@ -74,7 +75,7 @@ def test_projection_finds_the_place_again(point: LanePoint, left: float, up: flo
 
 
 @given(places(tuple(DRIVING)), st.floats(-25.0, 25.0), st.floats(-3.0, 3.0))
-@settings(max_examples=300)
+@settings(max_examples=examples(300))
 def test_projection_is_the_nearest_of_all_samples(point: LanePoint, left: float, up: float) -> None:
     x, y, z = beside(point, left, up)
     driving = MAP.arrays.drivable[MAP.samples.lane] == 1

@@ -13,6 +13,7 @@ from skidpad.roads.roadside import Barrier, BarrierKind, Box, Roadside
 from skidpad.sensors.object_level.objects import ObjectSuite
 from skidpad.sensors.ranging.beam import beam_of
 from skidpad.sensors.ranging.radar import Radar, aim
+from support.examples import examples
 from support.sensors.cars import BUMPER, RADAR, ROOF, world
 
 
@@ -53,7 +54,7 @@ def test_a_nearer_car_hides_the_one_behind_it_and_not_the_one_beside():
 
 
 @given(floats(5.0, 70.0), floats(-6.0, 6.0), floats(-3.0, 3.0))
-@settings(max_examples=50)
+@settings(max_examples=examples(50))
 def test_a_mirrored_scene_gives_mirrored_columns(x, y, yaw):
     table, states = world((x, y, 0.0, yaw))
     _, mirrored = world((x, -y, 0.0, -yaw))

@@ -15,6 +15,7 @@ import skidpad.stack
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import Supervision, Tier
 from skidpad.stack.adas import AdasStack
+from support.examples import examples
 from support.stackfakes import LANE_WIDTH, RED, SPECS, ArcMap, Car, draw, ego_at, frame
 
 approx = pytest.approx
@@ -141,7 +142,7 @@ class Centred(ArcMap):
 
 
 @pytest.mark.req("A-016", "A-042", "A-068", "A-142", "X-4")
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 @given(
     st.sampled_from([-0.004, -0.001, 0.0, 0.002, 0.003]),
     st.floats(-1.5, 1.5),

@@ -32,6 +32,7 @@ from skidpad.evidence.channels.indicators.layout import IndicatorReadings
 from skidpad.evidence.channels.indicators.panel import IndicatorPanel
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from support.channel_worlds import frame
+from support.examples import examples
 
 coordinates = st.floats(-1e3, 1e3)
 angles = st.floats(-10.0, 10.0)
@@ -109,7 +110,7 @@ def test_comfort_needs_four_points():
 
 @pytest.mark.req("C-046", "C-047")
 @given(brake=st.floats(0.5, 6.0))
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 def test_braking_harder_is_less_comfortable(brake):
     def plan(a):
         t = np.arange(16) * 0.2
@@ -129,7 +130,7 @@ def test_driving_backwards_keeps_the_heading():
 
 @pytest.mark.req("C-040")
 @given(st.floats(-4, 4), st.floats(-4, 4), st.floats(-pi, pi), st.integers(8, 11))
-@settings(max_examples=50)
+@settings(max_examples=examples(50))
 def test_the_fit_agrees_with_polyfit(ax, ay, heading, n):
     rng = np.random.default_rng(n)
     t = 1000.0 + np.sort(rng.uniform(0, 1, n))
@@ -179,7 +180,7 @@ def test_count_similarity(a, b, score):
 
 @pytest.mark.req("C-059")
 @given(st.lists(st.tuples(st.floats(0.1, 1.0), st.floats(0.0, 2 * pi)), min_size=3, max_size=8))
-@settings(max_examples=80)
+@settings(max_examples=examples(80))
 def test_area_agrees_with_shapely(polar):
     polar.sort(key=lambda p: p[1])
     ring = np.array([(r * np.cos(a), r * np.sin(a)) for r, a in polar])
@@ -199,7 +200,7 @@ def test_area_ratio_says_what_zero_means():
 
 @pytest.mark.req("C-054")
 @given(paths(), paths())
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_pairs_are_one_to_one_near_and_the_nearest_first(a, b):
     a, b = a / 200, b / 200
     pairs = similarity.pair_points(a, b, 4.0)
@@ -227,7 +228,7 @@ def test_well_separated_objects_are_paired_as_by_the_best_assignment():
 
 @pytest.mark.req("C-054")
 @given(paths(), paths())
-@settings(max_examples=60, derandomize=True)
+@settings(max_examples=examples(60), derandomize=True)
 def test_as_many_objects_are_paired_as_possible(a, b):
     a, b = a / 200, b / 200
     d = np.hypot(*(a[:, None] - b[None]).transpose(2, 0, 1))
@@ -299,7 +300,7 @@ def test_ten_equal_points_score_one_and_pairs_without_predictions_are_left_out()
 
 @pytest.mark.req("C-077")
 @given(paths(), paths())
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_frechet_is_its_recursive_definition(a, b):
     @cache
     def c(i, j):
@@ -338,7 +339,7 @@ def test_frechet_is_the_least_leash_also_on_walks_that_return(seed):
 
 @pytest.mark.req("C-077", "C-078", "C-079")
 @given(paths(st.just(6)), paths(st.just(6)), st.floats(-pi, pi), coordinates)
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_path_agreement_is_symmetric_bounded_and_does_not_see_the_map(a, b, angle, shift):
     for score in (prediction.plan_agreement, prediction.cross_channel_agreement):
         s = score(a, b)
@@ -563,7 +564,7 @@ def test_jitter_of_5_mm_is_harsh_when_differenced_and_smooth_when_fitted():
 
 
 @given(st.floats(-pi, pi), st.floats(-1e4, 1e4), st.floats(-1e4, 1e4))
-@settings(max_examples=15)
+@settings(max_examples=examples(15))
 def test_indicators_do_not_see_where_on_the_map_a_scene_lies(angle, dx, dy):
     def placed(f):
         turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])

@@ -21,6 +21,7 @@ from skidpad.evidence.channels.risk import (
     safety_scores,
 )
 from support.channel_worlds import CAR, frame
+from support.examples import examples
 
 EGO = (0.0, 0.0, 0.0, 10.0, 0.0)
 
@@ -177,7 +178,7 @@ states = st.tuples(
 
 @pytest.mark.req("C-092", "C-095")
 @given(states)
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_times_agree_with_shapely_footprints_in_small_steps(state):
     x, y, heading, v, stands = state
     v = 0.0 if stands else v
@@ -218,7 +219,7 @@ def risk_of(conflict):
 
 @pytest.mark.req("C-094", "C-095")
 @given(conflicts, conflicts)
-@settings(max_examples=300, derandomize=True)
+@settings(max_examples=examples(300), derandomize=True)
 def test_risk_is_ordered_as_danger_is(one, two):
     surer = one[0] >= two[0]
     sooner = one[1] <= two[1]
@@ -234,7 +235,7 @@ def test_risk_is_ordered_as_danger_is(one, two):
 @given(
     x=st.floats(10, 35), v=st.floats(4, 15), slack=st.floats(-1.5, 1.5), angle=st.floats(0.6, 2.5)
 )
-@settings(max_examples=40, derandomize=True)
+@settings(max_examples=examples(40), derandomize=True)
 def test_a_crossing_car_that_comes_nearer_in_time_never_lowers_the_risk(x, v, slack, angle):
     """It crosses the ego's path x m ahead, `slack` s from where both would be there at once."""
     c, s = v * np.cos(angle), v * np.sin(angle)
@@ -272,7 +273,7 @@ def test_a_touch_between_two_samples_is_a_hit_and_a_hair_later_a_miss():
 
 
 @given(st.floats(-np.pi, np.pi), st.floats(-1e4, 1e4), states)
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 def test_scores_are_bounded_and_do_not_see_the_map(angle, shift, state):
     x, y, heading, v, _ = state
     c, s = np.cos(angle), np.sin(angle)

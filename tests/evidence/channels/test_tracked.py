@@ -20,6 +20,7 @@ from skidpad.evidence.channels.tracked.tracks import Lookout, Tracks
 from skidpad.evidence.channels.tracked.vote import CHI2_LIMIT, Tracked, parting
 from skidpad.recording.channels.cycles import cycles
 from support.channel_worlds import Eyes, World, drive, frame
+from support.examples import examples
 
 TAILGATED, TAILGATING = HazardType.EGO_TAILGATED, HazardType.EGO_TAILGATING
 LOCALISATION, UNSEEN = HazardType.INCONSISTENT_LOCALISATION, HazardType.UNSEEN_BY_A_CHANNEL
@@ -31,7 +32,7 @@ EGO = (0.0, 0.0, 0.0, 15.0, 0.0)
     v_leader=st.floats(0.0, 45.0),
     grip=st.sampled_from([0.9, 0.5, 0.15]),
 )
-@settings(max_examples=300, derandomize=True)
+@settings(max_examples=examples(300), derandomize=True)
 def test_the_safe_distance_is_the_least_that_stopping_step_by_step_needs(
     v_follower, v_leader, grip
 ):

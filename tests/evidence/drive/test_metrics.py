@@ -25,6 +25,7 @@ from skidpad.recording.run.events import Relocation
 from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.log_files import read_log, write_log
 from skidpad.recording.run.ticks import TickLog
+from support.examples import examples
 from support.makelog import DT, drive, pose
 from support.makemap import Lane, TestMap, line, ring_map, straight_map
 
@@ -129,7 +130,7 @@ def test_a_car_in_the_next_lane_is_no_conflict() -> None:
     assert (m.min_ttc_true_s, m.min_gap_true_m, m.max_drac_true) == (None, None, None)
 
 
-@settings(max_examples=25)
+@settings(max_examples=examples(25))
 @given(st.floats(-0.4, 0.4), st.floats(6.0, 60.0))
 def test_gap_along_a_straight_lane_agrees_with_shapely(turn: float, distance: float) -> None:
     log = drive(1, lambda _k: [{"x": 50.0, "vx": 9.0}, {"x": 50.0 + distance, "yaw": turn}])
@@ -587,7 +588,7 @@ def test_a_stored_run_has_the_metrics_of_the_drive(tmp_path: Path) -> None:
     )
 
 
-@settings(max_examples=20)
+@settings(max_examples=examples(20))
 @given(st.floats(0.0, 6.28), st.floats(-500.0, 500.0))
 def test_metrics_do_not_depend_on_where_the_world_lies(angle: float, shift: float) -> None:
     base, road_map = follow(gap=20.0, v=25.0, v_lead=15.0, n=11), straight_map()
@@ -632,7 +633,7 @@ def test_matching_on_a_ring_gives_arc_length_and_offset(angle: float, left: floa
     assert min(apart, 200.0 * math.pi - apart) < 0.05
 
 
-@settings(max_examples=30)
+@settings(max_examples=examples(30))
 @given(st.floats(-30.0, 1030.0), st.floats(-30.0, 30.0))
 def test_matching_agrees_with_shapely(x: float, y: float) -> None:
     road_map = straight_map()

@@ -40,6 +40,7 @@ from skidpad.stack.reference.caution import (
 from skidpad.stack.reference.following import Manner, acceleration, free_acceleration, wanted_gap
 from skidpad.stack.reference.junctions import V_THROUGH, travel_time
 from skidpad.stack.reference.person import person_of
+from support.examples import examples
 
 ROADS = st.sampled_from(list(RoadLook))
 SPEEDS = st.floats(0.0, 60.0)
@@ -225,7 +226,7 @@ def test_a_tighter_bend_is_driven_slower(road, bend):
     assert bend_speed(road, -bend) == bend_speed(road, bend)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60))
 @given(data=st.data())
 def test_its_commands_are_never_wild(data):
     """Whatever is seen, from wherever: finite pedals in their ranges, the same from equal views."""

@@ -36,13 +36,14 @@ from skidpad.evidence.channels.matching import (
 )
 from skidpad.recording.channels.cycles import cycles
 from support.channel_worlds import CAR, Eyes, World, drive, frame, truth
+from support.examples import examples
 
 TAILGATED, TAILGATING = HazardType.EGO_TAILGATED, HazardType.EGO_TAILGATING
 LOCALISATION = HazardType.INCONSISTENT_LOCALISATION
 
 
 @given(v=st.floats(3.0, 40.0), gap=st.floats(0.5, 100.0), mu=st.floats(0.2, 1.0))
-@settings(max_examples=80)
+@settings(max_examples=examples(80))
 def test_equal_speeds_hit_as_their_stopping_distances_say(v, gap, mu):
     a_lead, a_follow = min(6.0, mu * G), mu * G
     distance = v * 1.0 + v * v / (2 * a_follow) - v * v / (2 * a_lead)
@@ -53,7 +54,7 @@ def test_equal_speeds_hit_as_their_stopping_distances_say(v, gap, mu):
 
 
 @given(st.floats(0, 60), st.floats(0, 40), st.floats(0, 40), st.floats(0.1, 1.0))
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_a_hit_stays_a_hit_when_nearer_faster_or_slicker(gap, v_lead, v_follow, mu):
     if would_hit(gap, v_lead, 0.9, v_follow, mu):
         assert would_hit(gap * 0.9, v_lead, 0.9, v_follow, mu)
@@ -100,7 +101,7 @@ def test_a_cyclist_has_no_grip_and_is_tailgated_all_the_same():
 
 
 @given(seed=st.integers(0, 10_000), long=st.sampled_from([1.0, 12.0]))
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=examples(60), derandomize=True)
 def test_nobody_who_could_hit_is_left_out(seed, long):
     """Looking only at who is near enough to stop in time finds what looking at all finds."""
     rng = np.random.default_rng(seed)
@@ -199,7 +200,7 @@ def test_in_a_bend_ahead_and_behind_are_along_the_plan():
     st.floats(-np.pi, np.pi),
     st.floats(-1e3, 1e3),
 )
-@settings(max_examples=20, derandomize=True)
+@settings(max_examples=examples(20), derandomize=True)
 def test_world_model_truth_does_not_see_the_map(places, angle, shift):
     (x, y) = places[0]
     c, s = np.cos(angle), np.sin(angle)
@@ -234,7 +235,7 @@ def test_world_model_truth_believes_ghosts_and_tells_ahead_from_behind():
 
 
 @given(st.data())
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_world_model_truth_agrees_with_footprints_moved_in_small_steps(data):
     ego = (0.0, 0.0, 0.0, 10.0, 0.0)
     x, y = data.draw(st.floats(-35, 35)), data.draw(st.floats(-3, 3))
@@ -290,7 +291,7 @@ spans = st.lists(
 
 @pytest.mark.req("C-214")
 @given(spans, spans)
-@settings(max_examples=80)
+@settings(max_examples=examples(80))
 def test_matching_is_one_to_one_and_the_largest_possible(detected, true):
     m = match(detected, true)
     assert len({d for d, _ in m.pairs}) == len({h for _, h in m.pairs}) == len(m.pairs)

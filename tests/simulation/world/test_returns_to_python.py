@@ -7,12 +7,12 @@ from dataclasses import replace
 import pytest
 from msgspec import structs
 
-from runs import adas_run
 from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.core.settings import load_profile
 from skidpad.core.surface import SurfacePatch
 from skidpad.core.weather import Weather
 from skidpad.simulation.world.stage import build_world
+from support.runs import adas_run
 
 RAIN = Weather(name="rain", precipitation=60.0, wetness=100.0, air_temperature_c=0.5)
 TYRES = {

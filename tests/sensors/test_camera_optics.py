@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from worlds import states_at, straight, table_of
 
 from skidpad.core.geometry import Pose
 from skidpad.core.setup import CameraOptics
@@ -13,6 +12,7 @@ from skidpad.physics import camera
 from skidpad.physics.optics import CONTRAST_SEEN, sight
 from skidpad.sensors.pictures.lighting import lighting
 from skidpad.sensors.suite import PixelSettings, PixelSuite
+from support.sensors.worlds import states_at, straight, table_of
 
 EYE = CameraSpec("eye", Modality.RGB, 400, 300, 20.0, Pose(0.0, 0.0, 1.5))
 MAP_EYE = CameraSpec("map", Modality.INSTANCE, 400, 300, 20.0, Pose(0.0, 0.0, 1.5))

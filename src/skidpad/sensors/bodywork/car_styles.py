@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from skidpad.sensors.bodywork.cars import CarStyle
+from skidpad.sensors.bodywork.car_shape import CarStyle
 
 SUPERMINI = CarStyle(
     breadth=1.12,

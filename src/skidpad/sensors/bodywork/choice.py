@@ -9,8 +9,9 @@ from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind
 from skidpad.physics.types import vehicle_types
 from skidpad.sensors.bodywork.body import Body
 from skidpad.sensors.bodywork.buses import CITY_BUS, COACH, BusStyle, make_bus
+from skidpad.sensors.bodywork.car_shape import CarStyle
 from skidpad.sensors.bodywork.car_styles import CARS
-from skidpad.sensors.bodywork.cars import CarStyle, make_car
+from skidpad.sensors.bodywork.cars import make_car
 from skidpad.sensors.bodywork.lorries import (
     BOX_LORRY,
     DRINKS_LORRY,

@@ -8,7 +8,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.run import AdasDriver, Roads, RunSpec, run_from_plain
 from skidpad.core.specs import CameraSpec, Modality
 from skidpad.core.states import ActorTable
-from skidpad.core.vocabulary import Bodywork, SemanticClass
+from skidpad.core.vocabulary import ActorKind, Bodywork, SemanticClass
 from skidpad.core.weather import Weather
 from skidpad.physics.types import vehicle_type
 from skidpad.sensors.raster.shaped_actors import FAR, ShapedActors
@@ -72,6 +72,58 @@ def test_front_wheels_point_where_they_go_and_stay_when_the_vehicle_stops():
     states.vx[0] = -5.0  # backwards and straight
     actors.turn_wheels(states, 0.05)
     assert actors.steer[0] == 0.0
+
+
+def make_walkers():
+    """Returns a walker of each style, with the vertices of its limbs."""
+    n = 3
+    table = ActorTable(
+        names=tuple("abc"), types=("walker.1", "walker.2", "child"), rgb=np.full((n, 3), 120, np.uint8),
+        kind=np.full(n, ActorKind.PEDESTRIAN, np.uint8), length=np.full(n, 0.6),
+        width=np.full(n, 0.5), height=np.array([1.8, 1.7, 1.2]),
+    )  # fmt: skip
+    actors = ShapedActors(table)
+    limbs = actors._limbs
+    return actors, [slice(a, b) for a, b in zip(limbs.first, limbs.end, strict=True)]
+
+
+def walk(actors, speed, elapsed):
+    """Lets all walkers go ahead for a time in s; returns their vertices."""
+    states = states_at([(0.0, 0.0, 0.0, 0.0)] * len(actors.rolled))
+    states.vx[:] = speed
+    actors.turn_wheels(states, elapsed)
+    return actors.near.vertices
+
+
+def test_legs_change_places_after_one_step_and_stand_still_without_speed():
+    actors, limbs = make_walkers()
+    assert len(limbs) == 12
+    drawn = actors.near.vertices.copy()
+    others = np.ones(len(drawn), dtype=bool)
+    for limb in limbs:
+        others[limb] = False
+    step = actors._step[0]
+    assert 0.2 < step < 0.6
+    after = walk(actors, 1.4, step / 1.4)
+    assert np.array_equal(after[others], drawn[others])
+    for q, limb in enumerate(limbs[:4]):  # of the first walker
+        low = drawn[limb, 2] < drawn[limb, 2].min() + 0.02
+        assert after[limb][low, 0].mean() == pytest.approx(
+            drawn[limb][low, 0].mean() - 2.0 * actors._limbs.reach[q], abs=0.03
+        )
+    standing = walk(actors, 0.0, 0.05).copy()
+    feet = [standing[limb, 0].mean() for limb in (limbs[0], limbs[2])]
+    assert abs(feet[0] - feet[1]) < 0.06
+    assert np.array_equal(walk(actors, 0.0, 0.05), standing)
+
+
+def test_a_foot_that_stands_stays_where_it_is_and_the_other_rises():
+    actors, limbs = make_walkers()
+    left, right = limbs[0], limbs[2]
+    middle = walk(actors, 1.4, 0.5 * actors._step[0] / 1.4)
+    assert middle[left, 2].min() == pytest.approx(0.0, abs=1e-6)
+    assert middle[right, 2].min() > 0.03
+    assert middle[:, 2].min() > -1e-6
 
 
 def look(distance, braking=False, indicating=(False, False), bodywork=Bodywork.SHAPED, back=True):

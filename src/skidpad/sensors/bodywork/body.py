@@ -27,12 +27,24 @@ class Wheel(NamedTuple):
     steered: bool
 
 
+class Limb(NamedTuple):
+    """A leg or an arm of a walker; its vertices are `first` to `end` - 1 of the body's mesh."""
+
+    first: int
+    end: int
+    pivot: float  # m, height of hip or shoulder
+    low: float  # m, height of its lowest point
+    reach: float  # m by which its end is drawn ahead of the pivot, negative behind
+    lift: float  # m by which its end rises where it moves ahead
+
+
 class Body(NamedTuple):
     """What is drawn of an actor, in its own frame."""
 
     mesh: Mesh
     wheels: tuple[Wheel, ...] = ()
     axle_front: float = 0.0  # m, x of the steered axle
+    limbs: tuple[Limb, ...] = ()
 
 
 class Part(NamedTuple):

@@ -74,7 +74,10 @@ def half_width_at(style: CarStyle, size: CarSize, x: float) -> float:
 
 
 def make_glass_ring(style: CarStyle, size: CarSize, t: float) -> list[Point]:
-    """Returns the cross-section of the glasshouse at a share of the length: sill, window, rail, roof, and the other side."""
+    """Returns the cross-section of the glasshouse at a share of the length.
+
+    From one side to the other: sill, window, rail, roof, rail, window, sill.
+    """
     x = (0.5 - t) * size.length
     h = size.height
     foot = curve_at(style.deck, t) * h - 0.004

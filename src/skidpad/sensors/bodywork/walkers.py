@@ -9,15 +9,18 @@ import numpy as np
 
 from skidpad.sensors.bodywork.body import (
     Body,
+    Limb,
     assemble,
     ball,
     skin,
     tube,
 )
 from skidpad.sensors.scene.materials import Material
-from skidpad.sensors.scene.mesh import Mesh, box, merge
+from skidpad.sensors.scene.mesh import Mesh, Points, box, merge
 
 HAIR, SHOE = Material.TRIM, Material.TYRE
+LIMB_PARTS = 3  # of a leg: thigh, shin, shoe; of an arm: two limbs and a hand
+LIFT = 0.07  # m by which a foot rises that moves ahead
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,15 +47,36 @@ WALKERS = {
 
 def make_walker(label: int, style: WalkerStyle, length: float, width: float, height: float) -> Body:
     """Returns the body of a walker in mid-step."""
-    mesh = _walker(label, style, 0.5 * length / height, 0.5 * width / height)
+    parts, limbs = _walker(label, style, 0.5 * length / height, 0.5 * width / height)
+    mesh = merge(parts)
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     size = np.array([length, width, height])
     place = (mesh.vertices - low) / (high - low) * size - (0.5 * length, 0.5 * width, 0.0)
-    return assemble([mesh._replace(vertices=place)], ())
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    scale = size[2] / (high[2] - low[2])
+    found = tuple(
+        _find_limb(place, int(starts[at]), int(starts[at + LIMB_PARTS]), scale * (z - low[2]), lift)
+        for at, z, lift in limbs
+    )
+    return assemble([mesh._replace(vertices=place)], ())._replace(limbs=found)
 
 
-def _walker(label: int, style: WalkerStyle, deep: float, wide: float) -> Mesh:
-    """A walker of height 1 with one leg and the other arm ahead, so far in and across as is asked."""
+def _find_limb(vertices: Points, first: int, end: int, pivot: float, lift: float) -> Limb:
+    """Returns the limb of these vertices, whose lowest quarter is its end; pivot, lift in m."""
+    mine = vertices[first:end]
+    low = float(mine[:, 2].min())
+    tip = mine[mine[:, 2] < low + 0.25 * (pivot - low)]
+    return Limb(first, end, pivot, low, float(tip[:, 0].mean()), lift)
+
+
+def _walker(
+    label: int, style: WalkerStyle, deep: float, wide: float
+) -> tuple[list[Mesh], list[tuple[int, float, float]]]:
+    """A walker of height 1 with one leg and the other arm ahead, so far in and across as is asked.
+
+    Returns its parts, and of each limb the first of its LIMB_PARTS parts, the height of its pivot and its
+    lift in m.
+    """
     hip, neck = style.hip, style.neck
     k = min(1.0, (wide - 0.042) / 0.112)
     rows = [
@@ -63,7 +87,9 @@ def _walker(label: int, style: WalkerStyle, deep: float, wide: float) -> Mesh:
         (neck, 0.03, 0.04 * k),
     ]
     parts = [_torso(label, rows), *_head(label, style)]
+    limbs: list[tuple[int, float, float]] = []
     for s in (1.0, -1.0):
+        limbs += [(len(parts), hip, LIFT), (len(parts) + LIMB_PARTS, neck - 0.045, 0.0)]
         parts += [*_leg(label, style, s, deep, k), *_arm(label, style, s, deep, wide, k)]
     if style.coat is not None:
         hem = [
@@ -75,7 +101,7 @@ def _walker(label: int, style: WalkerStyle, deep: float, wide: float) -> Mesh:
     if style.pack:
         x, z = (max(-0.13, -deep), -0.04), (hip + 0.06, neck - 0.04)
         parts.append(box(x, (-0.075 * k, 0.075 * k), z, label, Material.FENCE))
-    return merge(parts)
+    return parts, limbs
 
 
 def _head(label: int, style: WalkerStyle) -> list[Mesh]:

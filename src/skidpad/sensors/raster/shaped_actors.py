@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from skidpad.core.arrays import Floats, Ints32
 from skidpad.core.jit import kernel
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind
+from skidpad.sensors.bodywork.body import Limb
 from skidpad.sensors.bodywork.choice import make_body
 from skidpad.sensors.raster.rasteriser import Actors
 from skidpad.sensors.raster.view import View
@@ -19,6 +21,7 @@ from skidpad.sensors.scene.mesh import Mesh
 from skidpad.sensors.scene.static import pixel_key
 
 FAR = 60.0  # m from a camera, beyond which a plain body is drawn: a car is 10 px high there
+WALKING = 0.8  # m/s, from which on a walker's limbs swing in full; they hang down at 0
 SLOWEST = 0.5  # m/s, below which wheels stay turned as they are
 MOST_STEER = 0.6  # rad
 LONGEST_STEP = 20.0  # m in one step; more is a relocation
@@ -36,6 +39,18 @@ class _Wheels(NamedTuple):
     steered: Floats  # (w,) 1 or 0
 
 
+class _Limbs(NamedTuple):
+    """l limbs of all walkers; vertices are rows of all meshes one after the other."""
+
+    actor: Ints32  # (l,)
+    first: Ints32  # (l,)
+    end: Ints32  # (l,)
+    pivot: Floats  # (l,) m, height of hip or shoulder
+    low: Floats  # (l,) m, height of its end
+    reach: Floats  # (l,) m by which its end is drawn ahead
+    lift: Floats  # (l,) m by which its end rises where it moves ahead
+
+
 class _Ranges(NamedTuple):
     """Which vertices and triangles are those of each of n actors; fields of `Actors`."""
 
@@ -48,7 +63,15 @@ class _Ranges(NamedTuple):
 class ShapedActors:
     """The meshes of a table's actors, each with vertices of its own, and how their wheels stand."""
 
-    UNSAVED = ("far", "near", "_still", "_wheels", "_front")  # constant, or set by `turn_wheels`
+    UNSAVED = (
+        "far",
+        "near",
+        "_still",
+        "_wheels",
+        "_limbs",
+        "_step",
+        "_front",
+    )  # set by `turn_wheels`, or constant
 
     def __init__(self, table: ActorTable) -> None:
         n = len(table)
@@ -90,12 +113,18 @@ class ShapedActors:
             np.array([w.radius for _, _, w in rows], dtype=np.float64),
             np.array([float(w.steered) for _, _, w in rows], dtype=np.float64),
         )
+        self._limbs = _limbs_of([b.limbs for b in bodies], near.vertex_start)
+        legs = np.where(self._limbs.lift > 0.0, np.abs(self._limbs.reach), 0.0)
+        self._step = np.bincount(self._limbs.actor, legs, n)  # m, from one foot to the other
         self._front = np.array([b.axle_front for b in bodies], dtype=np.float64)
         self.steer = np.zeros(n)  # rad, of the front wheels
         self.rolled = np.zeros(n)  # m
 
     def turn_wheels(self, states: ActorStates, elapsed: float) -> None:
-        """Turns the wheels by `elapsed` s of the present motion; front wheels point where they go."""
+        """Turns wheels and swings limbs by `elapsed` s of the present motion.
+
+        Front wheels point where they go.
+        """
         c, s = np.cos(states.yaw), np.sin(states.yaw)
         ahead = states.vx * c + states.vy * s
         left = states.vy * c - states.vx * s + self._front * states.yaw_rate
@@ -105,6 +134,9 @@ class ShapedActors:
         step = ahead * elapsed if np.isfinite(elapsed) else np.zeros_like(ahead)
         self.rolled += np.where(np.abs(step) < LONGEST_STEP, step, 0.0)
         turn_vertices(self._wheels, self.steer, self.rolled, self._still, self.near.vertices)
+        phase = np.pi * self.rolled / np.where(self._step > 0.0, self._step, 1.0)
+        share = np.minimum(np.hypot(states.vx, states.vy) / WALKING, 1.0)
+        swing_limbs(self._limbs, phase, share, self._still, self.near.vertices)
 
     def select_for(self, view: View) -> Actors:
         """Returns the actors with plain bodies beyond `FAR`."""
@@ -116,6 +148,20 @@ class ShapedActors:
             for name, there in zip(_Ranges._fields, self.far, strict=True)
         }
         return self.near._replace(**chosen)
+
+
+def _limbs_of(limbs: Sequence[tuple[Limb, ...]], vertex_start: Ints32) -> _Limbs:
+    """Returns the limbs of all actors, whose meshes begin at these vertices (n,)."""
+    rows = [(i, int(vertex_start[i]), limb) for i, own in enumerate(limbs) for limb in own]
+    return _Limbs(
+        np.array([i for i, _, _ in rows], dtype=np.int32),
+        np.array([at + limb.first for _, at, limb in rows], dtype=np.int32),
+        np.array([at + limb.end for _, at, limb in rows], dtype=np.int32),
+        np.array([limb.pivot for _, _, limb in rows], dtype=np.float64),
+        np.array([limb.low for _, _, limb in rows], dtype=np.float64),
+        np.array([limb.reach for _, _, limb in rows], dtype=np.float64),
+        np.array([limb.lift for _, _, limb in rows], dtype=np.float64),
+    )
 
 
 def _ranges(meshes: list[Mesh], rows: range) -> _Ranges:
@@ -149,3 +195,21 @@ def turn_vertices(
             out[v, 0] = hx + c * x - s * y
             out[v, 1] = hy + s * x + c * y
             out[v, 2] = hz + z
+
+
+@kernel
+def swing_limbs(limbs: _Limbs, phase: Floats, share: Floats, still: Floats, out: Floats) -> None:
+    """Writes the vertices of all limbs, sheared so that their ends swing from `reach` to its opposite.
+
+    phase: (n,) rad, 0 as drawn; share: (n,) of the whole swing, 0 for limbs that hang down.
+    """
+    for q in range(limbs.actor.size):
+        i = limbs.actor[q]
+        reach, tall = limbs.reach[q], limbs.pivot[q] - limbs.low[q]
+        shift = reach * (share[i] * np.cos(phase[i]) - 1.0)
+        ahead = -np.sin(phase[i]) if reach > 0.0 else np.sin(phase[i])
+        lift = share[i] * limbs.lift[q] * max(ahead, 0.0)
+        for v in range(limbs.first[q], limbs.end[q]):
+            part = min(max((limbs.pivot[q] - still[v, 2]) / tall, 0.0), 1.0)
+            out[v, 0] = still[v, 0] + part * shift
+            out[v, 2] = still[v, 2] + part * lift

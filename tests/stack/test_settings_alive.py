@@ -327,6 +327,7 @@ OTHERS: dict[str, Scenario] = {
     "spray": Scenario(True, physical_lidar("rain-noon")),
     "radar_model": Scenario("physical", short_drive("clear-noon")),
     "radar_multipath": Scenario(True, with_radar),
+    "radar_interference": Scenario(0.5, lambda s: stage_of(cell(s)).setup.radar_interference),
     "radar_output": Scenario("tracks", with_radar),
     "lane_material": Scenario(True, lane_friction),
     "esc": Scenario(False, short_drive("icy_30")),

@@ -160,6 +160,13 @@ class SensorSettings(SettingsPart):
     radar_multipath: bool = setting_field(
         False, "M-1, T-11", "rails, walls and road mirror the radar, with radar_model=physical"
     )
+    radar_interference: float = setting_field(
+        0.0,
+        "M-1, T-11",
+        "share of vehicles whose radar disturbs ours, with radar_model=physical",
+        low=0.0,
+        high=1.0,
+    )
     radar_output: RadarOutput = setting_field(
         RadarOutput.POINTS, "M-1, T-11", "rows of the radar, with radar_model=physical"
     )

@@ -122,6 +122,7 @@ class Setup:
     spray: bool = False  # behind vehicles, for such lidars (embedded backend)
     radar_model: RadarModel = RadarModel.GEOMETRIC  # of the common radar (embedded backend)
     radar_multipath: bool = False  # of such a radar
+    radar_interference: float = 0.0  # share of vehicles whose radar disturbs such a radar
     radar_output: RadarOutput = RadarOutput.POINTS  # of such a radar
     stability: bool = False  # all vehicles have stability and traction control (embedded backend)
     anti_lock: AntiLock = AntiLock.IDEAL  # of vehicles that have them (embedded backend)

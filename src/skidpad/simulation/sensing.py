@@ -148,6 +148,7 @@ class WithPhysicalRadar:
             weather,
             multipath=setup.radar_multipath,
             output=setup.radar_output,
+            interference=setup.radar_interference,
             dt=setup.dt,
         )
 

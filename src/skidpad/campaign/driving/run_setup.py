@@ -300,6 +300,7 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
         spray=sensors.spray,
         radar_model=sensors.radar_model,
         radar_multipath=sensors.radar_multipath,
+        radar_interference=sensors.radar_interference,
         radar_output=sensors.radar_output,
         stability=world.esc,
         anti_lock=world.anti_lock,

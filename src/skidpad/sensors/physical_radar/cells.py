@@ -122,14 +122,16 @@ def add_echo(
     r0, v0, b0 = round(at[0]), round(at[1]), round(at[2])
     amplitude = sqrt(snr)
     c, s = np.cos(phase), np.sin(phase)
+    in_range = (hann(r0 - 1 - at[0]), hann(r0 - at[0]), hann(r0 + 1 - at[0]))
+    in_speed = (hann(v0 - 1 - at[1]), hann(v0 - at[1]), hann(v0 + 1 - at[1]))
     for b in range(max(b0 - 1, 0), min(b0 + 2, grid.beams)):
         beam = amplitude * exp(-2.0 * log(2.0) * (b - at[2]) ** 2)
         for v in range(max(v0 - 1, 1 - SPEEDS // 2), min(v0 + 2, SPEEDS // 2)):
-            row = beam * hann(v - at[1])
+            row = beam * in_speed[v - v0 + 1]
             if row * row < WEAK:
                 continue
             for r in range(max(r0 - 1, 1), min(r0 + 2, grid.ranges)):
-                value = row * hann(r - at[0])
+                value = row * in_range[r - r0 + 1]
                 if value * value < WEAK:
                     continue
                 number = cell_number(r, v, b)

@@ -39,6 +39,7 @@ from skidpad.sensors.physical_radar.echoes import (
     find_screens,
 )
 from skidpad.sensors.physical_radar.ghosts import add_ghosts
+from skidpad.sensors.physical_radar.interference import add_interference
 from skidpad.sensors.physical_radar.lists import POWER, SECTION, add_sections, join_rows
 from skidpad.sensors.physical_radar.mirrors import mirrors_of
 from skidpad.sensors.physical_radar.setup import (
@@ -83,6 +84,7 @@ class PhysicalRadar:
         *,
         multipath: bool = False,
         output: RadarOutput = RadarOutput.POINTS,
+        interference: float = 0.0,
         dt: float = DT,
     ) -> None:
         """Builds the radar's targets, mirrors and cells.
@@ -95,10 +97,12 @@ class PhysicalRadar:
             weather: acts on the waves; None: it does not.
             multipath: walls, rails and the road mirror the waves.
             output: cells, objects or tracks.
+            interference: share of vehicles that have a radar which disturbs this one.
             dt: s between two ticks.
         """
         self.spec, self._key = spec, np.uint64(stream_key(seed, "physical radar", spec.id))
         self._multipath, self._output, self._dt = multipath, output, dt
+        self._interference = interference
         walls = walls_of(roadside)
         self._world = hold(
             RadarWorld(
@@ -114,7 +118,7 @@ class PhysicalRadar:
 
     def change(self, weather: Weather | None) -> None:
         """Weather is another from the next tick on."""
-        self.setup = setup_of(self.spec, self._key, weather, self._multipath)
+        self.setup = setup_of(self.spec, self._key, weather, self._multipath, self._interference)
         self._held = hold(self.setup)
 
     def measure(self, tick: int, states: ActorStates) -> RadarPoints:
@@ -174,6 +178,8 @@ def find_detections(
     sensor = _sensor_of(radar, states)
     clear(cells)
     screens = find_screens(radar, world, states, sensor.origin)
+    if radar.rivals > 0.0:
+        sensor = add_interference(radar, world, states, sensor, screens)
     add_actors(radar, world, cells, states, sensor, screens, tick)
     add_sites(radar, world, cells, states, sensor, screens, tick)
     if radar.multipath:

@@ -19,6 +19,7 @@ from skidpad.core.arrays import Floats
 from skidpad.core.specs import RadarSpec
 from skidpad.core.weather import Weather
 from skidpad.physics.grip import rain_rate
+from skidpad.physics.interference import AFFECTED, interference_over_noise
 from skidpad.physics.mirrors import LIGHT, concrete_permittivity
 from skidpad.physics.optics import RADAR_GHZ, rain_attenuation_db_km
 from skidpad.physics.radio import rain_scatter, wet_radome_db
@@ -59,12 +60,18 @@ class RadarSetup(NamedTuple):
     air: RadarAir
     multipath: bool  # mirrors in walls, rails and the road
     concrete: complex  # permittivity of walls
+    rivals: float  # share of vehicles whose radar disturbs this one
+    rival: float  # m^2, what one leaves over the noise from 1 m, both on the axis
 
 
 def setup_of(
-    spec: RadarSpec, key: np.uint64, weather: Weather | None, multipath: bool = False
+    spec: RadarSpec,
+    key: np.uint64,
+    weather: Weather | None,
+    multipath: bool = False,
+    rivals: float = 0.0,
 ) -> RadarSetup:
-    """Returns the constants of a radar in a weather."""
+    """Returns the constants of a radar in a weather. rivals: share of vehicles whose radar disturbs it."""
     wide, high = radians(spec.horizontal_fov_deg), radians(spec.vertical_fov_deg)
     beams = max(1, ceil(wide / BEAM_STEP))
     ranges = min(ceil(spec.range / RANGE_STEP), RANGES - 1)
@@ -74,7 +81,8 @@ def setup_of(
     air = _air(spec, factor, ranges, high, 0.0 if weather is None else rain_rate(weather))
     return RadarSetup(
         mount_of(spec.mount), key, grid, spec.range, factor, wide, high, cells * FALSE_ALARMS, air,
-        multipath, concrete_permittivity(RADAR_GHZ),
+        multipath, concrete_permittivity(RADAR_GHZ), rivals,
+        interference_over_noise(1.0, AFFECTED, RADAR_GHZ),
     )  # fmt: skip
 
 

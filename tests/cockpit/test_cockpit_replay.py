@@ -209,6 +209,45 @@ def test_a_stretch_becomes_a_film(driven, tmp_path):
             stretch_of(recording, begin, end)
 
 
+def sheet(driven, path, *words):
+    """The tiles of a written sheet, (rows, columns, 480, 640, 3)."""
+    done = CliRunner().invoke(app, ["replay", str(driven[0]), "--picture", str(path), *words])
+    assert done.exit_code == 0, done.output
+    picture = cv2.imread(str(path))
+    rows, columns = picture.shape[0] // 480, picture.shape[1] // 640
+    return picture.reshape(rows, 480, columns, 640, 3).swapaxes(1, 2)
+
+
+def test_a_moment_becomes_a_sheet_of_its_views_in_every_weather(driven, tmp_path):
+    six = sheet(driven, tmp_path / "six.png", "--at", "1", "--view", "driver", "--weather", "all")
+    assert six.shape[:2] == (2, 3)
+    noon, night = six[0, 1], six[0, 2]
+    assert noon[:200].mean() > 2.0 * night[:200].mean(), "the sky of a night is darker"
+    three = sheet(driven, tmp_path / "a" / "three.png", "--view", "left,driver,right", "--at", "1")
+    assert three.shape[:2] == (1, 3)
+    assert min(tile.std() for tile in three[0]) > 10.0
+    wet = sheet(driven, tmp_path / "b.png", "--at", "1", "--view", "driver,semantic", "--drops",
+                "--weather", "rain-noon")  # fmt: skip
+    assert wet.shape[:2] == (2, 2)
+    assert wet[0, 0][:440].tolist() != wet[0, 1][:440].tolist(), "drops are seen"
+    assert wet[1, 0][:440].tolist() == wet[1, 1][:440].tolist(), "classes have no lens"
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["--picture", "a.gif"], r"a picture's file ends in \.png, \.jpg, \.webp, got a\.gif"),
+        (["--drops"], "--weather and --drops are of a picture"),
+        (["--picture", "a.png", "--view", "driver,roof"], "--view"),
+        (["--picture", "a.png", "--weather", "hail"], "hail"),
+    ],
+)
+def test_a_wrong_sheet_is_one_sentence(driven, words, sentence):
+    done = CliRunner().invoke(app, ["replay", str(driven[0]), *words])
+    with pytest.raises(ConfigError, match=sentence):
+        raise done.exception
+
+
 def test_folders_that_hold_no_run_are_one_sentence(driven, tmp_path):
     def refused(folder):
         with pytest.raises(FileError) as caught:

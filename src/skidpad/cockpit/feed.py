@@ -93,7 +93,7 @@ class Feed:
         return number
 
     def take(self) -> Packet | None:
-        """Returns a copy of the newest picture and marks it as read; None: there is none yet."""
+        """Returns a copy of the newest picture, taken before or not, and marks it as read; None: none yet."""
         while (number := self.last) > 0:
             data = self._slot(number)
             copy = data.copy()

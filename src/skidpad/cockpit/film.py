@@ -115,9 +115,9 @@ def _other(companion: Companion, moment: Moment, view: View) -> Picture:
     shown, said = companion(moment, view)
     picture = colours(shown)
     height = picture.shape[0]
-    _write(picture, f"{abs(said['speed_kmh']):.0f} km/h", 16, height - 44, INK, 1.1, 2)
+    write_text(picture, f"{abs(said['speed_kmh']):.0f} km/h", 16, height - 44, INK, 1.1, 2)
     line = f"{said['t']:6.2f} s   {said['mode']}   {said['weather']}"
-    _write(picture, line, 16, height - 16, DIM, 0.55, 1)
+    write_text(picture, line, 16, height - 16, DIM, 0.55, 1)
     return picture
 
 
@@ -141,14 +141,16 @@ def _say(
 ) -> None:
     """Writes speed, grip, time, mode and events into the picture, in place."""
     height = picture.shape[0]
-    _write(picture, f"{abs(motion['speed_kmh']):.0f} km/h", 16, height - 44, INK, 1.1, 2)
+    write_text(picture, f"{abs(motion['speed_kmh']):.0f} km/h", 16, height - 44, INK, 1.1, 2)
     mu = [v for v in motion["mu"] if v is not None]
     grip = f"   grip {min(mu):.2f}" if mu else ""
-    _write(picture, f"{tick * DT:6.2f} s{grip}   {stack['mode']}", 16, height - 16, DIM, 0.55, 1)
-    _write(picture, ", ".join(events), 16, height - 80, ACCENT, 0.6, 2)
+    write_text(
+        picture, f"{tick * DT:6.2f} s{grip}   {stack['mode']}", 16, height - 16, DIM, 0.55, 1
+    )
+    write_text(picture, ", ".join(events), 16, height - 80, ACCENT, 0.6, 2)
 
 
-def _write(
+def write_text(
     picture: Picture, text: str, x: int, y: int, ink: tuple[int, int, int], size: float, bold: int
 ) -> None:
     """Writes a line of text with a shadow at (x, y) px, in place."""

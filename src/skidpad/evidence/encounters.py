@@ -41,8 +41,9 @@ class Encounter:
 def encounter(log: RunLog, ego: int, other: int, since: float = 0.0) -> Encounter | None:
     """Returns how two actors met; None when they were never there together.
 
-    since: s, when the interaction began; standing near before that is not in play. ego, other: columns
-    of the log.
+    ego, other: columns of the log. since: s, when the interaction began; it limits only what counts
+    as in play for `met`. `distance` and `crossed_after`, which also decides `met`, are of the whole
+    time together.
     """
     both = together(log, ego, other)
     if not both.any():

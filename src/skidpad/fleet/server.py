@@ -38,7 +38,8 @@ class Listen:
 def run(fleet: Fleet, listen: Listen, lines: MapLines, say: Callable[[str], None]) -> None:
     """Serves pages and interface, with dispatcher and upkeep, until a signal ends it.
 
-    lines: roads of a map by its name. say: takes the address.
+    lines: roads of a map by its name. say: is called once the port is bound, with a sentence that
+    contains the address. The caller closes the fleet.
     """
     one = bind_socket(listen.host, listen.port)
     port = int(one.getsockname()[1])

@@ -102,7 +102,10 @@ def write_csv(path: Path, table: pl.DataFrame) -> None:
 
 
 def read_parquet(path: Path) -> tuple[pl.DataFrame, dict[str, str]]:
-    """Returns the table at `path` and the metadata in its footer; FileError when it is not Parquet."""
+    """Returns the table at `path` and the metadata in its footer.
+
+    FileError when it is missing, damaged, too large or no Parquet.
+    """
     if not is_file(path):
         raise FileError(f"there is no file {path}")
     content = read_bytes(path, "table", PARQUET_MAX)

@@ -96,7 +96,8 @@ def _delay(node: Node, nodes: Mapping[str, Node]) -> float:
 def read_signal_state(state: str) -> LightState | None:
     """Returns what a light shows: a colour, or three lamps from the top (`on;off;off`).
 
-    The standard leaves states to the road's own signals; other words are for conditions alone: None.
+    `flashing` counts as lit, the topmost lit lamp decides, and none lit is OFF. The standard leaves
+    states to the road's own signals; other words are for conditions alone: None.
     """
     words = [word.strip().lower() for word in state.split(";")]
     if len(words) == len(LAMPS):

@@ -372,9 +372,10 @@ class Supervisor:
 
 @kernel
 def has_actor_ahead(held: Held[ActorStates], x: float, y: float, z: float, heading: float) -> bool:
-    """Returns whether an actor besides the ego is in the box ahead of a place.
+    """Returns whether the centre of an actor besides the ego is in the box ahead of a place.
 
-    The box is CLEAR_ASIDE m to both sides and CLEAR_AHEAD m long; heading: rad.
+    The box is CLEAR_ASIDE m to both sides and CLEAR_AHEAD m long, and LEVEL m up and down; heading:
+    rad. Absent actors do not count.
     """
     s = held.value
     c, sn = cos(heading), sin(heading)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from msgspec import Meta, Struct, structs
 
-from skidpad.cli.options.asked import Drivers, Tuned
+from skidpad.cli.options.asked import Climate, Drivers, Tuned
 from skidpad.cli.options.spread import spread_fields
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.run import Roads, RunSpec, Scenario
@@ -164,9 +164,29 @@ def replay(
     ] = None,
     begin: Annotated[float, typer.Option("--from", help="s, of the film.")] = 0.0,
     end: Annotated[float, typer.Option("--to", help="s, of the film.")] = 10.0,
+    picture: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write the moment --at as a picture (.png, .jpg or .webp) instead of a page."
+        ),
+    ] = None,
     view: Annotated[
-        str, typer.Option(help="driver, follow, top or crash, and every small view.")
+        str,
+        typer.Option(
+            help="driver, follow, top or crash, and every small view; of a picture several, "
+            "parted by commas."
+        ),
     ] = "follow",
+    weather: Annotated[
+        str | None,
+        typer.Option(
+            help="Of the picture, one for each: all, or presets and YAML files parted by commas; "
+            "default: as it was."
+        ),
+    ] = None,
+    drops: Annotated[
+        bool, typer.Option("--drops", help="The picture also with rain drops on the lens.")
+    ] = False,
     scenery: Annotated[
         Scenery,
         typer.Option(help="Beside the roads in the pictures, whatever the run had: full or none."),
@@ -188,15 +208,26 @@ def replay(
     from skidpad.cockpit.producer import Producer
     from skidpad.cockpit.replaying import replay_job
     from skidpad.cockpit.serving import serve
-    from skidpad.cockpit.source import timeline
+    from skidpad.cockpit.sheet import Shots, write_sheet
+    from skidpad.cockpit.source import index_at, opening_tick, timeline
     from skidpad.cockpit.studio import Looks, View
     from skidpad.core.errors import require_choice
+    from skidpad.core.setup import DT
 
+    if picture is None and (drops or weather is not None):
+        raise ConfigError("--weather and --drops are of a picture: give it with --picture FILE.png")
     source = open_source(run, hazard)
     other = None if beside is None else open_source(beside)
+    looks, known = Looks(scenery, bodywork), [v.value for v in View]
+    if picture is not None:
+        views = [View(require_choice("--view", v.strip(), known)) for v in view.split(",")]
+        weathers = () if weather is None else Climate(weather).find_weathers()
+        moment = index_at(source, opening_tick(source) if at is None else round(at / DT))
+        shots = Shots(views, weathers, drops)
+        typer.echo(write_sheet(source, moment, shots, picture, looks))
+        return
     if film is not None:
-        looks = Looks(scenery, bodywork)
-        seen = View(require_choice("--view", view, [v.value for v in View]))
+        seen = View(require_choice("--view", view, known))
         typer.echo(write_film(source, stretch_of(source, begin, end), seen, film, other, looks))
         return
     what = {

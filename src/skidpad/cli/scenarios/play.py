@@ -39,7 +39,11 @@ def play_folder(
     backend: BackendChoice,
     seeds: Seeds = 1,
 ) -> None:
-    """Play every scenario of a folder in every weather, with and without its grip."""
+    """Play every scenario of a folder in each weather, grip and seed that is asked for.
+
+    By default the weather is the file's own and the grip physical. Files that cannot be played are
+    left out with a message.
+    """
     template = play_template(cross, ego, run, scenario, tuned, backend)
     how(_campaign(template, cross, folder, seeds, []), played_report)
 

@@ -62,5 +62,9 @@ def click_export(fleet: Fleet, id: str, hazard: str) -> bytes:
 
 
 def click_analyse(fleet: Fleet, id: str) -> int:
-    """Looks for recurring hazards and returns how many clusters were found; Refused without the right."""
+    """Clusters the newest hazards, stores the analysis and returns how many clusters were found.
+
+    Fixed hazards that came back are reopened. id: of the person who clicked. Raises Refused without
+    a valid credential (401) or the right (403).
+    """
     return len(analyse(fleet, require_right(fleet, id, Action.ANALYSE)).clusters)

@@ -15,7 +15,7 @@ Searches = dict[str, tuple[str, ...]]  # sentences by the hazard's id
 
 
 def read_searches(folder: Path) -> Searches:
-    """Return what is known of each hazard that was searched; {} where none was.
+    """Returns the sentences on each hazard that was searched, by its id; {} where none was.
 
     Raises:
         FileError: the file is damaged.

@@ -47,7 +47,11 @@ def answers(
 
 
 def terminal_answer(matrix: Matrix) -> list[str]:
-    """Returns the first two answers as lines, and a command that shows the worst kept run with a crash."""
+    """Returns the first two answers as lines, where possible with a last line `Next: <command>`.
+
+    The command shows the run with the most crashes of the compared configurations; there is none
+    where that run had no crash or its log was not kept. One line alone where no run was finished.
+    """
     if not len(matrix.finished):
         return ["No run was finished."]
     functions, weather = _functions(matrix), _weather(matrix)

@@ -186,7 +186,10 @@ def _light_at(cast: _Cast, lx: float, ly: float) -> float:
 
 @inner_kernel
 def _dim_pixel(p: np.uint32, light: float) -> np.uint32:
-    """Returns the packed pixel with its light multiplied by `light`."""
+    """Returns the packed pixel dimmed to the share `light` of its light.
+
+    Its bytes are square roots of light, so they are multiplied by the root of `light`.
+    """
     gain = np.float32(np.sqrt(light))  # the picture's bytes are square roots of light
     red, green, blue = unpack(p)
     return pack(red * gain, green * gain, blue * gain)

@@ -89,9 +89,11 @@ def see_boxes(
     limit: float,
     work: CameraScratch,
 ) -> int:
-    """Writes what a camera on box 0 sees up to `limit` m into the arrays of `e`; returns how many runs.
+    """Writes what a camera on box 0 sees of the other boxes into `e`; returns how many runs.
 
-    labels: (n,) SemanticClass of the boxes. Nearer boxes hide farther ones column by column.
+    A run is an upright rectangle of pixels on a strip of a face; one box has many. What stands in `e`
+    from the returned number on is not valid. limit: m. labels: (n,) SemanticClass of the boxes.
+    Nearer boxes hide farther ones column by column.
     """
     place(e.mount, states, work.seat)
     camera = _camera(work.seat, e.focal, e.width, e.height)
@@ -274,7 +276,10 @@ def _strip_runs(
 
 @inner_kernel
 def _row(camera: Camera, px: float, py: float, pz: float) -> tuple[float, float]:
-    """Returns row in px and depth in m of a point, m from the camera; the row is NaN nearer than `NEAR`."""
+    """Returns row in px and depth in m of a point; the row is NaN for a depth below `NEAR`.
+
+    px, py, pz: m from the camera's place, along the axes of the world.
+    """
     ahead, up = camera.forward, camera.up
     forward = ahead.x * px + ahead.y * py + ahead.z * pz
     if forward < NEAR:

@@ -49,7 +49,8 @@ def droplet_layer(weather: Weather, width: int, height: int, seed: int, camera: 
 def overlaid(image: Image, layer: Layer) -> Image:
     """Returns (H, W, 3) the image seen through the drops; `image` itself where there are none.
 
-    layer: (H, W) opacity, as by `droplet_layer`. The input is never changed.
+    layer: (H, W) opacity, as by `droplet_layer`. A drop shows the scene blurred and upside down. The
+    input is never changed.
     """
     if not layer.any():
         return image

@@ -291,7 +291,10 @@ class Episode:
         self.moving.stand_among(obstacles(self.landscape.roads))
 
     def move(self, dt: float) -> None:
-        """Drives and walks all actors by one tick."""
+        """Moves all vehicles and walkers by one tick; attached actors move later, in `follow`.
+
+        dt: s, must be the step that is set in `moving`, by which the world advances.
+        """
         self.moving.grip = self.sky.grip
         self.vehicles.command(dt)
         self.moving.step()

@@ -42,7 +42,7 @@ def steering_gain(v_kmh: float) -> float:
 
 
 def angle_to(pose: Pose, target: LanePoint) -> float | None:
-    """Returns the signed angle from the heading to the target in rad (eq. 13).
+    """Returns the angle in rad from the heading to the target, positive to the left (eq. 13).
 
     None when it is nearer than TARGET_TOO_NEAR.
     """
@@ -66,7 +66,7 @@ class LaneCentring:
         self.dynamic = lookahead is Lookahead.DYNAMIC
 
     def steer(self, pose: Pose, v: float, path: PathAhead) -> float:
-        """Returns steer for the ego at `pose` with speed v (m/s); 0 without a place to steer by."""
+        """Returns steer in -1..1, left positive, at `pose` and v m/s; 0 without a place to steer by."""
         v_kmh = kmh_from_mps(v)
         distance = lookahead_distance(v_kmh) if self.dynamic else LOOKAHEAD_FIXED
         return steer_towards(pose, v_kmh, path(distance, pose.yaw))

@@ -23,7 +23,7 @@ ALONG = 0.7  # cosine between two ways that run together
 
 
 def travel_time(v: float, way: float, a: float, v_max: float = V_THROUGH) -> float:
-    """Returns the s for `way` m from speed v at acceleration a up to v_max; faster ones count as v_max."""
+    """Returns the s for `way` m from v at a > 0 m/s² up to v_max; faster ones count as v_max."""
     if v >= v_max:
         return way / v_max
     until = (v_max * v_max - v * v) / (2.0 * a)

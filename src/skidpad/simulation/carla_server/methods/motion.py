@@ -171,7 +171,7 @@ def set_actor_collisions(served: Served, id: Any, enabled: Any) -> None:
 
 @TABLE.method("set_actor_enable_gravity", Shape.VOID)
 def set_actor_enable_gravity(served: Served, id: Any, enabled: Any) -> None:
-    """Switches gravity; off, a vehicle or walker keeps its height."""
+    """Switches gravity; off, a vehicle or walker keeps its height and its tyres grip nothing."""
     actor = served.episode.actors.get(id)
     served.episode.falling.weigh(actor, wire.flag(enabled, "enabled"))
 

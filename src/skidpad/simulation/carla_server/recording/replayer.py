@@ -135,7 +135,7 @@ class Replayer:
         self.release()
 
     def release(self) -> None:
-        """Hands the actors of the replay back to physics."""
+        """Ends the replay, if one runs, and hands its actors back to physics."""
         if self._run is not None:
             self._run.free()
         self._run = None

@@ -52,7 +52,8 @@ class GivingWay:
     def shown_red(self, vehicles: Vehicles, dt: float) -> NDArray[np.bool_]:
         """Returns (n,) whether a sign shows each vehicle red, dt s after the last time.
 
-        To be called once a tick: it counts how long each has waited.
+        Call it once a tick: it counts how long each has been before its sign. A stop sign shows red for
+        at least STOPPED s, and both kinds as long as the way is taken.
         """
         n = len(vehicles)
         placed, red = vehicles.moving.placed[:n], np.zeros(n, dtype=np.bool_)

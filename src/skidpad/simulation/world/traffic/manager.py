@@ -76,7 +76,10 @@ def priority_of(
 
 
 def streets_of(map: RoadMap) -> Streets:
-    """Returns what drivers know of a map, without pedestrians."""
+    """Returns lanes, rights of way and zebras of a map as drivers know them, with no `walkers` yet.
+
+    `Traffic.arrange` puts the walkers in.
+    """
     entry, conflict, zebra, zebras = priority_of(map)
     nobody, free = np.empty(0, dtype=np.int64), np.zeros(len(zebras), dtype=np.bool_)
     return Streets(network_of(map), entry, conflict, zebra, zebras, nobody, free)

@@ -110,7 +110,10 @@ def against(reference: Path, other: Path) -> str:
     Weathers of a seed share their traffic, so a pair is a seed: the mean of its cells.
     """
     a, b = (matrix_of(folder).finished for folder in (reference, other))
-    pairs = a.join(b, on=["config", "weather", "seed"], suffix="_b")
+    cell = ["config", "weather", "seed"]
+    pairs = a.join(b, on=cell, suffix="_b").sort(
+        cell
+    )  # sums in one order: 0.175 is rounded one way
     rows = []
     configs = matrix_of(other).configs
     for config in configs if len(configs) == 1 else ["", *configs]:
@@ -120,10 +123,10 @@ def against(reference: Path, other: Path) -> str:
             if not len(both):
                 continue
             change = (pl.col(f"{name}_b").cast(pl.Float64) - pl.col(name)).mean()
-            seeds = both.group_by("seed").agg(change.alias("change"))["change"]
+            seeds = both.group_by("seed", maintain_order=True).agg(change.alias("change"))["change"]
             c = compare_pairs(seeds.to_numpy())
             title_of = config_title(config) if config else "all"
-            rows.append([title_of, title, str(c.n), f"{c.mean:+.2f}", limits(c.interval)])
+            rows.append([title_of, title, str(c.n), f"{round(c.mean, 9):+.2f}", limits(c.interval)])
     return markdown(("configuration", "per run", "seeds", f"minus {reference.name}", "95 %"), rows)
 
 

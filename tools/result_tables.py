@@ -108,6 +108,7 @@ def block(name: str, which: str, folder: Path) -> str:
             path.with_name(reference_of(path)), path
         ),
         "adas envelope": result_envelope.rivals,
+        "adas goals": result_envelope.goals,
         "adas pareto": result_envelope.pareto,
         "grip completion": result_grip.completion,
         "grip claims": result_grip.claims,

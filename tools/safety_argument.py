@@ -21,8 +21,6 @@ ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "docs" / "results"
 ARGUMENT, PAGE = RESULTS / "envelope-argument.yaml", ROOT / "docs" / "envelope-safety.md"
 ESTIMATES = "envelope-estimates/estimates.csv"
-MAPS = ("envelope-figure8", "envelope-motorway", "envelope-town")
-SLIPPERY = ("rain-noon", "rain_100", "snow", "icy_30", "icy_100")
 LEAST, SPEED_SHARE, TOO_HIGH = 3.0, 0.85, 0.05
 
 
@@ -50,11 +48,11 @@ def estimate_on(results: Path, is_patchy: bool) -> Status:
 def _slippery(results: Path, name: str) -> pl.DataFrame | None:
     """Returns the runs of one driver on all maps in rain, snow and ice; None: not driven everywhere."""
     found = []
-    for folder in (results / map_name for map_name in MAPS):
+    for folder in (results / map_name for map_name in proof.MAPS):
         drivers = proof.read_drivers(folder) if (folder / "results.parquet").is_file() else {}
         if name not in drivers:
             return None
-        found.append(drivers[name].filter(pl.col("weather").is_in(SLIPPERY)))
+        found.append(proof.on_surfaces(drivers[name], proof.SLIPPERY))
     return pl.concat(found, how="diagonal")
 
 
@@ -63,8 +61,8 @@ def fewer_events_than_bare(results: Path) -> Status:
     bare, governed = (_slippery(results, name) for name in (proof.BARE, proof.ENVELOPE))
     if bare is None or governed is None or proof.events(bare) < ENOUGH:
         return Status.UNDEVELOPED
-    km = [float(runs["distance_km"].sum()) for runs in (bare, governed)]
-    bound = factor_bound(proof.events(bare), proof.events(governed)) * km[1] / km[0]
+    bound = factor_bound(proof.events(bare), proof.events(governed))
+    bound *= proof.way_ratio(bare, governed)
     return Status.SUPPORTED if bound >= LEAST else Status.REFUTED
 
 
@@ -73,8 +71,8 @@ def fewer_events_than_table(results: Path) -> Status:
     rival, governed = (_slippery(results, name) for name in (proof.TABLE, proof.ENVELOPE))
     if rival is None or governed is None:
         return Status.UNDEVELOPED
-    km = [float(runs["distance_km"].sum()) for runs in (rival, governed)]
-    bound = factor_bound(proof.events(rival), proof.events(governed)) * km[1] / km[0]
+    bound = factor_bound(proof.events(rival), proof.events(governed))
+    bound *= proof.way_ratio(rival, governed)
     return Status.SUPPORTED if bound > 1.0 else Status.REFUTED
 
 

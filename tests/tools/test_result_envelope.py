@@ -24,7 +24,7 @@ def write_runs(folder: Path, contacts: dict[str, int], speed: float = 40.0) -> N
         {
             "config": config, "weather": weather, "seed": seed, "distance_km": 5.0,
             "mean_speed_kmh": speed + seed % 3, "serious_contacts": n if weather == "snow" else 0,
-            "road_departures": 0, "rear_ended": 1,
+            "road_departures": 0, "rear_ended": 1, "motion_hash": f"{weather} {seed} {n}",
         }
         for config, n in contacts.items()
         for weather in ("snow", "clear-noon")
@@ -56,6 +56,47 @@ def test_rivals_lie_beside_and_the_table_is_tested_by_seed(tmp_path):
     assert float(snow["envelope"][9]) < 0.05
     assert float(dry["envelope"][9]) == 1.0
     assert snow["table of three speeds"][4] == "24"
+
+
+def test_weathers_in_which_all_moved_alike_count_once(tmp_path):
+    folder = tmp_path / "envelope-figure8"
+    write_runs(folder, {"3": 3, "5": 0})
+    runs = pl.read_parquet(folder / "results.parquet")
+    again = runs.with_columns(
+        pl.col("weather").replace({"snow": "blizzard", "clear-noon": "clear-night"})
+    )
+    differs = again.with_columns(
+        pl.when(weather="clear-night", config="5").then(pl.lit("x")).otherwise("motion_hash").alias(
+            "motion_hash"
+        )
+    )  # fmt: skip
+    pl.concat([runs, differs]).write_parquet(folder / "results.parquet")
+    weathers = {row[0] for row in proof.cells(folder)}
+    assert weathers == {"snow, blizzard", "clear-noon", "clear-night"}
+    assert proof.events(proof.read_drivers(folder)["bare"]) == 36
+
+
+def test_goals_are_judged_over_the_maps_that_are_driven(tmp_path):
+    for name in proof.MAPS[:2]:
+        write_runs(tmp_path / name, {"3": 3, "5": 0}, speed=36.0)
+        write_runs(tmp_path / f"{name}-table", {"3": 2})
+        write_runs(tmp_path / f"{name}-oracle", {"3": 0})
+    text = proof.goals(tmp_path / proof.MAPS[0])
+    assert text.startswith("2 of 3 maps.")
+    rows = {line.split("|")[1].strip(): line.split("|")[2:] for line in text.splitlines()[2:]}
+    bare, table, envelope, by_bare, by_table, speed, p_bare, p_table = (
+        cell.strip() for cell in rows["snow"][:8]
+    )
+    assert (bare, table, envelope) == ("72 in 120 km", "48 in 120 km", "0 in 120 km")
+    assert by_bare == f"above {power.factor_bound(72, 0):.1f}"
+    assert by_table == f"above {power.factor_bound(48, 0):.1f}"
+    assert speed == f"{100 * 37 / 41:.0f} %"
+    assert max(float(p_bare), float(p_table)) < 0.01
+    assert rows["dry"][4].strip() == "too few (0)"
+
+
+def test_a_factor_is_of_events_per_km(tmp_path):
+    assert proof.factor_text(40, 4, 0.5) == f"5.0 (above {0.5 * power.factor_bound(40, 4):.1f})"
 
 
 def test_the_picture_has_every_driver(tmp_path):

@@ -27,7 +27,7 @@ def write_estimates(results: Path, too_high: float) -> None:
 
 def write_drives(results: Path, bare: int, governed: int, speed: float = 40.0) -> None:
     """So many contacts in each run of 12 on each map, of the bare stack, and of the envelope."""
-    for name in safety.MAPS:
+    for name in safety.proof.MAPS:
         for folder, config, n, v in (
             (name, "3", bare, 60.0), (name, "5", governed, speed), (f"{name}-table", "3", bare, 40.0),
             (f"{name}-oracle", "3", 0, 40.0),
@@ -36,7 +36,8 @@ def write_drives(results: Path, bare: int, governed: int, speed: float = 40.0) -
             path.parent.mkdir(parents=True, exist_ok=True)
             rows = [
                 {"config": config, "weather": "snow", "seed": s, "distance_km": 5.0, "rear_ended": 0,
-                 "mean_speed_kmh": v, "serious_contacts": n, "road_departures": 0}
+                 "mean_speed_kmh": v, "serious_contacts": n, "road_departures": 0,
+                 "motion_hash": f"{s} {n}"}
                 for s in range(12)
             ]  # fmt: skip
             table = pl.DataFrame(rows)

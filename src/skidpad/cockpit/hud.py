@@ -33,7 +33,10 @@ def round_value(value: float | None, digits: int = 2) -> float | None:
 
 
 def mean_grip(mu: NDArray[np.float32]) -> float | None:
-    """Returns the mean friction of the tyres that touch a road; None when none does."""
+    """Returns the mean friction of the tyres of one actor; None when no value is finite.
+
+    mu: NaN where there is no tyre; 0, as of a tyre in the air, counts.
+    """
     known = mu[np.isfinite(mu)]
     return float(known.mean()) if known.size else None
 

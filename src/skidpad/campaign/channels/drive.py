@@ -296,7 +296,10 @@ def _about(spec: RunSpec, segment: Segment) -> dict[str, str]:
 
 
 def _variant(spec: RunSpec) -> dict[str, str]:
-    """Returns the words in which a run differs from the published route; empty where it does not."""
+    """Returns variant, weather and stratum of a run whose route has a `base`; {} for one as published.
+
+    ConfigError for a run that drives no route.
+    """
     course = route_of(spec)
     if not course.base:
         return {}

@@ -249,7 +249,12 @@ class Density:
         self.called = 0  # of the reserve
 
     def words(self, truth: WorldTruth) -> list[ActorCommand]:
-        """Returns the commands of this tick: the farthest leave first, the nearest come first."""
+        """Returns commands that bring the number of vehicles to `wanted`; none where that is None.
+
+        The farthest from the ego leave first. The nearest come back first, where they left, with ROOM m to
+        all others and FROM_EGO m to the ego; missing ones are called from the reserve. Changes `away` and
+        `called`: call it once per tick.
+        """
         if self.wanted is None:
             return []
         return [*self._call(truth), *self._leave_or_come(truth, self.wanted)]

@@ -157,9 +157,9 @@ class Synchronized:
             self.noted = note_bound(scene, self.actor, "SynchronizeAction", asked, applied, of)
 
     def _share_of_road(self, scene: Scene) -> float:
-        """Returns the part of its speed that runs along the road; 1 off every lane.
+        """Returns abs(cos) of the angle between the actor's yaw and its lane; 1 off every lane.
 
-        esmini plans the course away with it.
+        The course of `away` is planned with the actor's speed times this share, as in esmini.
         """
         pose = self.actor.pose
         lane = scene.network.place_of(pose).lane

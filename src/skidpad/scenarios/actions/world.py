@@ -141,7 +141,10 @@ class SetEnvironment:
     environment: Environment
 
     def happen(self, scene: Scene) -> Running:
-        """Sets weather and time from the next step on; returns an action that is done."""
+        """Queues the weather for the next step and sets the clock at once; returns a done action.
+
+        An environment without a time of day leaves the clock as it is.
+        """
         scene.environments.append(self.environment)
         scene.tell_time(self.environment)
         return DONE

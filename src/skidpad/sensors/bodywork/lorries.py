@@ -223,7 +223,11 @@ def _between(
 def _cab_mirrors(
     label: int, x: tuple[float, float], width: float, half: float, top: float
 ) -> list[Mesh]:
-    """Upright mirrors beside the screen, within the width of the box."""
+    """Returns the two upright mirrors beside a lorry's windscreen, within the width of the box.
+
+    x: rear and front of the cab; width: of the box; half: half the width of the hull; top: height of
+    the cab; all in m.
+    """
     place = x[1] - 0.32
     outer = 0.5 * width
     inner = min(outer - 0.14, half - 0.02) if outer - half > 0.05 else outer - 0.05

@@ -72,10 +72,10 @@ def _find_limb(vertices: Points, first: int, end: int, pivot: float, lift: float
 def _walker(
     label: int, style: WalkerStyle, deep: float, wide: float
 ) -> tuple[list[Mesh], list[tuple[int, float, float]]]:
-    """A walker of height 1 with one leg and the other arm ahead, so far in and across as is asked.
+    """Returns the parts of a walker of height 1 in mid-step, left leg and right arm ahead, and its limbs.
 
-    Returns its parts, and of each limb the first of its LIMB_PARTS parts, the height of its pivot and its
-    lift in m.
+    A limb: the first of its LIMB_PARTS parts, the height of its pivot, and its lift in m. deep, wide: half
+    the length and half the width of its box, as shares of its height.
     """
     hip, neck = style.hip, style.neck
     k = min(1.0, (wide - 0.042) / 0.112)

@@ -87,10 +87,10 @@ def _pictures(source: Source, k: int, shots: Shots, looks: Looks) -> Iterator[Pi
                     picture = np.ascontiguousarray(image.rgb[..., ::-1])
                 else:
                     picture = colours(plane(image))
-                yield _titled(picture, title + added)
+                yield _frame_with_title(picture, title + added)
 
 
-def _titled(picture: Picture, title: str) -> Picture:
+def _frame_with_title(picture: Picture, title: str) -> Picture:
     """Returns the picture in the size of the sheet's, bars beside it where its shape differs, titled."""
     scale = min(WIDTH / picture.shape[1], HEIGHT / picture.shape[0])
     small = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)

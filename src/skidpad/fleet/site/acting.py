@@ -64,7 +64,7 @@ def click_export(fleet: Fleet, id: str, hazard: str) -> bytes:
 def click_analyse(fleet: Fleet, id: str) -> int:
     """Clusters the newest hazards, stores the analysis and returns how many clusters were found.
 
-    Fixed hazards that came back are reopened. id: of the person who clicked. Raises Refused without
+    Fixed hazards that came back are reopened. id: of the account that asks. Raises Refused without
     a valid credential (401) or the right (403).
     """
     return len(analyse(fleet, require_right(fleet, id, Action.ANALYSE)).clusters)

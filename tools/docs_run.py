@@ -9,7 +9,8 @@ A comment before a block says how it is run:
     <!-- not run: needs Docker -->                                           never, and why
 
 Blocks of one page share a folder and run in order. Lines without `$` are what the commands print; a
-block with a title is a file of that name. docs/extending.md is run by tests of its own.
+block with a title is a file of that name. `pip install ./NAME` installs a package of the page, without
+network, into a folder of its own. docs/extending.md is run by tests of its own.
 """
 
 from __future__ import annotations
@@ -24,9 +25,12 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from configparser import ConfigParser
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timezone
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -39,6 +43,9 @@ BLOCK = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 ELSEWHERE = ("extending.md",)
+INSTALL = re.compile(r"^\$ pip install \./([\w-]+)$", re.MULTILINE)  # a package that the page holds
+PACKAGES = "packages"  # folder that such packages are installed to
+ENTRY_POINTS = 'project.entry-points."'
 SET_UP = re.compile(r"^(make run|source |pip install)")  # what the environment has been through
 LONGEST_S = 3600.0
 
@@ -114,7 +121,10 @@ def run_block(block: Block, folder: Path, quick: bool) -> float:
     """
     script, printed = block.script(quick)
     if block.title:
+        (folder / block.title).parent.mkdir(parents=True, exist_ok=True)
         (folder / block.title).write_text(script, encoding="utf-8")
+    for name in INSTALL.findall(block.text) if block.language == "console" else ():
+        install(folder / name, folder / PACKAGES)
     if block.title or not script.strip():
         return 0.0
     if block.language == "python":
@@ -138,7 +148,8 @@ def run_block(block: Block, folder: Path, quick: bool) -> float:
 def call(words: list[str], folder: Path) -> tuple[int, str]:
     """Run a command, end what it left running, and return its code and what it printed."""
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
-    environment = {**os.environ, "PATH": path, "COLUMNS": "120"}
+    python = os.pathsep.join(filter(None, [os.environ.get("PYTHONPATH"), str(folder / PACKAGES)]))
+    environment = {**os.environ, "PATH": path, "PYTHONPATH": python, "COLUMNS": "120"}
     with (folder / "said.txt").open("w+", encoding="utf-8") as said:
         process = subprocess.Popen(
             words, cwd=folder, env=environment, stdout=said, stderr=subprocess.STDOUT,
@@ -151,6 +162,49 @@ def call(words: list[str], folder: Path) -> tuple[int, str]:
                 os.killpg(process.pid, signal.SIGTERM)
         said.seek(0)
         return code, said.read()
+
+
+def install(package: Path, packages: Path) -> None:
+    """Installs a package into a folder by pip, without network.
+
+    The setuptools that Python 3.11 brings along cannot build alone; there it is unpacked instead.
+    """
+    if not has_builder():
+        unpack(package, packages)
+        return
+    options = ("--no-index", "--no-build-isolation", "--no-deps", "--disable-pip-version-check")
+    words = ["pip", "install", "-q", *options, "--upgrade", "--target", str(packages), str(package)]
+    subprocess.run([sys.executable, "-m", *words], check=True)
+
+
+def has_builder() -> bool:
+    """Tells whether setuptools is there and can build a wheel."""
+    try:
+        import_module("setuptools.command.bdist_wheel")  # since setuptools 70.1
+    except ImportError:
+        return find_spec("setuptools") is not None and find_spec("wheel") is not None
+    return True
+
+
+def unpack(package: Path, packages: Path) -> None:
+    """Installs a package of plain modules as pip does.
+
+    Modules are copied, and names, version and entry points go into a .dist-info folder.
+    """
+    toml = ConfigParser()
+    toml.read(package / "pyproject.toml", encoding="utf-8")
+    name, version = (toml["project"][key].strip('"') for key in ("name", "version"))
+    about = packages / f"{name.replace('-', '_')}-{version}.dist-info"
+    about.mkdir(parents=True)
+    for module in package.glob("*.py"):
+        (packages / module.name).write_bytes(module.read_bytes())
+    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
+    lines = []
+    for section in toml.sections():
+        if section.startswith(ENTRY_POINTS):
+            lines.append(f"[{section[len(ENTRY_POINTS) : -1]}]")
+            lines += [f"{key} = {value[1:-1]}" for key, value in toml[section].items()]
+    (about / "entry_points.txt").write_text("\n".join(lines) + "\n")
 
 
 def prepare(folder: Path) -> None:

@@ -6,14 +6,12 @@ import os
 import re
 import subprocess
 import sys
-from configparser import ConfigParser
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 
 import polars as pl
 import pytest
 
+from docs_run import install
 from skidpad.cli.lookup.extensions import extension_points
 from skidpad.recording.run.log_files import read_log
 
@@ -21,52 +19,6 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "extending.md"
 RECIPE = re.compile(r"^## (An? .+?)\n(.*?)(?=^## |\Z)", re.DOTALL | re.MULTILINE)
 BLOCK = re.compile(r"```(\w+)(?: title=\"([\w./-]+)\")?\n(.*?)```", re.DOTALL)
 RECIPES = dict(RECIPE.findall(PAGE.read_text(encoding="utf-8")))
-ENTRY_POINTS = 'project.entry-points."'
-
-
-def install(package: Path, packages: Path) -> None:
-    """Installs a package into a folder by pip, without network.
-
-    The setuptools that Python 3.11 brings along cannot build alone; there it is unpacked instead.
-    """
-    if not has_builder():
-        unpack(package, packages)
-        return
-    options = ("--no-index", "--no-build-isolation", "--no-deps", "--disable-pip-version-check")
-    call(
-        package.parent, "-m", "pip", "install", "-q", *options,
-        "--upgrade", "--target", str(packages), str(package),
-    )  # fmt: skip
-
-
-def has_builder() -> bool:
-    """Tells whether setuptools is there and can build a wheel."""
-    try:
-        import_module("setuptools.command.bdist_wheel")  # since setuptools 70.1
-    except ImportError:
-        return find_spec("setuptools") is not None and find_spec("wheel") is not None
-    return True
-
-
-def unpack(package: Path, packages: Path) -> None:
-    """Installs a package of plain modules as pip does.
-
-    Modules are copied, and names, version and entry points go into a .dist-info folder.
-    """
-    toml = ConfigParser()
-    toml.read(package / "pyproject.toml", encoding="utf-8")
-    name, version = (toml["project"][key].strip('"') for key in ("name", "version"))
-    about = packages / f"{name.replace('-', '_')}-{version}.dist-info"
-    about.mkdir(parents=True)
-    for module in package.glob("*.py"):
-        (packages / module.name).write_bytes(module.read_bytes())
-    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
-    lines = []
-    for section in toml.sections():
-        if section.startswith(ENTRY_POINTS):
-            lines.append(f"[{section[len(ENTRY_POINTS) : -1]}]")
-            lines += [f"{key} = {value[1:-1]}" for key, value in toml[section].items()]
-    (about / "entry_points.txt").write_text("\n".join(lines) + "\n")
 
 
 def call(folder: Path, *arguments: str, packages: Path | None = None) -> str:

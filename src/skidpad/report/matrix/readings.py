@@ -4,22 +4,14 @@ from __future__ import annotations
 
 import polars as pl
 
-from skidpad.recording.run.readings import name_values, read_readings, summarise_readings
+from skidpad.recording.run.readings import name_values, read_readings
 from skidpad.report.elements.page import Block, Cell, Table
+from skidpad.report.elements.readings import READING_COLUMNS, reading_rows
 from skidpad.report.matrix.data import Matrix
 
 TYPE = "envelope"  # of the recorded "sensor" that holds the envelope's columns
 UNKNOWN = 0.3  # confidence below which the prior alone speaks
-COLUMNS = (
-    ("configuration", ""),
-    ("weather", ""),
-    ("sensor", "id that the stack gave it"),
-    ("type", ""),
-    ("quantity", "the unit stands in its name"),
-    ("mean", ""),
-    ("least", ""),
-    ("most", ""),
-)
+COLUMNS = (("configuration", ""), ("weather", ""), *READING_COLUMNS)
 
 
 def reading_blocks(matrix: Matrix) -> list[Block]:
@@ -29,11 +21,8 @@ def reading_blocks(matrix: Matrix) -> list[Block]:
     first = first.sort("config", "weather")
     for run, name in zip(first.iter_rows(named=True), matrix.names(first), strict=True):
         folder = None if name is None else matrix.folder.log(name)
-        readings = None if folder is None else read_readings(folder)
-        for s in () if readings is None else summarise_readings(readings):
-            words = (run["config"], run["weather"], s.sensor.id, s.sensor.title, s.quantity)
-            numbers = (Cell("-" if v is None else f"{v:.4g}", v) for v in (s.mean, s.least, s.most))
-            rows.append([*(Cell(word) for word in words), *numbers])
+        cell = [Cell(run["config"]), Cell(run["weather"])]
+        rows += [[*cell, *row] for row in ([] if folder is None else reading_rows(folder))]
     return [
         Table(
             COLUMNS, rows, "Readings of further sensors and functions, first seed of each weather"

@@ -27,6 +27,7 @@ from skidpad.report.elements.page import (
     write_page,
     write_report_page,
 )
+from skidpad.report.elements.readings import READING_COLUMNS, reading_rows
 from skidpad.report.elements.tables import Column, Format, table
 from skidpad.report.play.cards import run_anchor, run_card, run_title
 from skidpad.report.play.runs import (
@@ -112,6 +113,7 @@ def build_page(played: Played) -> Page:
         Section("Runs", [_runs_table(runs, links)]),
         Section("Counterparts", _counterparts(runs)),
         Section("Run by run", _cards(played, runs)),
+        Section("Readings", _readings(runs)),
         Section("Crashes", _crashes(played, runs)),
         Section("Definitions", [Definitions(MEANINGS)]),
     ]
@@ -311,6 +313,20 @@ COUNTERPARTS: list[Column[Of]] = [
     ),
     Column("speed at contact", _speed_of_contact, unit="km/h", format=Format(".0f", absent="-")),
 ]  # fmt: skip
+
+
+def _readings(runs: Sequence[PlayRun]) -> list[Block]:
+    """Returns a table of what was recorded beside the log in the first INLINE runs, or nothing."""
+    rows = [
+        [Cell(run.scenario), Cell(_outside(run)), *row]
+        for run in runs[:INLINE]
+        if run.folder is not None
+        for row in reading_rows(run.folder)
+    ]
+    columns = (("scenario", ""), ("weather", ""), *READING_COLUMNS)
+    which = f", the {INLINE} runs that need a look most" if len(runs) > INLINE else ""
+    title = f"Readings of further sensors and functions{which}"
+    return [Table(columns, rows, title)] * bool(rows)
 
 
 def _crashes(played: Played, runs: Sequence[PlayRun]) -> list[Block]:

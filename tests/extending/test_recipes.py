@@ -57,21 +57,27 @@ def follow(text: str, folder: Path, packages: Path) -> list[str]:
     return followed
 
 
+def replayed_readings(folder: Path, out: str) -> str:
+    """Returns what the cockpit's replay of a campaign's run shows, without the package."""
+    replay = "from skidpad.cockpit.replay import RecordedRun; from pathlib import Path; "
+    replay += f"print(RecordedRun(next(Path('{out}/runs').iterdir())).readings(20))"
+    return call(folder, "-c", replay)
+
+
 def check_sensor(folder: Path) -> None:
     """The report, and the cockpit's replay without the package, show the sensor."""
     assert "Radar to the rear" in (folder / "out/behind/report.html").read_text("utf-8")
-    replayed = "from skidpad.cockpit.replay import RecordedRun; from pathlib import Path; "
-    replayed += "print(RecordedRun(next(Path('out/behind/runs').iterdir())).readings(20))"
-    assert "Radar to the rear, returns" in call(folder, "-c", replayed)
+    assert "Radar to the rear, returns" in replayed_readings(folder, "out/behind")
 
 
 def check_function(folder: Path) -> None:
-    """The function held the vehicle to the limit of 100 km/h, and the report shows its numbers."""
+    """The function held the vehicle to the limit of 100 km/h; report and cockpit show its numbers."""
     page = folder / "out/assisted/report.html"
     assert "Intelligent speed assistance" in page.read_text("utf-8")
     rows = pl.read_parquet(page.with_name("results.parquet"))
     assert 90.0 < rows["max_speed_kmh"].item() < 101.0
     assert rows["functions"].item() == "acc+lca+isa"
+    assert "Intelligent speed assistance, limit kmh" in replayed_readings(folder, "out/assisted")
 
 
 def check_indicator(folder: Path) -> None:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from skidpad.core.channels import ChannelView
-from skidpad.core.frames import CameraImage, GnssFix, ImuReading, LidarPoints
+from skidpad.core.errors import StackError
+from skidpad.core.frames import CameraImage, GnssFix, ImuReading, LidarPoints, SensorFrame
 from skidpad.core.geometry import Pose
 from skidpad.core.registry import Registry, load_factory
 from skidpad.core.sight import DriverView
@@ -37,6 +38,7 @@ class AnySpec(Protocol):
         """Returns the pose relative to the vehicle's origin."""
 
 
+R = TypeVar("R")
 Measure = Callable[[], Any]  # returns the reading of the present tick
 
 
@@ -114,6 +116,19 @@ def _own_types() -> tuple[SensorType, ...]:
 
 
 SENSORS = Registry("sensor", "skidpad.sensors", SensorType, _own_types)
+
+
+def read_sensor(frame: SensorFrame, id: str, kind: type[R]) -> R:
+    """Returns the reading of a sensor that a stack asked for; StackError for none, or another kind.
+
+    kind: the `reading` of the sensor's type.
+    """
+    if id not in frame.extra:
+        raise StackError(f"sensor {id!r} was not asked for: `sensors()` must return its spec")
+    found = frame.extra[id]
+    if not isinstance(found, kind):
+        raise StackError(f"sensor {id!r} must read {kind.__name__}, got {type(found).__name__}")
+    return found
 
 
 def find_sensor_type(spec: object) -> SensorType | None:

@@ -15,6 +15,7 @@ from typing import Any
 from skidpad.core.constants import G
 from skidpad.core.errors import require_range
 from skidpad.core.frames import SensorFrame
+from skidpad.core.sensor_types import read_sensor
 from skidpad.core.setup import DT
 from skidpad.core.specs import (
     AIR_THERMOMETER,
@@ -154,7 +155,7 @@ class Envelope:
         applied: the command of the tick before. The frame's `extra` must hold RAIN_ID and AIR_ID.
         """
         set_to, ego, v = self.settings, frame.ego, max(frame.ego.speed, 0.0)
-        stage, air_c = int(frame.extra[RAIN_ID]), float(frame.extra[AIR_ID])
+        stage, air_c = read_sensor(frame, RAIN_ID, int), read_sensor(frame, AIR_ID, float)
         way = way_ahead(self.map, ego.pose)
         grade = 0.0 if way is None else way.grade
         drive = self.grip.car.drive_at(applied.throttle, v)

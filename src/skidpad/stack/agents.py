@@ -29,6 +29,7 @@ from skidpad.core.lefthanded import (
     vector_from_carla,
     vectors_to_carla,
 )
+from skidpad.core.sensor_types import read_sensor
 from skidpad.core.setup import DT
 from skidpad.core.specs import CameraSpec, LidarSpec, Modality, SensorSpec
 from skidpad.core.states import StackReport, VehicleCommand
@@ -180,7 +181,7 @@ class AgentStack:
         if kind in CAMERAS:
             return _image(MARK + str(wanted["id"]), CAMERAS[kind], frame)
         if kind == LIDAR:
-            seen: LidarPoints = frame.extra[MARK + str(wanted["id"])]
+            seen = read_sensor(frame, MARK + str(wanted["id"]), LidarPoints)
             places = vectors_to_carla(*seen.xyz.astype(np.float64).T)
             return np.column_stack((places, seen.intensity)).astype(np.float32)
         return {"speed": ego.speed}

@@ -26,9 +26,10 @@ from skidpad.campaign.channels.world import TRAFFIC, Segment, crew_of, route_of,
 from skidpad.campaign.driving.backends import WATCHDOG, keep_server, make_backend
 from skidpad.campaign.driving.loop import Moment, Sink, Unsupervised, loop
 from skidpad.campaign.driving.pace import RealTime
-from skidpad.core.channels import ChannelFrame, Context, Decision, TruthFrame
+from skidpad.core.channels import ChannelFrame, ChannelView, Context, Decision, TruthFrame
 from skidpad.core.frames import SensorFrame
 from skidpad.core.run import ARBITER, RunSpec
+from skidpad.core.sensor_types import read_sensor
 from skidpad.core.setup import DT, ActorCommand
 from skidpad.core.specs import ChannelSpec
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
@@ -114,7 +115,8 @@ class Crew:
             for channel in self.channels:
                 channel.keep_below(v_max)
         self.frames: list[ChannelFrame] = [
-            channel.update(frame.extra[channel.name]) for channel in self.channels
+            channel.update(read_sensor(frame, channel.name, ChannelView))
+            for channel in self.channels
         ]
         scores = safety_scores(self.frames).tolist()
         names, drive_by = self.crew.channels, self.crew.drive_by

@@ -16,6 +16,7 @@ import numpy as np
 from skidpad.core.errors import require_choice
 from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import mps_from_kmh
+from skidpad.core.sensor_types import read_sensor
 from skidpad.core.setup import DT
 from skidpad.core.sight import DriverView, SeenActors
 from skidpad.core.specs import EyesSpec, SensorSpec
@@ -251,4 +252,4 @@ class ReferenceStack:
         if self.supervision is not Supervision.NONE:
             self.supervision = Supervision.NONE
             self.driver.reset()
-        return self.driver.act(frame.extra[EYES])
+        return self.driver.act(read_sensor(frame, EYES, DriverView))

@@ -156,7 +156,7 @@ $(VENV)/.installed: $(BIN)/python pyproject.toml
 	touch $@
 
 $(VENV)/.tested-with: $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet --prefer-binary -e '.[test,server,cluster,ros,live,learn,search,cockpit,fleet,osi,crg,rl]'
+	$(BIN)/python -m pip install --quiet --prefer-binary -e '.[test,server,cluster,ros,live,learn,search,cockpit,fleet,osi,crg,geo,rl]'
 	-$(BIN)/python -m pip install --quiet --prefer-binary -e '.[carla]'
 	touch $@
 

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import sys
 from math import pi
 
 import pytest
 
-from skidpad.core.errors import ConfigError
+from skidpad.core.errors import ConfigError, MissingExtra
 from skidpad.roads.projection import EARTH_RADIUS, map_place
+
+
+def test_without_the_package_one_sentence_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyproj", None)
+    with pytest.raises(MissingExtra, match=r"GeoPosition on a map with a projection .*\[geo\]"):
+        map_place("+proj=utm +zone=32", 0.0, 9.0)
+    assert map_place("", 0.0, 180.0)[0] == pytest.approx(pi * EARTH_RADIUS)
 
 
 def test_a_zone_of_utm_has_its_meridian_at_500_km():

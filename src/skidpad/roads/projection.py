@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import isfinite, radians
 
-from skidpad.core.errors import ConfigError
+from skidpad.core.errors import ConfigError, MissingExtra
 from skidpad.core.told import describe_value
 
 EARTH_RADIUS = 6_378_137.0  # m, equator of WGS 84, for maps without a projection
@@ -21,13 +21,15 @@ def map_place(projection: str, latitude: float, longitude: float) -> tuple[float
 
     projection: the PROJ text of the map's header (ASAM OpenDRIVE 1.8, "Geo referencing"). Without one,
     on the plane that touches the earth at 0, 0. ConfigError when PROJ knows no such projection or the
-    place lies outside it.
+    place lies outside it, MissingExtra where PROJ is not installed.
     """
     if "+proj=" not in projection:
         return EARTH_RADIUS * radians(longitude), EARTH_RADIUS * radians(latitude)
-    from pyproj import Proj  # takes 60 ms, which few maps and files need
-    from pyproj.exceptions import ProjError
-
+    try:
+        from pyproj import Proj  # takes 60 ms, which few maps and files need
+        from pyproj.exceptions import ProjError
+    except ImportError as error:
+        raise MissingExtra("a GeoPosition on a map with a projection", "geo") from error
     words = (word for word in projection.split() if word.lstrip("+").partition("=")[0] in KEPT)
     try:
         x, y = Proj(" ".join(words))(longitude, latitude, errcheck=True)

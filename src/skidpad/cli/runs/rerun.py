@@ -83,7 +83,11 @@ def _show(result: Rerun) -> None:
 
 def study(
     id: Annotated[
-        str, typer.Argument(help="F-08, F-17 to F-19, F-21, F-25, F-29, F-30, noise or A-278.")
+        str,
+        typer.Argument(
+            help="A finding, by its id in docs/results/claims.md, which says what each claims: "
+            "F-08, F-17 to F-19, F-21, F-25, F-29, F-30, A-278; or noise."
+        ),
     ],
     seeds: Annotated[int, typer.Option(min=1, help="Seeds per arm.")] = 6,
     workers: Annotated[

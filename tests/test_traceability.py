@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pytest
 
+from support.slow_tests import quick_tests
 from traceability import DOC, marks, proof, render, states, summaries
 
 DECISION = re.compile(r"[XLMGCKRT]-[1-9]\d?")  # the project's settled questions; not listed
@@ -36,6 +37,20 @@ def test_what_is_not_yet_there_has_no_test_that_claims_it():
 )
 def test_what_only_words_prove_is_said_to_be_proved_by_words(tests, how):
     assert proof(tests) == how
+
+
+# Proved by slow tests alone, because the proof needs the real client and a world that ticks.
+SLOW_ALONE = {"A-266"}
+
+
+def test_make_test_touches_every_requirement():
+    """Each requirement that is done has a test that is not slow; what has none stands in the list."""
+    quick, state = quick_tests(), states()
+    open_ones = set(state["differs"]) | set(state["not_yet"])
+    done = {i: set(tests) for i, tests in marks().items() if i in set(summaries()) - open_ones}
+    assert len(done) > 400
+    slow = {i for i, tests in done.items() if not quick & tests}
+    assert slow == SLOW_ALONE
 
 
 def test_files_of_tests_have_names_of_their_own():

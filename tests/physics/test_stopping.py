@@ -29,6 +29,7 @@ def test_stops_like_the_measured_ones(surface, v0, measured):
     assert physical_stop(surface, v0).distance == pytest.approx(measured, rel=0.10)
 
 
+@pytest.mark.req("B-001")
 @pytest.mark.parametrize("kmh", [50, 80, 100])
 def test_dry_wet_snow_ice(kmh):
     distances = [

@@ -265,7 +265,7 @@ def test_each_panel_has_the_ways_of_its_own_friction_and_variant():
     assert lateral_ends(three.svg, PALETTE[1]) == [{-3.0}, {-4.0}, {-5.0}]
 
 
-@pytest.mark.req("B-140")
+@pytest.mark.req("B-005", "B-140")
 def test_the_density_is_that_of_steering_and_bands_hold_eight_runs_of_ten(monkeypatch):
     """Ten runs whose speeds are 0 to 9 m/s; steering is spread evenly to the left, or to both sides."""
     drawn_charts = []

@@ -5,13 +5,15 @@
 
 from __future__ import annotations
 
+import ast
 from collections import defaultdict
 from functools import cache
 from pathlib import Path
 
 import pytest
 
-LIST = Path(__file__).parents[1] / "slow_tests.txt"
+TESTS = Path(__file__).parents[1]
+LIST = TESTS / "slow_tests.txt"
 SLOW_S = 2.0  # a test function whose cases together take longer is slow
 
 
@@ -27,6 +29,20 @@ def slow_functions() -> frozenset[str]:
 def is_slow(nodeid: str) -> bool:
     """Returns whether the test function of this id is in the list."""
     return function_of(nodeid) in slow_functions()
+
+
+def quick_tests() -> set[str]:
+    """Returns the ids of the test functions that `make test` runs, and of files that have some."""
+    quick = set()
+    for path in sorted(TESTS.rglob("test_*.py")):
+        file = path.relative_to(TESTS).as_posix()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.FunctionDef) or not node.name.startswith("test_"):
+                continue
+            marks = {ast.unparse(decorator) for decorator in node.decorator_list}
+            if "pytest.mark.slow" not in marks and not is_slow(f"{file}::{node.name}"):
+                quick |= {file, f"{file}::{node.name}"}
+    return quick
 
 
 def function_of(nodeid: str) -> str:

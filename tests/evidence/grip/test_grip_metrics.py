@@ -54,7 +54,7 @@ def test_with_two_vehicles_the_nearer_counts_at_each_tick():
     assert grip_series(log)[:, 3].tolist() == pytest.approx([10.0, 20.0])
 
 
-@pytest.mark.req("B-104", "B-105", "B-106")
+@pytest.mark.req("B-005", "B-104", "B-105", "B-106")
 def test_score_is_route_times_a_penalty_for_each_infraction():
     hit = ContactEvent(9, 1, "", 100.0, 5.0, 0.0, 0.0)
     log = drive(10, lambda k: [going(5.0 * k), going(60.0)], contacts=[hit])
@@ -183,7 +183,7 @@ def test_a_series_of_another_shape_has_no_delay():
     assert np.isnan(delays(a, b)).all()
 
 
-@pytest.mark.req("B-107", "B-108", "B-148")
+@pytest.mark.req("B-005", "B-107", "B-108", "B-148")
 def test_distances_of_equal_cells_are_zero_and_of_others_above_their_floor():
     t = np.arange(0.0, 15.0, DT)
     a, b = cell(braking(5.0, t)), cell(0.5 * braking(5.0, t))

@@ -6,6 +6,7 @@ from __future__ import annotations
 import ast
 import csv
 from collections import defaultdict
+from functools import cache
 from pathlib import Path
 
 import yaml
@@ -62,6 +63,7 @@ def states() -> dict[str, dict[str, str]]:
     return {kind: dict(raw[kind] or {}) for kind in ("differs", "not_yet")}
 
 
+@cache
 def marks() -> dict[str, list[str]]:
     """Requirement id to the tests that carry it, as `path::name`."""
     found: dict[str, list[str]] = defaultdict(list)
@@ -69,7 +71,7 @@ def marks() -> dict[str, list[str]]:
         tree = ast.parse(path.read_text(encoding="utf-8"))
         where = path.relative_to(ROOT / "tests").as_posix()
         module_ids = [i for node in tree.body for i in _module_mark(node)]
-        for node in ast.walk(tree):
+        for node in tree.body:
             if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
                 ids = [i for d in node.decorator_list for i in _ids(d)]
                 for i in ids:

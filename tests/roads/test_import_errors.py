@@ -100,7 +100,10 @@ def test_the_content_hash_sees_any_change(figure8: RoadMap) -> None:
 
 
 def test_junction_ids_never_meet_road_ids_in_our_maps() -> None:
-    for path in FOLDER.glob("*.xodr"):
+    paths = sorted(FOLDER.glob("*.xodr"))
+    assert len(paths) > 3
+    seen = set()
+    for path in paths:
         text = path.read_text()
         roads = set(re.findall(r'<road [^>]*?\bid="(\d+)"', text))
         junctions = set(re.findall(r'<junction [^>]*?\bid="(\d+)"', text))
@@ -108,6 +111,8 @@ def test_junction_ids_never_meet_road_ids_in_our_maps() -> None:
         assert roads.isdisjoint(junctions)
         assert all(int(j) >= 9000 for j in junctions)
         assert "<geoReference>" in text
+        seen |= junctions
+    assert len(seen) > 3
 
 
 def test_our_importer_follows_junctions_even_when_a_road_has_their_id() -> None:

@@ -63,15 +63,18 @@ def test_the_answer_counts_what_the_trials_say(found):
 
 
 def test_failures_are_contacts_above_5_kmh_and_others_are_none(found):
-    for trial in read_trials(found[0]):
+    trials = read_trials(found[0])
+    assert {trial.is_failure for trial in trials} == {True, False}
+    for trial in trials:
         hard = trial.contact_kmh is not None and trial.contact_kmh > 5.0
         assert trial.is_failure == (hard or trial.departed_s is not None)
 
 
 def test_the_border_lies_between_two_runs_that_were_driven(found):
     out, _ = found
-    space = read_search(out).space
-    for group in read_findings(out).groups:
+    space, groups = read_search(out).space, read_findings(out).groups
+    assert groups
+    for group in groups:
         assert group.failing.is_failure
         assert not group.harmless.is_failure
         gap = np.abs(np.subtract(group.failing.unit, group.harmless.unit))

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from skidpad.evidence.channels.hazards import Signal
+from skidpad.evidence.channels.judging import kept
 from skidpad.evidence.channels.judging.evaluation import Evaluation
-from skidpad.evidence.channels.judging.kept import code_hash, segment_bytes, segment_from
+from skidpad.evidence.channels.judging.kept import segment_bytes, segment_from
 from skidpad.evidence.channels.judging.segments import Segment, judge
 from skidpad.recording.channels.cycles import cycles
 from support.channel_worlds import Eyes, World, drive
@@ -53,9 +54,26 @@ def test_a_damaged_file_is_not_taken(segment):
     assert segment_from(data.replace(b"text.npy", b"tixt.npy"), MADE_BY) is None
 
 
-def test_the_code_has_one_name_as_long_as_it_is_the_same():
-    assert code_hash() == code_hash()
-    assert len(code_hash()) == 64
+def test_the_code_has_one_hash_as_long_as_code_and_rules_are_the_same(tmp_path, monkeypatch):
+    """A copy elsewhere has the same hash; another byte, name or file of rules has another."""
+
+    def hash_of(name: str, **texts: str) -> str:
+        folder = tmp_path / name
+        folder.mkdir()
+        for stem, text in texts.items():
+            folder.joinpath(stem.replace("__", ".")).write_text(text)
+        monkeypatch.setattr(kept, "FOLDER", folder)
+        return kept.code_hash.__wrapped__()
+
+    first = hash_of("first", a__py="x = 1\n", rules__yaml="limit: 3\n")
+    assert hash_of("copy", rules__yaml="limit: 3\n", a__py="x = 1\n", notes__md="z") == first
+    others = [
+        hash_of("code", a__py="x = 2\n", rules__yaml="limit: 3\n"),
+        hash_of("rules", a__py="x = 1\n", rules__yaml="limit: 4\n"),
+        hash_of("name", b__py="x = 1\n", rules__yaml="limit: 3\n"),
+        hash_of("more", a__py="x = 1\n", rules__yaml="limit: 3\n", b__py=""),
+    ]
+    assert len({first, *others}) == 5
 
 
 @pytest.mark.req("C-233")

@@ -58,6 +58,8 @@ class Scenario:
         parameters: Values of the file's parameters, by name.
         seed: Of sensor noise and traffic.
         duration: Longest simulated time, s.
+        disturb: Other vehicles whose acceleration varies at random, as `--disturb`:
+            "lead=accel", or "lead=accel(0.5,2)" for 0.5 m/s^2 and 2 s.
 
     Raises:
         ScenarioError: The file cannot be played; the message lists all reasons.
@@ -79,11 +81,13 @@ class Scenario:
         parameters: Mapping[str, float | str] | None = None,
         seed: int = 1,
         duration: float = 120.0,
+        disturb: Sequence[str] = (),
     ) -> None:
         words = [mode.value for mode in ActorMode]
         course = Course(
             parameters=dict(parameters or {}),
             actors=ActorMode(require_choice("actors", actors, words)),
+            disturb=tuple(disturb),
         )
         settings = load_profile("recommended", {"grip": GripModel.PHYSICAL})
         spec = template(
@@ -170,12 +174,13 @@ class Scenario:
 
         Args:
             checkpoint: of this scenario.
-            branch: sensor noise and choices of traffic are drawn from random streams of
-                this name from now on; without a name they go on as they were.
+            branch: sensor noise, choices of traffic and disturbances are drawn from random
+                streams of this name from now on; without a name they go on as they were.
         """
         checkpoint.restore(self)
         if branch:
             branch_backend(self._open.backend, branch)
+            self.player.disturbances.branch(branch)
 
     @property
     def t(self) -> float:

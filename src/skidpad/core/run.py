@@ -220,6 +220,14 @@ class Scenario(Struct, frozen=True, kw_only=True, tag="scenario", forbid_unknown
         Meta(description="NAME=module:Class, a controller, action or value that files may name."),
     ] = ()
     strict: Annotated[bool, Meta(description="Names that nobody registered are errors.")] = False
+    disturb: Annotated[
+        tuple[str, ...],
+        Meta(
+            description="ACTOR=accel or ACTOR=accel(SIGMA,TAU): another vehicle's acceleration varies "
+            "at random, by SIGMA m/s^2 and correlated over TAU s; without numbers as measured."
+        ),
+    ] = ()
+    draws: dict[str, tuple[float, ...]] = {}  # draws of disturbances before those of the seed
 
     @property
     def title(self) -> str:
@@ -391,6 +399,10 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
                 plain[name] = value
         if isinstance(self.driver, AdasDriver) and not self.driver.added:  # as before, too
             del plain["driver"]["added"]
+        if isinstance(self.course, Scenario):  # likewise
+            for name in ("disturb", "draws"):
+                if not getattr(self.course, name):
+                    del plain["course"][name]
         return plain
 
 

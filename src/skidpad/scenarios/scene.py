@@ -270,7 +270,7 @@ class Actor:
             pose, v, _ = self.track.at(t)
             v = v if self.track.timed or self.track.steered else self.guide.v
         else:
-            pose, v = self._pose_on_road(dt), self.guide.v
+            pose, v = self._pose_on_road(dt), self.guide.v_now
         self.pose = pose
         return ActorCommand(self.name, place=self.centre(pose), speed=v)
 

@@ -44,6 +44,7 @@ from skidpad.physics.wind import wind_of_intensity
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
 from skidpad.scenarios import scenario as scenarios
+from skidpad.scenarios.playing.disturbing import Disturbances, read_disturbances
 from skidpad.scenarios.playing.player import Player, setups
 from skidpad.scenarios.registry import Names
 from skidpad.scenarios.shipped import NAMES, scenario_file
@@ -206,6 +207,9 @@ def _scenario(spec: RunSpec, course: Scenario) -> Stage:
         duration=spec.duration,
         end_on_collision=course.end_on_collision,
         seed=spec.seed,
+        disturbances=Disturbances(
+            read_disturbances(course.disturb, compiled), course.draws, spec.seed
+        ),
     )
     ego, actors = setups(compiled)
     setup = replace(setup_of(spec, compiled.map_name, ego), actors=actors)
@@ -237,8 +241,9 @@ def load_scenario(
 
     conditions: in what stacks of other actors drive.
     """
-    checked = check_scenario(course, conditions)
-    return checked.playable()
+    found = check_scenario(course, conditions).playable()
+    read_disturbances(course.disturb, found)  # what is wrong in them is said here
+    return found
 
 
 def check_scenario(

@@ -312,6 +312,8 @@ class OpenRun:
         checkpoint.restore(self)
         if branch:
             branch_backend(self.backend, branch)
+            if self.stage.player is not None:
+                self.stage.player.disturbances.branch(branch)
 
     def close(self) -> None:
         """Releases the backend and what it holds."""

@@ -84,6 +84,7 @@ class Guide:
         self.network, self.base = network, point
         self.free = pose  # where there is no lane: straight on
         self.v, self.a = v, 0.0
+        self.dv = self.da = 0.0  # of a disturbance, on top of v and a
         self.pace: float | None = None  # speed of this step's way, where it is not v
         self.aside = 0.0  # m sideways in this step, without a heading of its own
         self.leap = 0.0  # m along the way that this step puts it further, without a speed
@@ -95,6 +96,11 @@ class Guide:
         look = 0.0 if point is None else wrap_angle(pose.yaw - point.heading)
         self.along = 1.0 if abs(look) <= pi / 2.0 else -1.0
         self.turn = look if self.along > 0.0 else wrap_angle(look - pi)
+
+    @property
+    def v_now(self) -> float:
+        """Returns the demanded speed with its disturbance, m/s."""
+        return self.v + self.dv
 
     def advance(self, motion: Motion | Pose) -> None:
         """Moves the reference point on, to abreast of the actor; at the end of the road it stays."""
@@ -138,15 +144,15 @@ class Guide:
         """Moves the reference point abreast of an actor, and returns what a driver has to do."""
         self.advance(motion)
         if self.base is None:
-            return Demand(self.v, self.a, 0.0, 0.0, 0.0, 0.0, reverse=self.v < 0.0)
+            return Demand(self.v_now, self.a + self.da, 0.0, 0.0, 0.0, 0.0, reverse=self.v < 0.0)
         heading = self.base.heading if self.along > 0.0 else self.base.heading + pi
         c, s = cos(heading), sin(heading)
         dx, dy = motion.x - self.base.x, motion.y - self.base.y
         left = dy * c - dx * s
         drift = motion.vy * c - motion.vx * s
         return Demand(
-            v=0.0 if self.at_end else self.v,
-            a=0.0 if self.at_end else self.a,
+            v=0.0 if self.at_end else self.v_now,
+            a=0.0 if self.at_end else self.a + self.da,
             curvature=self.along * self.base.curvature,
             error=left - self.along * self.offset,
             error_rate=drift - self.along * self.offset_rate,
@@ -159,7 +165,7 @@ class Guide:
 
         What the speed, leap and way aside of this one step were is used up.
         """
-        v, self.pace = self.v if self.pace is None else self.pace, None
+        v, self.pace = (self.v if self.pace is None else self.pace) + self.dv, None
         leap, aside, self.leap, self.aside = self.leap, self.aside, 0.0, 0.0
         way = v * dt
         if self.base is None:

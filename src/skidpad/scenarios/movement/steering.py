@@ -180,7 +180,7 @@ class LaneSteering:
 
     def step(self, guide: Guide, pose: Pose, dt: float) -> Pose:
         """Returns the pose a step of dt s on; moves the guide's point along and sets `settled`."""
-        v = guide.v
+        v = guide.v_now
         guide.advance(pose)
         offset, self.offset = guide.offset if self.offset is None else self.offset, None
         target = guide.preview(look_ahead(self.axles, v), offset)

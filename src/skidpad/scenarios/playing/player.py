@@ -16,6 +16,7 @@ from skidpad.recording.run.staging import Staging
 from skidpad.scenarios.actions.routing import go_on_after_track
 from skidpad.scenarios.movement.motion import Guide
 from skidpad.scenarios.movement.network import Place
+from skidpad.scenarios.playing.disturbing import Disturbances
 from skidpad.scenarios.playing.piloting import control
 from skidpad.scenarios.playing.staging import WayOfEgo, staging_of
 from skidpad.scenarios.playing.telling import Telling
@@ -77,6 +78,7 @@ class Player:
     skill: of the drivers, by actor.
     end_on_collision: a contact of the ego ends the run; else the file alone decides.
     seed: of the traffic that actions bring.
+    disturbances: of other vehicles; None: there are none.
     """
 
     def __init__(
@@ -89,10 +91,12 @@ class Player:
         end_on_collision: bool = False,
         dt: float = DT,
         seed: int = 0,
+        disturbances: Disturbances | None = None,
     ) -> None:
         self.scenario, self.duration, self.end_on_collision = scenario, duration, end_on_collision
         self.modes, self.skill = dict(modes or {}), dict(skill or {})
         self.actors: dict[str, Actor] = {}
+        self.disturbances = disturbances or Disturbances((), {}, seed)
         self.scene = Scene(
             scenario.network, dt, self.actors, dict(scenario.parameters),
             dict(scenario.variables), ego=scenario.ego, seed=seed,
@@ -152,6 +156,8 @@ class Player:
         self.telling.step(self.scene)
         drive(self.scene)
         control(self.scene)
+        if not first:  # so that a run may branch at its first tick with nothing drawn
+            self.disturbances.step(self.actors, self.scene.dt)
         t = self.scene.t
         stopped = self.hit and self.end_on_collision
         self.ended = self.telling.ended or stopped or t >= self.duration

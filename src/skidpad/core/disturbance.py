@@ -25,6 +25,7 @@ KNOT_S = 1.0
 LARGEST = 4.0  # standard deviations that an acceleration stays within; assumption
 SHARE = 0.25  # of the speed that the scenario asks for, within which the disturbed one stays; assumption
 SIGMAS, TAUS = (0.001, 5.0), (0.1, 60.0)  # that may be asked for
+PREFIX = "disturb."  # of names of variables: "disturb.lead.3" is z[3] of `lead`
 NUMBER = r"(\d+\.?\d*|\.\d+)"
 FORM = re.compile(rf"accel(?:\({NUMBER},{NUMBER}\))?")
 
@@ -49,6 +50,16 @@ class Disturbance(Struct, frozen=True):
     def acceleration(self, x: float) -> float:
         """Returns the acceleration in m/s^2 for a value of the process."""
         return self.sigma * min(max(x, -LARGEST), LARGEST)
+
+
+def name_draw(actor: str, k: int) -> str:
+    """Returns the name of the variable that is draw number k of an actor's disturbance."""
+    return f"{PREFIX}{actor}.{k}"
+
+
+def actor_of_draw(name: str) -> str:
+    """Returns the actor whose disturbance a variable is a draw of; "" for any other variable."""
+    return name.removeprefix(PREFIX).rpartition(".")[0] if name.startswith(PREFIX) else ""
 
 
 def parse_disturbance(text: str) -> Disturbance:

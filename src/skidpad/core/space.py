@@ -171,7 +171,9 @@ class Space(Struct, frozen=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         names = [v.name for v in self.variables]
         if not names:
-            raise ConfigError("nothing varies: give --vary NAME=LOW:HIGH, or a distribution file")
+            raise ConfigError(
+                "nothing varies: give --vary NAME=LOW:HIGH, --disturb ACTOR=accel or a distribution file"
+            )
         if len(set(names)) < len(names):
             raise ConfigError(f"a name varies twice: {', '.join(names)}")
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from math import ceil, log
 from pathlib import Path
 
+from skidpad.core.disturbance import actor_of_draw, name_draw, parse_disturbance
 from skidpad.core.wording import count_text
 from skidpad.recording.campaign.risks import (
     RISK_RUNS,
@@ -13,8 +14,10 @@ from skidpad.recording.campaign.risks import (
     Influence,
     Probability,
     Rate,
+    Repetition,
     Risk,
     RiskFound,
+    name_input,
     read_risk,
     read_risk_found,
 )
@@ -44,8 +47,8 @@ SUBSET = "subset simulation"
 AIMED = 0.45  # relative half-width, a little below the largest that determines something
 SCALED = "times the probability when all values of the input are multiplied so"
 INTERVALS = (
-    "counting: exact; subset simulation: Student's of the logarithm over its repetitions; importance "
-    "sampling: normal of the logarithm"
+    "counting: exact; subset simulation and splitting: Student's of the logarithm over repetitions; "
+    "importance sampling: normal of the logarithm"
 )
 
 
@@ -61,14 +64,20 @@ def risk_page(asked: Risk, found: RiskFound, trials: Sequence[Trial]) -> Page:
     """Returns the page of a question and what came of it."""
     run = asked.template
     title = f"Risk: {getattr(run.course, 'title', 'scenario')}"
-    subtitle = f"{driver_text(run.driver)}, {count_text(len(trials), 'run')}"
+    subtitle = f"{driver_text(run.driver)}, {count_text(_run_count(found, trials), 'run')}"
     sections = [
         Section("Answer", [_answers(asked, found, trials)]),
         Section("Methods", _methods(found)),
+        *([Section("Branches", _branches(found.splitting))] if found.splitting else []),
         Section("What it hangs on", [_inputs(asked, found)]),
         Section("Limits of this answer", [Text(_limits(asked, found))]),
     ]
     return Page(title=title, subtitle=subtitle, sections=sections)
+
+
+def _run_count(found: RiskFound, trials: Sequence[Trial]) -> int:
+    """Returns how many runs were driven, those of splitting included."""
+    return len(trials) + sum(r.runs for r in found.splitting)
 
 
 def answer(asked: Risk, found: RiskFound) -> str:
@@ -133,7 +142,7 @@ def _answers(asked: Risk, found: RiskFound, trials: Sequence[Trial]) -> Answers:
     return Answers([
         Answer("How probable is a crash?", answer(asked, found), lines, _estimates(found)),
         Answer("What happens then?", kinds[0] if kinds else "No crash was reached.", kinds[1:]),
-        Answer("What did it cost?", f"{count_text(len(trials), 'run')}. {cost}".strip()),
+        Answer("What did it cost?", f"{count_text(_run_count(found, trials), 'run')}. {cost}".strip()),
     ])  # fmt: skip
 
 
@@ -181,14 +190,66 @@ def _methods(found: RiskFound) -> list[Block]:
     if found.levels:
         events = ", ".join(f"{level:.2f}" for level in found.levels)
         least = min(found.ancestors)
+        sampling = "counting tells" if found.splitting else "importance sampling tells"
         blocks += [
             Text(
                 f"Subset simulation went through margins {events} (first repetition). Its failures stem "
-                f"from at least {least} different first samples in each repetition; importance sampling "
-                f"tells as much as {found.effective:.0f} failures of equal weight."
+                f"from at least {least} different first samples in each repetition; {sampling} "
+                f"as much as {found.effective:.0f} failures of equal weight."
             )
         ]
     return blocks
+
+
+def _branches(repetitions: Sequence[Repetition]) -> list[Block]:
+    """Returns how far branches diverge, and what each repetition of splitting went through."""
+    columns = [
+        ("repetition", ""),
+        ("probability", "its own, unbiased estimate"),
+        ("levels", "margins under which its rounds went on"),
+        ("failing", "drives of its end that fail"),
+        ("ancestors", "different first drives from which these stem"),
+        ("runs", ""),
+    ]
+    rows = [
+        [
+            Cell(str(r.number + 1), r.number),
+            Cell(f"{r.p:.2g}", r.p),
+            Cell(", ".join(f"{level:.2f}" for level in r.levels) or "-", len(r.levels)),
+            Cell(str(r.failing), r.failing),
+            Cell(str(r.ancestors), r.ancestors),
+            Cell(str(r.runs), r.runs),
+        ]
+        for r in repetitions
+    ]
+    note = (
+        "Few ancestors mean that the failures of a repetition have one past in common. The interval "
+        "comes from the repetitions, which are independent of each other."
+    )
+    table = Table(columns, rows, caption="repetitions of splitting", note=note)
+    apart = mean_distances(repetitions)
+    if not apart:
+        return [table]
+    with canvas(height=2.6) as (figure, (axes,)):
+        axes.plot([s for s, _ in apart], [d for _, d in apart], "o-", color=PALETTE[0])
+        axes.set_xlabel("s since the branch")
+        axes.set_ylabel("distance, m")
+        picture = Figure(
+            svg_of(figure),
+            "How far the disturbed vehicle of a branch is from where it was in the drive that was left, "
+            "mean over all branches that were still driven.",
+        )
+    return [picture, table]
+
+
+def mean_distances(repetitions: Sequence[Repetition]) -> list[tuple[int, float]]:
+    """Returns the mean distance of branches in m by s since the branch, over all repetitions."""
+    found = []
+    for k in range(max(len(r.apart) for r in repetitions)):
+        ones = [r.apart[k] for r in repetitions if len(r.apart) > k]
+        count = sum(n for n, _ in ones)
+        found.append((k, sum(n * distance for n, distance in ones) / count))
+    return found
 
 
 def _method_row(e: Probability) -> list[Cell]:
@@ -222,7 +283,16 @@ def _inputs(asked: Risk, found: RiskFound) -> Table:
             *_influence_cells(by_name.get(v.name)),
         ]
         for v in asked.space.variables
+        if not actor_of_draw(v.name)
     ]
+    for one in map(parse_disturbance, getattr(asked.template.course, "disturb", ())):
+        law = f"acceleration: sigma {one.sigma:g} m/s², correlated over {one.tau:g} s"
+        cells = [
+            Cell(name_input(name_draw(one.actor, 0))),
+            Cell(law),
+            Cell(one.source or "assumption"),
+        ]
+        rows.append([*cells, *_influence_cells(None)])
     for unit, rate in (("hour", asked.per_hour), ("100 km", asked.per_100km)):
         if rate is not None:
             name, source = Cell(f"encounters per {unit}"), Cell(rate.source or "assumption")

@@ -13,7 +13,7 @@ from skidpad.recording.files import write_bytes
 from skidpad.scenarios.reading.distributions import read_weights, scenario_of_choices
 from skidpad.scenarios.reading.document import Node, parse
 from skidpad.scenarios.reading.parameters import inner
-from skidpad.search.space import SEED, WEATHER, check_space
+from skidpad.search.space import check_space, is_parameter
 
 TOP = "ParameterValueDistribution"
 
@@ -79,7 +79,7 @@ def write_choices(path: Path, scenario: str, trials: Sequence[Trial]) -> None:
     for trial in trials:
         one = ElementTree.SubElement(sets, "ParameterValueSet")
         for name, value in trial.values.items():
-            if name != SEED and name.partition(".")[0] != WEATHER:
+            if is_parameter(name):
                 text = value if isinstance(value, str) else repr(value)
                 ElementTree.SubElement(one, "ParameterAssignment", parameterRef=name, value=text)
     ElementTree.indent(root)

@@ -17,9 +17,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from skidpad.core.arrays import Floats
+from skidpad.evidence.drive.conflict import deceleration_to_avoid_crash, time_to_collision
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.evidence.drive.severity import LIGHT_BELOW, Contact, graded_contacts
-from skidpad.evidence.pairs import Pair, pairs
+from skidpad.evidence.pairs import EGO, Pair, body, following, pairs, together
 from skidpad.recording.run.log import RunLog
 from skidpad.roads.queries import RoadMap
 
@@ -117,6 +119,41 @@ def closeness(
         max_drac_mps2=_most_braking(found),
         contact=hardest,
         departed_s=departed,
+    )
+
+
+def approach(log: RunLog, off_road: np.ndarray) -> Floats:
+    """Returns (T,) the margin that a run would have if it had ended at each tick; it never rises.
+
+    From the first contact or departure of the ego on it is 1.0; what that is worth, `closeness` says.
+    Runs are ranked by all three terms ("combined"). off_road: (T,) as for `closeness`.
+    """
+    gap, ttc = (np.full(len(log), np.inf) for _ in range(2))
+    drac = np.zeros(len(log))
+    bodies = [body(log, i) for i in range(len(log.table.names))]
+    for i in range(1, len(bodies)):
+        both = together(log, EGO, i)
+        for f in (following(bodies[EGO], bodies[i]), following(bodies[i], bodies[EGO])):
+            apart = np.where(both & ~np.isnan(f.gap), f.gap, np.inf)
+            gap = np.minimum(gap, apart)
+            ttc = np.minimum(ttc, time_to_collision(apart, f.v_closing))
+            drac = np.maximum(drac, deceleration_to_avoid_crash(apart, f.v_closing))
+    gap_term, ttc_term, braking_term = (
+        _rise_of(np.minimum.accumulate(gap), GAP_SCALE),
+        _rise_of(np.minimum.accumulate(ttc), TTC_SCALE),
+        BRAKING_SCALE / (BRAKING_SCALE + np.maximum.accumulate(drac)),
+    )
+    levels = 1.0 + (gap_term + ttc_term + braking_term) / 3.0
+    ends = [c.tick for c in log.contacts] + log.tick[off_road].tolist()
+    if ends:
+        levels[log.tick >= min(ends)] = 1.0
+    return levels
+
+
+def _rise_of(values: Floats, scale: float) -> Floats:
+    """Returns what `_rising` does for an array, in which inf stands for a value that never applied."""
+    return np.where(
+        np.isinf(values), 1.0, values / (np.where(np.isinf(values), 0.0, values) + scale)
     )
 
 

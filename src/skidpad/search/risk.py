@@ -13,20 +13,25 @@ import msgspec
 import numpy as np
 from scipy.special import ndtr
 
-from skidpad.campaign.workers.worker import Runner
+from skidpad.campaign.workers.worker import Job, Runner
 from skidpad.core.arrays import Floats
+from skidpad.core.errors import BackendError
 from skidpad.core.space import Choice, Variable
 from skidpad.recording.campaign.risks import (
     RISK_FOUND,
     RISK_RUNS,
     SCALES,
+    SPLITTING,
     Influence,
     Probability,
+    Repetition,
     Risk,
     RiskFound,
+    read_repetitions,
 )
 from skidpad.recording.campaign.searches import Trial
 from skidpad.recording.files import write_bytes
+from skidpad.search.branching import SplitTask, split_drives
 from skidpad.search.loop import StoredTrials, drive_all
 from skidpad.search.probability import (
     Estimate,
@@ -39,11 +44,14 @@ from skidpad.search.probability import (
     sample_mixture,
     subset_estimate,
 )
+from skidpad.search.splitting import METHOD as SPLITTING_METHOD
+from skidpad.search.splitting import splitting_estimate
 from skidpad.search.trial import Point, unit_tuple
 
 OBJECTIVE = "combined"
 LEAST_EFFECTIVE = 30.0  # failures of equal weight below which a changed input is not judged
 OUTSIDE = 0.01  # share of a changed input that may lie where none was drawn
+SPLIT_DEADLINE_S = 7 * 86_400.0  # of one repetition of splitting
 ENOUGH = 100  # counted failures from which on counting alone determines the result: +-20 %
 
 
@@ -86,10 +94,14 @@ def estimate_risk(
     found = explore(limit, len(asked.space.variables), rng, asked.repetitions, asked.per_level)
     explored, first = len(limit.trials), len(found.first)
     counted, subset = counting_estimate(found.first), subset_estimate(found)
-    if counted.p * first >= ENOUGH:
-        samples = Weighted(np.empty((first, 0)), np.ones(first), found.first)
+    repetitions: tuple[Repetition, ...] = ()
+    if asked.disturbed:
+        repetitions = split_all(asked, out, runner, lambda runs: on_run(explored + runs))
+        samples, trials = _independent(found.first), limit.trials[:first]
+        answer = answer_by_splitting(counted, subset, repetitions)
+    elif counted.p * first >= ENOUGH:
+        samples, trials = _independent(found.first), limit.trials[:first]
         answer = Answer(counted.p, counted.low, counted.high, "", (counted,))
-        trials = limit.trials[:first]
     elif len(found.failing):
         samples = sample_mixture(limit, found.failing, rng, asked.samples)
         weighted = importance_estimate(samples, explored)
@@ -101,8 +113,10 @@ def estimate_risk(
         samples, trials = Weighted(np.empty((0, 0)), np.empty(0), np.empty(0)), []
         answer = Answer(0.0, 0.0, counted.high, "no failure was reached", (counted, subset))
     seconds = {
-        counted.method: limit.simulated_s(0, first), subset.method: limit.simulated_s(0, explored)
-    }  # fmt: skip
+        counted.method: limit.simulated_s(0, first),
+        subset.method: limit.simulated_s(0, explored),
+        SPLITTING_METHOD: sum(r.simulated_s for r in repetitions),
+    }
     result = RiskFound(
         probabilities=tuple(
             _plain(e, seconds.get(e.method, limit.simulated_s(0))) for e in answer.estimates
@@ -114,11 +128,12 @@ def estimate_risk(
         levels=tuple(found.chains[0].levels),
         ancestors=tuple(c.ancestors for c in found.chains),
         effective=samples.effective,
-        kinds=_kinds(trials, samples),
+        kinds=_kinds_of_splits(repetitions) if repetitions else _kinds(trials, samples),
         influences=tuple(
             influence_of(v, k, trials, samples) for k, v in enumerate(asked.space.variables)
         ),
-        faults=sum(bool(t.fault) for t in limit.trials),
+        faults=sum(bool(t.fault) for t in limit.trials) + sum(r.faults for r in repetitions),
+        splitting=repetitions,
     )
     write_bytes(out / RISK_FOUND, msgspec.json.format(msgspec.json.encode(result)))
     return result
@@ -133,6 +148,65 @@ class Answer:
     high: float
     why_not: str
     estimates: tuple[Estimate, ...]
+
+
+def split_all(
+    asked: Risk, out: Path, runner: Runner, on_run: Callable[[int], None]
+) -> tuple[Repetition, ...]:
+    """Returns all repetitions of splitting in their order; each is written down once it is driven.
+
+    Raises:
+        BackendError: the process that drove a repetition was lost.
+    """
+    known = {r.number: r for r in read_repetitions(out)}
+    write_bytes(out / SPLITTING, b"".join(map(_encode_line, known.values())))
+    missing = [k for k in range(asked.repetitions) if k not in known]
+    jobs = [
+        Job(f"splitting {k}", split_drives, SplitTask(asked, k), SPLIT_DEADLINE_S) for k in missing
+    ]
+    for done in runner(jobs):
+        if done.failure is not None:
+            last = done.detail.strip().rpartition("\n")[2]
+            raise BackendError(f"{done.job.key} was lost ({last}); --resume drives it again")
+        known[done.value.number] = done.value
+        with (out / SPLITTING).open("ab") as file:
+            file.write(_encode_line(done.value))
+        on_run(sum(r.runs for r in known.values()))
+    return tuple(known[k] for k in range(asked.repetitions))
+
+
+def _encode_line(one: Repetition) -> bytes:
+    """Returns a repetition as a line of JSON."""
+    return msgspec.json.encode(one) + b"\n"
+
+
+def answer_by_splitting(
+    counted: Estimate, subset: Estimate, repetitions: Sequence[Repetition]
+) -> Answer:
+    """Returns the answer of splitting beside counting, or beside subset simulation where that has too few."""
+    found = splitting_estimate([r.p for r in repetitions], sum(r.runs for r in repetitions))
+    every = counted, subset, found
+    if found.p == 0.0:
+        return Answer(counted.p, counted.low, counted.high, "splitting reached no failure", every)
+    other = counted if counted.p * counted.runs >= ENOUGH else subset
+    return Answer(
+        found.p, *joint_interval(found, other), compare_estimates(found, other).why_not, every
+    )
+
+
+def _independent(margins: Floats) -> Weighted:
+    """Returns independent draws by their margins, each with a weight of 1."""
+    return Weighted(np.empty((len(margins), 0)), np.ones(len(margins)), margins)
+
+
+def _kinds_of_splits(repetitions: Sequence[Repetition]) -> dict[str, float]:
+    """Returns the share of the probability by kind of failure, the largest first."""
+    shares: dict[str, float] = defaultdict(float)
+    for one in repetitions:
+        for kind, count in one.kinds.items():
+            shares[kind] += one.p * count / one.failing
+    total = sum(shares.values())
+    return {k: v / total for k, v in sorted(shares.items(), key=lambda item: -item[1])}
 
 
 def _plain(e: Estimate, simulated_s: float) -> Probability:

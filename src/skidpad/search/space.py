@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from math import ceil
 
 from msgspec import structs
 
+from skidpad.core.disturbance import KNOT_S, PREFIX, actor_of_draw, name_draw, parse_disturbance
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.run import RunSpec, Scenario
 from skidpad.core.space import Choice, Law, Normal, Space, Uniform, Value, Variable
@@ -62,20 +64,41 @@ def _require_range(name: str, law: Uniform | Normal) -> Law:
 
 
 def apply_values(template: RunSpec, values: Mapping[str, Value]) -> RunSpec:
-    """Returns the run with these values in its scenario, its weather and its seed."""
+    """Returns the run with these values in its scenario, disturbances, weather and seed."""
     course = template.course
     assert isinstance(course, Scenario)
-    own = {n for n in values if n == SEED or n.partition(".")[0] == WEATHER}
-    parameters = {n: v for n, v in values.items() if n not in own}
+    draws: dict[str, tuple[float, ...]] = {}
+    for name in values:  # in the order of the space: that of the draws
+        if actor := actor_of_draw(name):
+            draws[actor] = (*draws.get(actor, ()), float(values[name]))
+    parameters = {n: v for n, v in values.items() if is_parameter(n)}
     weather = template.weather
     if WEATHER in values:
         weather = find_weather(str(values[WEATHER]))
     fields = {n.partition(".")[2]: v for n, v in values.items() if n.startswith(f"{WEATHER}.")}
     return structs.replace(
         template,
-        course=structs.replace(course, parameters={**course.parameters, **parameters}),
+        course=structs.replace(
+            course, parameters={**course.parameters, **parameters}, draws={**course.draws, **draws}
+        ),
         weather=_with_fields(weather, fields),
         seed=int(values.get(SEED, template.seed)),
+    )
+
+
+def is_parameter(name: str) -> bool:
+    """Returns whether a variable is a parameter of the scenario: no disturbance, weather or seed."""
+    return name != SEED and name.partition(".")[0] != WEATHER and not actor_of_draw(name)
+
+
+def disturbance_variables(template: RunSpec) -> tuple[Variable, ...]:
+    """Returns the draws of the run's disturbances over its longest time as standard normal variables."""
+    course = template.course
+    assert isinstance(course, Scenario)
+    return tuple(
+        Variable(name_draw(one.actor, k), Normal(0.0, 1.0), one.source)
+        for one in map(parse_disturbance, course.disturb)
+        for k in range(ceil(template.duration / KNOT_S))
     )
 
 
@@ -89,6 +112,10 @@ def _require_own(variable: Variable) -> None:
     word, dot, name = variable.name.partition(".")
     if variable.name == SEED and isinstance(variable.law, Choice):
         raise ConfigError("--vary seed: takes a range, as seed=1:1000000")
+    if variable.name.startswith(PREFIX):
+        raise ConfigError(
+            f"--vary {variable.name}: disturbances are given by --disturb ACTOR=accel"
+        )
     if word != WEATHER:
         return
     if not dot:

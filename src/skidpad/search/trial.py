@@ -60,7 +60,7 @@ def describe_run(blank: Trial, driven: Run, objective: str) -> Trial:
         last = driven.error.strip().rpartition("\n")[2]
         return structs.replace(blank, fault=last or "the run ended before its first tick")
     near = closeness(log, load_map(driven.road), driven.off_road, objective)
-    columns = _columns(log, near)
+    columns = list_columns(log, near)
     if near.margin <= 0.0 and driven.log.header.about["config"] != REFERENCE:
         columns["bound"] = _bound_of(driven, near)
     return structs.replace(blank, simulated_s=float(log.t[-1]), **columns)
@@ -77,7 +77,7 @@ def _bound_of(driven: Run, near: Closeness) -> str:
     return find_run_avoidance(log, road, contact.tick, contact.actor)
 
 
-def _columns(log: RunLog, near: Closeness) -> dict[str, object]:
+def list_columns(log: RunLog, near: Closeness) -> dict[str, object]:
     """Returns the columns of a trial from its log: margins, motion hash and the contact, if any."""
     columns: dict[str, object] = {
         name: getattr(near, name)

@@ -76,6 +76,8 @@ def vary_scenario(
 ) -> tuple[RunSpec, Space]:
     """Returns the run that a scenario makes with these options, and what varies in it.
 
+    Disturbances vary as well, by their draws.
+
     `--vary` comes over `below`, and that over what a file of distributions says.
 
     Raises:
@@ -83,14 +85,17 @@ def vary_scenario(
         FileError: the file is missing, cannot be played, or declares no parameter of a name that varies.
     """
     from skidpad.core.space import Space
-    from skidpad.search.space import check_space, parse_variable
+    from skidpad.search.space import check_space, disturbance_variables, parse_variable
 
     file, of_file = _read_varied(file)
     given = [parse_variable(text) for text in vary]
     names = {v.name for v in given}
     kept = {v.name: v for v in (*of_file, *below) if v.name not in names}
-    space = check_space(Space((*kept.values(), *given)))
     template = _template(file, cross, ego, run, scenario, tuned)
+    named = (*kept.values(), *given)
+    if named:
+        check_space(Space(named))
+    space = Space((*named, *disturbance_variables(template)))
     _require_parameters(template, space)
     return template, space
 

@@ -7,11 +7,14 @@ from typing import Any
 
 from msgspec import Struct
 
+from skidpad.core.disturbance import actor_of_draw
+from skidpad.core.reading import decode_json, read_bytes
 from skidpad.core.run import RunSpec, run_from_plain
 from skidpad.core.space import Space
-from skidpad.recording.campaign.searches import read_stored
+from skidpad.recording.campaign.searches import LARGEST, read_stored
 
 RISK, RISK_RUNS, RISK_FOUND = "risk.json", "runs.jsonl", "probability.json"
+SPLITTING = "splitting.jsonl"
 SCALES = (0.5, 0.9, 1.1, 2.0)  # of the values of an input, to see what hangs on it
 
 
@@ -49,13 +52,26 @@ class Risk(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return run_from_plain(self.run, RISK)
 
     @property
+    def disturbed(self) -> tuple[str, ...]:
+        """Returns the names of the vehicles whose acceleration is disturbed."""
+        actors = (actor_of_draw(v.name) for v in self.space.variables)
+        return tuple(dict.fromkeys(actor for actor in actors if actor))
+
+    @property
     def assumptions(self) -> list[str]:
         """Returns the names of the inputs for which no source is given."""
-        names = [v.name for v in self.space.variables if not v.source]
+        unread = [v.name for v in self.space.variables if not v.source]
+        names = list(dict.fromkeys(name_input(name) for name in unread))
         rates = {"encounters per hour": self.per_hour, "encounters per 100 km": self.per_100km}
         return names + [
             name for name, rate in rates.items() if rate is not None and not rate.source
         ]
+
+
+def name_input(variable: str) -> str:
+    """Returns what pages call an input: all draws of a disturbance are one."""
+    actor = actor_of_draw(variable)
+    return f"disturbance of {actor}" if actor else variable
 
 
 class Probability(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -82,6 +98,35 @@ class Influence(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     why_not: str = ""
 
 
+class Repetition(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One repetition of splitting; a line of `splitting.jsonl`.
+
+    Attributes:
+        number: from 0.
+        p: its estimate of the probability.
+        levels: margins under which its rounds went on.
+        ancestors: different first drives from which its failures stem.
+        failing: drives of its end that fail.
+        runs: drives in all.
+        simulated_s: driven for them, ways back to where they branch included.
+        kinds: failing drives by kind of failure.
+        apart: by second since a branch: branches that were still driven then, and the mean distance in m
+            of the disturbed vehicles from where they were in the drive that was left.
+        faults: drives in which the stack failed.
+    """
+
+    number: int
+    p: float
+    levels: tuple[float, ...]
+    ancestors: int
+    failing: int
+    runs: int
+    simulated_s: float
+    kinds: dict[str, int]
+    apart: tuple[tuple[int, float], ...]
+    faults: int = 0
+
+
 class RiskFound(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What came of it: `probability.json`.
 
@@ -95,6 +140,7 @@ class RiskFound(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         kinds: share of the probability by kind of failure.
         influences: of each numeric input.
         faults: runs that could not be driven.
+        splitting: its repetitions, where disturbances were asked for.
     """
 
     probabilities: tuple[Probability, ...]
@@ -108,11 +154,21 @@ class RiskFound(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     kinds: dict[str, float]
     influences: tuple[Influence, ...]
     faults: int
+    splitting: tuple[Repetition, ...] = ()
 
 
 def read_risk(out: Path) -> Risk:
     """Return what was asked in a folder; FileError where it holds no such question."""
     return read_stored(out, RISK, Risk)
+
+
+def read_repetitions(out: Path) -> list[Repetition]:
+    """Returns the repetitions of splitting in a folder; a last line that was cut off is left out."""
+    path = out / SPLITTING
+    if not path.is_file():
+        return []
+    lines = read_bytes(path, SPLITTING, LARGEST).split(b"\n")[:-1]
+    return [decode_json(line, f"{path} line {k + 1}", Repetition) for k, line in enumerate(lines)]
 
 
 def read_risk_found(out: Path) -> RiskFound:

@@ -30,7 +30,7 @@ from skidpad.recording.campaign.searches import (
 from skidpad.recording.files import write_bytes
 from skidpad.search.files import write_choices
 from skidpad.search.loop import drive_all
-from skidpad.search.space import apply_values
+from skidpad.search.space import apply_values, is_parameter
 from skidpad.search.trial import Point, unit_tuple
 
 KEPT = 3  # failures of each group that are kept as runs
@@ -126,12 +126,14 @@ def write_hazard(out: Path, hazard: Hazard) -> None:
 def write_findings(out: Path, found: Search, findings: Findings) -> None:
     """Writes what was found, the avoidable failures as a file to play, and some of them as runs.
 
-    Those runs, of `kept_trials`, are driven again unless their folders exist.
+    There is no file where no parameter varies. Those runs, of `kept_trials`, are driven again unless
+    their folders exist.
     """
     write_bytes(out / FOUND, msgspec.json.encode(findings))
     course = found.template.course
     avoidable = [trial for group in findings.groups for trial in group.failures]
-    write_choices(out / CHOICES, course.file, avoidable)  # type: ignore[union-attr]
+    if any(map(is_parameter, found.space.names)):
+        write_choices(out / CHOICES, course.file, avoidable)  # type: ignore[union-attr]
     for trial in kept_trials(findings.groups):
         folder = failure_folder(out, trial.number)
         if not folder.exists():

@@ -30,7 +30,7 @@ from skidpad.search.branching import Drives
 from skidpad.search.margin import approach, closeness
 from skidpad.search.risk import split_all
 from skidpad.search.space import disturbance_variables
-from skidpad.search.splitting import split, splitting_estimate
+from skidpad.search.splitting import split_paths, splitting_estimate
 
 CALL = (
     "lead_slowdown", "--stack", "0", "--param", "TriggerDistance=10000", "--disturb", "lead=accel(0.6,2)",
@@ -100,7 +100,7 @@ def test_a_kept_failure_is_a_run_that_drives_alike(searched):
 def test_measured_sizes_have_a_source_and_chosen_ones_are_assumptions(tmp_path):
     plain = ask(110, 4)
     assert plain.assumptions == ["disturbance of lead"]
-    assert plain.disturbed == ("lead",)
+    assert plain.disturbed_actors == ("lead",)
     spec = skidpad.Scenario("lead_slowdown", disturb=("lead=accel",), duration=3.5).spec
     variables = disturbance_variables(spec)
     assert len(variables) == 4
@@ -190,7 +190,7 @@ def test_splitting_finds_the_probability_that_brute_force_finds():
     asked, ps, runs = ask(118, 30), [], 0
     for repetition in range(4):
         drives = Drives(asked, repetition)
-        found = split(drives, 30, np.random.default_rng(repetition), 1.0)
+        found = split_paths(drives, 30, np.random.default_rng(repetition), 1.0)
         drives.close()
         ps.append(found.p)
         runs += found.paths

@@ -11,7 +11,7 @@ from math import log
 import numpy as np
 import pytest
 
-from skidpad.search.splitting import split, splitting_estimate
+from skidpad.search.splitting import split_paths, splitting_estimate
 
 
 @dataclass
@@ -48,7 +48,7 @@ class Walks:
 
 def repeat(goal, count, repetitions, seed):
     rng = np.random.default_rng(seed)
-    return [split(Walks(goal, rng), count, rng) for _ in range(repetitions)]
+    return [split_paths(Walks(goal, rng), count, rng) for _ in range(repetitions)]
 
 
 @pytest.mark.parametrize("goal", [4, 8, 14, 20])  # 0.07, 4e-3, 6e-5, 1e-6
@@ -74,7 +74,9 @@ def test_the_interval_of_ten_repetitions_holds_the_truth():
 
 
 def test_below_the_floor_paths_are_counted_only():
-    found = split(Walks(6, np.random.default_rng(2)), 400, np.random.default_rng(3), floor=3.0)
+    found = split_paths(
+        Walks(6, np.random.default_rng(2)), 400, np.random.default_rng(3), floor=3.0
+    )
     assert min(found.levels) > 3.0
     assert found.p == pytest.approx(1.0 / 63.0, rel=0.6)
 
@@ -87,5 +89,5 @@ def test_without_a_failure_there_is_no_upper_end():
         def go_on(self, heights):
             return Walk([1], self.goal)
 
-    flat = split(Flat(5, None), 20, np.random.default_rng(1))
+    flat = split_paths(Flat(5, None), 20, np.random.default_rng(1))
     assert (flat.p, flat.levels, flat.paths) == (0.0, (), 20)

@@ -27,7 +27,7 @@ from skidpad.roads.bundled import load_map
 from skidpad.scenarios.playing.disturbing import Disturbances
 from skidpad.search.margin import NO_CONFLICT, approach, closeness
 from skidpad.search.space import apply_values
-from skidpad.search.splitting import Split, split
+from skidpad.search.splitting import Split, split_paths
 from skidpad.search.trial import list_columns, unit_tuple
 
 BRANCH_ABOVE = 1.0  # margin: of a contact it is not known at once how hard it was
@@ -102,7 +102,7 @@ class Drives:
         return found
 
     def close(self) -> None:
-        """Releases all simulators."""
+        """Releases the simulators of all drives."""
         for run, _ in self.begun.values():
             run.close()
 
@@ -148,7 +148,7 @@ def split_drives(task: SplitTask) -> Repetition:
     process = Drives(task.asked, task.repetition)
     rng = stream(task.asked.seed, "splitting", task.repetition)
     try:
-        found = split(process, task.asked.per_level, rng, BRANCH_ABOVE)
+        found = split_paths(process, task.asked.per_level, rng, BRANCH_ABOVE)
     finally:
         process.close()
     return _describe(task, found, process)

@@ -95,7 +95,7 @@ def estimate_risk(
     explored, first = len(limit.trials), len(found.first)
     counted, subset = counting_estimate(found.first), subset_estimate(found)
     repetitions: tuple[Repetition, ...] = ()
-    if asked.disturbed:
+    if asked.disturbed_actors:
         repetitions = split_all(asked, out, runner, lambda runs: on_run(explored + runs))
         samples, trials = _independent(found.first), limit.trials[:first]
         answer = answer_by_splitting(counted, subset, repetitions)

@@ -52,7 +52,7 @@ class Risk(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return run_from_plain(self.run, RISK)
 
     @property
-    def disturbed(self) -> tuple[str, ...]:
+    def disturbed_actors(self) -> tuple[str, ...]:
         """Returns the names of the vehicles whose acceleration is disturbed."""
         actors = (actor_of_draw(v.name) for v in self.space.variables)
         return tuple(dict.fromkeys(actor for actor in actors if actor))

@@ -67,7 +67,7 @@ class Split(Generic[P]):
     paths: int
 
 
-def split(
+def split_paths(
     process: Process[P], count: int, rng: np.random.Generator, floor: float = 0.0
 ) -> Split[P]:
     """Runs one repetition of splitting.

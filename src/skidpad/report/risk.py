@@ -47,8 +47,8 @@ SUBSET = "subset simulation"
 AIMED = 0.45  # relative half-width, a little below the largest that determines something
 SCALED = "times the probability when all values of the input are multiplied so"
 INTERVALS = (
-    "counting: exact; subset simulation and splitting: Student's of the logarithm over repetitions; "
-    "importance sampling: normal of the logarithm"
+    "counting: exact; subset simulation: Student's of the logarithm over its repetitions; splitting: "
+    "Cox's of a log-normal mean over its repetitions; importance sampling: normal of the logarithm"
 )
 
 

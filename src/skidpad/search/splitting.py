@@ -107,13 +107,21 @@ def split_paths(
 
 
 def splitting_estimate(found: Sequence[float], runs: int) -> Estimate:
-    """Returns the mean of the repetitions' estimates with Student's interval of its logarithm.
+    """Returns the mean of the repetitions' estimates with its interval.
 
-    0 without an upper end where no repetition reached a failure. runs: of all repetitions.
+    Estimates are about log-normal, and the interval is Cox's for the mean of such a distribution with
+    Student's quantile (Olsson 2005). Where a repetition reached no failure, it is Student's of the
+    logarithm of the mean; where none did, the estimate is 0 without an upper end. runs: of all.
     """
     n, p = len(found), float(np.mean(found))
     if p == 0.0:
         return Estimate(METHOD, 0.0, 0.0, inf, runs)
-    spread = float(np.std(found, ddof=1)) / sqrt(n) / p
-    reach = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, n - 1)) * spread
-    return Estimate(METHOD, p, p * exp(-reach), min(p * exp(reach), 1.0), runs)
+    if min(found) > 0.0:
+        spread = float(np.var(np.log(found), ddof=1))
+        middle = float(np.mean(np.log(found))) + 0.5 * spread
+        error = sqrt(spread / n + spread**2 / (2.0 * (n - 1)))
+    else:
+        middle, error = log(p), float(np.std(found, ddof=1)) / sqrt(n) / p
+    reach = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, n - 1)) * error
+    low, high = min(exp(middle - reach), p), max(exp(middle + reach), p)
+    return Estimate(METHOD, p, low, min(high, 1.0), runs)

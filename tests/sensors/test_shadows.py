@@ -5,10 +5,21 @@ import pytest
 
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import CameraSpec, Modality
-from skidpad.core.vocabulary import ActorKind
+from skidpad.core.vocabulary import ActorKind, SemanticClass
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import preset
+from skidpad.roads.roadside import Box, Shape
 from skidpad.sensors.finish.extras import NO_EXTRAS, Extra
+from skidpad.sensors.finish.shadows import (
+    GROUND_MASK,
+    Bodies,
+    cast_shadows,
+    shade_of,
+    standing,
+)
+from skidpad.sensors.pictures.lighting import lighting
+from skidpad.sensors.raster.view import camera_view
+from skidpad.sensors.scene.materials import Material
 from skidpad.sensors.suite import PixelSettings, PixelSuite
 from support.sensors.worlds import states_at, straight, table_of
 
@@ -78,3 +89,30 @@ def test_without_sun_there_is_no_edge_but_still_contact():
     sharp = Weather(sun_altitude_deg=20.0, sun_azimuth_deg=90.0)
     bright = seen(sharp, False)[0] - seen(sharp, True)[0]
     assert (dull > 3.0).sum() < 0.7 * (bright > 3.0).sum()
+
+
+def test_a_crown_throws_a_round_shadow_beside_its_stem_and_a_beam_over_the_road_none():
+    def box(x, z, height, width, shape):
+        return Box(SemanticClass.VEGETATION, x, 0.0, z, 0.0, width, width, height, shape=shape)
+
+    crown = box(10.0, 2.0, 4.0, 3.0, Shape.CROWN)
+    stem = box(10.0, 0.0, 2.3, 0.3, Shape.POST)
+    bodies = standing([stem, crown, box(40.0, 6.0, 1.0, 2.0, Shape.BOX)])
+    assert bodies.lift.tolist() == [0.0, 2.0, 0.0]
+    assert bodies.round.tolist() == [False, True, False]
+    light = lighting(Weather(sun_altitude_deg=45.0, sun_azimuth_deg=0.0))
+    view = camera_view(CameraSpec("rgb", Modality.RGB, 400, 400, 90.0, ABOVE), Pose(10.0, 0.0, 0.0))
+    ground = np.full((400, 400), Material.GRASS, dtype=np.int32)
+    inverse = np.full((400, 400), 1.0 / 20.0, dtype=np.float32)
+
+    def dark(only):
+        picture = np.full((400, 400), 0xFF808080, dtype=np.uint32)
+        one = Bodies._make(field[only] for field in bodies)
+        cast_shadows(view, one, shade_of(light), 90.0, GROUND_MASK, inverse, ground, picture)
+        return (200 - np.nonzero(picture != 0xFF808080)[0]) / PX
+
+    way = dark([1])  # m behind the stem: the sun stands ahead of it, 1 m of shadow per m of height
+    assert way.max() == pytest.approx(-2.0 + 0.85 * 1.5, abs=0.25)
+    assert way.min() == pytest.approx(-6.0 - 0.85 * 1.5, abs=0.25)
+    assert dark([0]).size > 0
+    assert dark([2]).size == 0

@@ -17,7 +17,7 @@ from skidpad.core.arrays import Floats
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind
-from skidpad.roads.roadside import Box
+from skidpad.roads.roadside import Box, Shape
 from skidpad.sensors.finish.outline import MOST, spans
 from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.pictures.packing import pack, unpack
@@ -37,6 +37,8 @@ REACH = 90.0  # m; farther shadows are a pixel or two
 CONTACT, CONTACT_DARK = 0.5, 0.62  # m around the outline, share of light lost below the body
 EDGE = 0.25  # m, how soft the sun's shadow ends
 LONGEST = 8.0  # m of the sun's shadow beyond the body
+FARTHEST = 25.0  # m from a hanging body, beyond which its shadow is not drawn
+ROUNDED = 0.85  # of half the width of a crown: the radius of its shadow
 SUN_DARK = 0.85  # share of the sun's light that a body keeps away
 NO_SUN = 0.02  # share of the light below which the sun casts no shadow that is seen
 LEVEL = 1.2  # m above or below, beyond which the ground is another road's
@@ -55,6 +57,8 @@ class Bodies(NamedTuple):
     width: Floats
     height: Floats
     present: NDArray[np.bool_]
+    lift: Floats  # m of the lower side above the ground
+    round: NDArray[np.bool_]  # the crown of a tree: a disc throws its shadow
 
 
 class Shade(NamedTuple):
@@ -69,19 +73,29 @@ def bodies_of(table: ActorTable, states: ActorStates) -> Bodies:
     """Returns the boxes of all actors but props."""
     present = states.present & (table.kind != ActorKind.PROP)
     return Bodies(
-        states.x, states.y, states.z, states.yaw, table.length, table.width, table.height, present
-    )
+        states.x, states.y, states.z, states.yaw, table.length, table.width, table.height, present,
+        np.zeros(len(table)), np.zeros(len(table), dtype=np.bool_),
+    )  # fmt: skip
 
 
 def standing(boxes: Sequence[Box]) -> Bodies:
-    """Returns what stands beside the road as bodies; what hangs over it is too high to darken it."""
+    """Returns what stands beside the road as bodies.
+
+    What stands on a post or a stem throws its shadow from there; other things over a road throw none.
+    """
 
     def each(name: str) -> Floats:
         return np.array([getattr(b, name) for b in boxes], dtype=np.float64)
 
+    foot: dict[tuple[float, float], float] = {}
+    places = [(round(b.x, 1), round(b.y, 1)) for b in boxes]
+    for place, box in zip(places, boxes, strict=True):
+        foot[place] = min(box.z, foot.get(place, box.z))
+    lift = [box.z - foot[place] for place, box in zip(places, boxes, strict=True)]
     return Bodies(
         each("x"), each("y"), each("z"), each("yaw"), each("length"), each("width"),
-        each("height"), np.ones(len(boxes), dtype=np.bool_),
+        each("height"), np.ones(len(boxes), dtype=np.bool_), np.array(lift, dtype=np.float64),
+        np.array([b.shape in (Shape.CROWN, Shape.CONE) for b in boxes], dtype=np.bool_),
     )  # fmt: skip
 
 
@@ -104,8 +118,11 @@ class _Cast(NamedTuple):
     s: float
     half_l: float
     half_w: float
+    begin_x: float  # m by which the shadow begins beside the body: it hangs
+    begin_y: float
     end_x: float
     end_y: float
+    round: bool
     sun: float  # share of light that the sun's shadow takes away; 0: there is none
 
 
@@ -116,9 +133,14 @@ def _cast_of(bodies: Bodies, i: int, shade: Shade) -> _Cast:
     throw = np.hypot(shade.sun_x, shade.sun_y)
     tall = bodies.height[i] * min(1.0, LONGEST / max(bodies.height[i] * throw, 1e-6))
     tx, ty = tall * shade.sun_x, tall * shade.sun_y
-    dark = SUN_DARK * shade.sun if shade.sun > NO_SUN else 0.0
+    lift = bodies.lift[i]
+    dark = SUN_DARK * shade.sun if shade.sun > NO_SUN and lift * throw < FARTHEST else 0.0
+    bx, by = lift * shade.sun_x, lift * shade.sun_y
     half_l, half_w = 0.5 * bodies.length[i], 0.5 * bodies.width[i]
-    return _Cast(c, s, half_l, half_w, c * tx + s * ty, -s * tx + c * ty, dark)
+    return _Cast(
+        c, s, half_l, half_w, c * bx + s * by, -s * bx + c * by,
+        c * tx + s * ty, -s * tx + c * ty, bodies.round[i], dark,
+    )  # fmt: skip
 
 
 @inner_kernel
@@ -133,12 +155,12 @@ def _corners(bodies: Bodies, i: int, cast: _Cast, out: Floats) -> None:
         far = float(end) if cast.sun > 0.0 else 0.0
         for a in (-1.0, 1.0):
             for b in (-1.0, 1.0):
-                lx = a * (cast.half_l + CONTACT) + far * cast.end_x
-                ly = b * (cast.half_w + CONTACT) + far * cast.end_y
+                lx = a * (cast.half_l + CONTACT) + cast.begin_x + far * cast.end_x
+                ly = b * (cast.half_w + CONTACT) + cast.begin_y + far * cast.end_y
                 for side in (-1.0, 1.0):
                     out[k, 0] = bodies.x[i] + cast.c * lx - cast.s * ly
                     out[k, 1] = bodies.y[i] + cast.s * lx + cast.c * ly
-                    out[k, 2] = bodies.z[i] + side * slack
+                    out[k, 2] = bodies.z[i] - bodies.lift[i] + side * slack
                     k += 1
 
 
@@ -158,7 +180,10 @@ def _beyond_shadow(cast: _Cast, lx: float, ly: float) -> float:
     A swept box is bounded by its own two directions and by that of the way; beyond a corner the
     largest of the three is a little less than the distance.
     """
-    px, py = lx - 0.5 * cast.end_x, ly - 0.5 * cast.end_y
+    px = lx - cast.begin_x - 0.5 * cast.end_x
+    py = ly - cast.begin_y - 0.5 * cast.end_y
+    if cast.round:
+        return _beyond_disc(cast, px, py)
     half_l, half_w = NARROWER * cast.half_l, NARROWER * cast.half_w
     along = abs(px) - half_l - 0.5 * abs(cast.end_x)
     aside = abs(py) - half_w - 0.5 * abs(cast.end_y)
@@ -171,10 +196,25 @@ def _beyond_shadow(cast: _Cast, lx: float, ly: float) -> float:
 
 
 @inner_kernel
-def _light_at(cast: _Cast, lx: float, ly: float) -> float:
-    """Returns the share of the light that reaches the ground at (lx, ly) in the body's axes."""
+def _beyond_disc(cast: _Cast, px: float, py: float) -> float:
+    """Returns the m to the outline that a disc sweeps, negative inside; (px, py): from its middle."""
+    square = cast.end_x * cast.end_x + cast.end_y * cast.end_y
+    along = (px * cast.end_x + py * cast.end_y) / max(square, 1e-9)
+    along = min(max(along, -0.5), 0.5)
+    dx, dy = px - along * cast.end_x, py - along * cast.end_y
+    return float(np.sqrt(dx * dx + dy * dy) - ROUNDED * min(cast.half_l, cast.half_w))
+
+
+@inner_kernel
+def _light_at(cast: _Cast, lx: float, ly: float, hangs: bool) -> float:
+    """Returns the share of the light that reaches the ground at (lx, ly) in the body's axes.
+
+    hangs: the body does not touch the ground.
+    """
     light = 1.0
-    near = (CONTACT - _outside(lx, ly, cast.half_l, cast.half_w)) / (1.6 * CONTACT)
+    near = (
+        0.0 if hangs else (CONTACT - _outside(lx, ly, cast.half_l, cast.half_w)) / (1.6 * CONTACT)
+    )
     if near > 0.0:
         near = min(near, 1.0)
         light = 1.0 - CONTACT_DARK * near * near
@@ -211,7 +251,8 @@ def _darken(
     """Draws one body's shadow into `out`, in the spans that it can reach."""
     r, per = view.rotation, 1.0 / view.focal
     ox, oy = view.centre[0] - bodies.x[i], view.centre[1] - bodies.y[i]
-    oz = view.centre[2] - bodies.z[i]
+    oz = view.centre[2] - bodies.z[i] + bodies.lift[i]
+    hangs = bodies.lift[i] > CONTACT
     x0, y0 = cast.c * ox + cast.s * oy, -cast.s * ox + cast.c * oy
     x_u = (cast.c * r[0, 0] + cast.s * r[0, 1]) * per
     y_u = (-cast.s * r[0, 0] + cast.c * r[0, 1]) * per
@@ -230,7 +271,8 @@ def _darken(
             u, z = column + 0.5 - view.cx, 1.0 / w
             if abs(z * (dz + z_u * u) + oz) > LEVEL:
                 continue
-            light = _light_at(cast, z * (x_v + x_u * u) + x0, z * (y_v + y_u * u) + y0)
+            lx, ly = z * (x_v + x_u * u) + x0, z * (y_v + y_u * u) + y0
+            light = _light_at(cast, lx, ly, hangs)
             if light < 0.995:
                 out[row, column] = _dim_pixel(out[row, column], light)
 

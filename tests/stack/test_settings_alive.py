@@ -243,6 +243,20 @@ def pictures(settings: Settings, weather: str, *ids: str) -> list[bytes]:
     return found
 
 
+def picture_while_driving(settings: Settings) -> bytes:
+    """What a camera shows after half a second at speed in rain."""
+    ready = cell(settings, "rain-noon", sensors=SensorLevel.PIXELS)
+    setup = stage_of(ready).setup
+    backend = EmbeddedBackend()
+    backend.reset(replace(setup, ego=replace(setup.ego, speed=25.0)), ready.seed)
+    for _ in range(9):
+        backend.step(VehicleCommand(throttle=0.5))
+    rgb = backend.step(VehicleCommand(throttle=0.5)).images["rgb_front"].rgb
+    found = np.ascontiguousarray(rgb).tobytes()
+    backend.close()
+    return found
+
+
 @cache
 def figure8():
     return load_map("figure8")
@@ -340,6 +354,8 @@ OTHERS: dict[str, Scenario] = {
     "wind_gusts": Scenario(0.3, in_wind(wind_speed=12.0)),
     "camera": Scenario(False, lambda s: pictures(s, "rain-noon", "rgb_front")),
     "camera_haze": Scenario(True, lambda s: pictures(s, "rain-noon", "rgb_front")),
+    "camera_exposure": Scenario(True, lambda s: pictures(s, "rain-noon", "rgb_front")),
+    "camera_drops": Scenario(True, picture_while_driving),
     "night_rain": Scenario("rain_only", lambda s: pictures(s, "rain-night", "rgb_front")),
     "headways": Scenario("field", short_drive("clear-noon")),
     "drivers": Scenario(False, short_drive("rain-noon")),

@@ -174,6 +174,14 @@ class SensorSettings(SettingsPart):
     camera_haze: bool = setting_field(
         False, "M-4, T-11", "contrast of RGB images falls with distance by Koschmieder's law"
     )
+    camera_exposure: bool = setting_field(
+        False, "M-4, T-11", "RGB images are exposed for daylight by a camera with limits"
+    )
+    camera_drops: bool = setting_field(
+        False,
+        "M-4, T-11",
+        "drops of rain on the glass before RGB cameras, between strokes of a wiper",
+    )
     night_rain: NightRain = setting_field(
         NightRain.BOTH, "D-094", "camera effects of rain at night"
     )

@@ -93,6 +93,8 @@ class CameraOptics:
     """What colour pictures show of the quantities of `physics.camera`; all off: the published pictures."""
 
     haze: bool = False  # contrast by visibility
+    drops: bool = False  # of rain on the glass
+    exposure: bool = False  # by daylight, within a camera's limits
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

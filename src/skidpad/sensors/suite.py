@@ -18,10 +18,13 @@ from skidpad.core.specs import CameraSpec, Modality, RadarSpec, SensorSpec
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import Bodywork, LightState, RangeModel
 from skidpad.core.weather import Weather
+from skidpad.physics.grip import rain_rate
 from skidpad.physics.optics import depth_range, label_range, radar_range
 from skidpad.sensors.finish.extras import NO_EXTRAS, Extra
 from skidpad.sensors.finish.finish import Finish
 from skidpad.sensors.pictures.degradation import CameraNoise, degradation
+from skidpad.sensors.pictures.exposure import expose
+from skidpad.sensors.pictures.lens import LensDrops
 from skidpad.sensors.pictures.lighting import lighting
 from skidpad.sensors.pictures.perception_noise import PerceptionNoise
 from skidpad.sensors.pictures.shading import Shading
@@ -109,6 +112,8 @@ class PixelSuite:
         labels = label_range(weather, Beam.LOW if beam is None else beam)
         sight = Sight(depth_range(weather), labels) if limited else UNLIMITED
         light = lighting(weather, beam, haze=settings.optics.haze)
+        if settings.optics.exposure:
+            light = expose(light, weather)
         snowed = Extra.SNOW in settings.extras
         static = self.scene.static
         self.shading = Shading(
@@ -130,6 +135,10 @@ class PixelSuite:
             if settings.camera_effect
             else {}
         )
+        self._drops: dict[str, LensDrops] = {}
+        if settings.optics.drops:
+            rain = rain_rate(weather)
+            self._drops = {id: LensDrops(self.cameras[id], seed, rain, dt) for id in self._rgb}
         self.radars = [
             Radar(s, beam_of(s, seed, dt), radar_range(weather, s.range) if limited else s.range)
             for s in self._specs
@@ -162,6 +171,9 @@ class PixelSuite:
             lit = np.zeros(n, dtype=np.bool_) if braking is None else braking
             turns = np.zeros((n, 2), dtype=np.bool_) if indicating is None else indicating
             self._finish.place(tick, states, lights, lit, turns)
+        speed = float(np.hypot(states.vx[EGO], states.vy[EGO]))
+        for drops in self._drops.values():
+            drops.move(tick, speed)
         for one in self._passes.values():
             one.drawn = NOTHING
             if self.settings.poison_old:
@@ -213,6 +225,8 @@ class PixelSuite:
         if self.settings.extras:
             own = self.cameras[id].shows_own_body
             self._finish.add(self.settings.extras, view, own, one, packed)
+        if id in self._drops:
+            self._drops[id].draw(view, self.shading.light, packed)
         if id in self._degraded:
             self._degraded[id].apply(self.tick, packed, range(view.top, view.height))
         rgb = packed.view(np.uint8).reshape(*packed.shape, 4)[..., :3]

@@ -287,7 +287,11 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
         grip=spec.grip,
         range_model=sensors.range,
         camera_effect=sensors.camera,
-        camera_optics=CameraOptics(haze=sensors.camera_haze),
+        camera_optics=CameraOptics(
+            haze=sensors.camera_haze,
+            drops=sensors.camera_drops,
+            exposure=sensors.camera_exposure,
+        ),
         rain_hides_night=sensors.night_rain is NightRain.RAIN_ONLY,
         mu_ref=world.mu_ref,
         tyres=world.tyres,

@@ -71,7 +71,8 @@ def marks() -> dict[str, list[str]]:
         tree = ast.parse(path.read_text(encoding="utf-8"))
         where = path.relative_to(ROOT / "tests").as_posix()
         module_ids = [i for node in tree.body for i in _module_mark(node)]
-        for node in tree.body:
+        inner = (n for node in tree.body if isinstance(node, ast.ClassDef) for n in node.body)
+        for node in (*tree.body, *inner):
             if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
                 ids = [i for d in node.decorator_list for i in _ids(d)]
                 for i in ids:

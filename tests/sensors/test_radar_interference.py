@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sensors.test_objects import RADAR, world
 from skidpad.physics.interference import AFFECTED, interference_over_noise
 from skidpad.roads.roadside import Barrier, BarrierKind, Roadside
 from skidpad.sensors.physical_radar.radar import PhysicalRadar
+from support.sensors.cars import RADAR, world
 
 TABLE = Path(__file__).parents[2] / "docs" / "radar-interference.csv"
 ROWS = list(csv.DictReader(TABLE.open(encoding="utf-8")))

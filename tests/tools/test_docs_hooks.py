@@ -16,7 +16,7 @@ from skidpad.physics.types import vehicle_types
 DOCS = ROOT / "docs"
 GENERATED = {
     "index.md", "contributing.md", "reference/cli.md", "reference/settings.md", "reference/weathers.md",
-    "reference/vehicles.md", "reference/sensors.md", "gallery.md",
+    "reference/vehicles.md", "reference/sensors.md", "reference/files.md", "gallery.md",
 }  # fmt: skip
 
 

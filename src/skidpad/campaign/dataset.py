@@ -35,8 +35,8 @@ from skidpad.stack.camera.eyes import CAMERAS, images_of
 
 CARD, FRAMES = "dataset.json", "frames.parquet"
 COLUMNS = {
-    "tick": "of 0.05 s",
-    "speed": "m/s",
+    "tick": "number of the tick, of 0.05 s",
+    "speed": "m/s, of the ego",
     "yaw_rate": "rad/s, left positive",
     "throttle": "0 to 1, asked for by the driver at this image",
     "brake": "0 to 1",

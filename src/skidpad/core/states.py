@@ -103,21 +103,21 @@ class EgoEstimate:
 class ContactEvent:
     """A contact that began in a tick (A-029)."""
 
-    tick: int
+    tick: int  # number of the tick
     actor: int  # index of the actor that was touched by the sensor's owner; -1: static
     static: str  # "" for a vehicle, else "guardrail", "wall", "pole", ...
-    impulse: float  # N s
+    impulse: float  # N s, of the contact
     v_closing: float  # m/s, positive when closing
-    x: float
-    y: float
+    x: float  # m, world frame, place of the contact
+    y: float  # m, world frame, place of the contact
 
 
 @dataclass(frozen=True, slots=True)
 class TrafficContact:
     """A contact of a background actor, not of the ego, that began in a tick."""
 
-    tick: int
-    actor: int
+    tick: int  # number of the tick
+    actor: int  # index of the actor that was touched
     other: int  # -1: something that stands
     v_closing: float  # m/s, positive when closing
 
@@ -126,9 +126,9 @@ class TrafficContact:
 class LaneInvasion:
     """The ego's outline crossed a lane marking (A-030)."""
 
-    tick: int
+    tick: int  # number of the tick
     marking: str  # "solid", "broken", "none", ...
-    road: int
+    road: int  # OpenDRIVE id of the road
 
 
 @fill_slots
@@ -139,28 +139,30 @@ class StackReport:
     Distances in m from the sensor, None: no target. Nothing here feeds back into control.
     """
 
-    status: DetectionStatus | None = None
-    tier: Tier | None = None
-    detected: bool | None = None
-    distance: float | None = None  # measured, as used by the tiers
-    time_gap: float | None = None  # s
-    bumper: float | None = None
-    roof: float | None = None
-    fused: float | None = None  # before the median
-    radar_pre: float | None = None  # nearest point after the pre-filter
-    radar_lane: float | None = None  # nearest point that passed the lane check
+    status: DetectionStatus | None = None  # where the measured distance comes from
+    tier: Tier | None = None  # rule of the hierarchy that acted
+    detected: bool | None = None  # there is a measured distance
+    distance: float | None = None  # m, measured, as the tiers use it
+    time_gap: float | None = None  # s, distance over own speed
+    bumper: float | None = None  # m, by the camera in the bumper
+    roof: float | None = None  # m, by the camera on the roof
+    fused: float | None = None  # m, of both cameras, before the median
+    radar_pre: float | None = None  # m, nearest point after the pre-filter
+    radar_lane: float | None = None  # m, nearest point that passed the lane check
     radar_velocity: float | None = None  # m/s, negative closing
-    radar_points: int | None = None
+    radar_points: int | None = None  # number of radar points after the pre-filter
     v_target: float | None = None  # m/s, cruise target
-    light_distance: float | None = None
-    light_state: LightState | None = None
-    light_source: LightSource | None = None
+    light_distance: float | None = None  # m, to the stop line of the light
+    light_state: LightState | None = None  # state of the light ahead
+    light_source: LightSource | None = None  # how the light was found
     light_stop: bool | None = None  # a stop is requested
-    hsv: LightState | None = None  # None: not evaluated
+    hsv: LightState | None = (
+        None  # state of the light by its colour in the image; none: not evaluated
+    )
     lane_offset: float | None = None  # m, left positive
-    yaw_error: float | None = None  # rad
+    yaw_error: float | None = None  # rad, to the lane
     curvature: float | None = None  # 1/m at the reference point
-    resume_timer: float | None = None  # s
+    resume_timer: float | None = None  # s, since the last tick at a stop; none: no stop yet
 
 
 @fill_slots

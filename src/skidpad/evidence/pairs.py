@@ -28,14 +28,16 @@ STEEPEST = 0.15  # no road climbs as much; assumption
 class Pair(NamedTuple):
     """Two actors, whichever of them follows; None where it never applied."""
 
-    one: str
-    other: str
-    min_gap_m: float | None  # bumper to bumper, while one is in the other's way
-    min_ttc_s: float | None
-    min_thw_s: float | None
-    max_drac_mps2: float | None
-    max_required_mps2: float | None
-    min_pet_s: float | None  # up to 2 s
+    one: str  # name of an actor
+    other: str  # name of the other one
+    min_gap_m: float | None  # m, least gap, bumper to bumper, while one is in the other's way
+    min_ttc_s: float | None  # s, least time to collision
+    min_thw_s: float | None  # s, least time headway
+    max_drac_mps2: float | None  # m/s^2, largest deceleration to avoid a crash at constant speeds
+    max_required_mps2: (
+        float | None
+    )  # m/s^2, largest required deceleration, with the lead's acceleration
+    min_pet_s: float | None  # s, least post-encroachment time, up to 2 s
 
 
 class Body(NamedTuple):

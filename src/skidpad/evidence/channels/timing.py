@@ -14,10 +14,22 @@ from skidpad.core.channels import Cycle
 BUDGET_MS = 25.0  # C-006, C-233
 MODULES = ("comfort", "similarity", "motion_prediction", "risk", "hazards")
 TIMES: dict[str, Any] = {
-    **dict.fromkeys(("cycle", "objects"), pl.Int64),
-    **dict.fromkeys(("prepare", *MODULES, "writing", "total"), pl.Float64),  # ms
+    "cycle": pl.Int64,  # number of the cycle
+    "objects": pl.Int64,  # number of objects of all channels
+    "prepare": pl.Float64,  # ms, to bring the channels' frames into one form
+    "comfort": pl.Float64,  # ms, indicators of comfort
+    "similarity": pl.Float64,  # ms, indicators that compare channels
+    "motion_prediction": pl.Float64,  # ms, prediction of all objects
+    "risk": pl.Float64,  # ms, indicators of risk
+    "hazards": pl.Float64,  # ms, rules of hazards
+    "writing": pl.Float64,  # ms, of the hazard records
+    "total": pl.Float64,  # ms, all parts but the writing
 }
-LIVE_TIMES = TIMES | dict.fromkeys(("wall_ms", "waited_ms", "faults"), pl.Float64)
+LIVE_TIMES: dict[str, Any] = TIMES | {
+    "wall_ms": pl.Float64,  # ms, from the sending of the cycle to its verdict
+    "waited_ms": pl.Float64,  # ms, that the thread was ready and had no processor
+    "faults": pl.Float64,  # page faults in the cycle
+}
 
 
 class Stopwatch(Protocol):

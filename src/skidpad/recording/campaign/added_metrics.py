@@ -18,8 +18,8 @@ class AddedMetric(msgspec.Struct, frozen=True):
     """The value of one metric in one run, and what the metric is."""
 
     name: str  # of its column, with the unit at its end
-    title: str
-    units: str
+    title: str  # a few words for tables
+    units: str  # its unit in words
     value: float | None = None  # None: there was nothing to measure
 
 

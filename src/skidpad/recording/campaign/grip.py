@@ -16,24 +16,33 @@ from skidpad.recording.campaign.results import Columns, metric
 from skidpad.recording.files import read_parquet, require_columns, write_parquet
 
 SERIES, STOPPING = "series", "stopping.parquet"
+STOPPING_COLUMNS = {
+    "weather": "name of the weather",
+    "model": "model of grip",
+    "ratio": "friction at standstill over the dry friction of the same tyres",
+    "mu_80": "friction at 80 km/h",
+    "stop_50_m": "m, of a full stop from 50 km/h",
+    "stop_80_m": "m, of a full stop from 80 km/h",
+    "stop_100_m": "m, of a full stop from 100 km/h",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GripKey:
     """Which run a row is about, and how it ended."""
 
-    scenario: str
-    weather: str  # slug
+    scenario: str  # name of the scenario
+    weather: str  # name of the weather
     friction: str  # original or reduced
-    seed: int
+    seed: int  # seed of the run
     cutin: str  # variant of the cut-in
-    controller: str
-    sensors: str  # core.SensorLevel
-    model: str  # core.GripModel of the reduced friction
+    controller: str  # who drives the ego
+    sensors: str  # objects or pixels
+    model: str  # model of grip of the reduced friction
     overlay: bool  # rain drops on the cameras
-    outcome: str  # core.Outcome
-    version: str = ""
-    log_hash: str | None = None  # equal hashes are equal drives
+    outcome: str  # how the run ended
+    version: str = ""  # of Skidpad
+    log_hash: str | None = None  # content hash of the tick log; equal hashes are equal drives
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +76,17 @@ GRIP = Columns(
     GripKey, GripMetrics, ("scenario", "cutin", "overlay", "weather", "friction", "seed")
 )
 GripEntry = Entry[GripKey, GripMetrics]
-COLUMNS = ("x", "y", "v", "cvip", "steer", "brake", "throttle", "npc_x", "npc_y")
+COLUMNS = {
+    "x": "m, across the road, left positive, of the ego",
+    "y": "m, along the road, of the ego",
+    "v": "m/s, of the ego",
+    "cvip": "m, between box centres, ego to nearest NPC",
+    "steer": "-1 to 1",
+    "brake": "1 while the pedal is pressed, else 0",
+    "throttle": "0 to 1",
+    "npc_x": "m, as x, of the first NPC",
+    "npc_y": "m, as y, of the first NPC",
+}
 
 
 def series_path(folder: Path, cell: str, seed: int) -> Path:

@@ -49,14 +49,14 @@ M = TypeVar("M")
 class Entry(Generic[K, M]):
     """One finished run. `run` names it within the campaign: cell and seed."""
 
-    run: str
-    key: K
-    metrics: M | None  # None: it crashed or timed out
-    timing: Timing
-    fingerprint: str
-    attempts: int = 1
+    run: str  # name of the run within the campaign
+    key: K  # columns of results.parquet that say which run
+    metrics: M | None  # the other columns of results.parquet; null: it crashed or timed out
+    timing: Timing  # columns of timing.parquet
+    fingerprint: str  # processor features, libraries and version that drove it
+    attempts: int = 1  # times that the run was begun
     error: str = ""  # one sentence, for agent_error, crashed, timeout
-    added: tuple[AddedMetric, ...] = ()  # by installed packages
+    added: tuple[AddedMetric, ...] = ()  # metrics of installed packages
 
 
 E = TypeVar("E", bound=Entry[Any, Any])

@@ -13,20 +13,20 @@ class RunKey:
     """Which run a row is about, and how it ended."""
 
     config: str  # "0" to "4", a set of functions, or module:Class
-    weather: str  # slug
+    weather: str  # name of the weather
     precipitation_kind: str  # "clear" or "rain"
     time_of_day: str  # "sunrise", "noon", "night"; "" for other weathers
-    seed: int
-    profile: str
-    map: str
-    sensors: str  # core.SensorLevel
-    grip: str  # core.GripModel
-    range: str  # core.RangeModel
-    outcome: str  # core.Outcome
+    seed: int  # seed of the run
+    profile: str  # name of the profile of settings
+    map: str  # name of the map, or path of its file
+    sensors: str  # objects or pixels
+    grip: str  # model of grip
+    range: str  # model of sight
+    outcome: str  # how the run ended
     functions: str = ""  # "acc+lca"; "": unknown, or none
     cruise_kmh: float | None = None  # target of free cruise; None: unknown
-    traffic: str = ""  # core.TrafficStart
-    version: str = ""  # of skidpad
+    traffic: str = ""  # where background vehicles start
+    version: str = ""  # of Skidpad
     log_hash: str | None = None  # content hash of the tick log: the promise of reproducibility
     motion_hash: str | None = None  # of poses, contacts, commands; equal hashes are one drive
     vehicles_missing: int | None = None  # asked for, but the map has no place for them (A-204)

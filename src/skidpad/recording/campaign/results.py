@@ -40,8 +40,8 @@ def metric(meaning: str, source: str) -> Any:
 class Timing:
     """How long a run took on the wall; outside every hash (A-246, A-261)."""
 
-    wall_s: float
-    cpu_s: float = 0.0  # 0: unknown, the run ended its process
+    wall_s: float  # s, on the wall
+    cpu_s: float = 0.0  # s, of the processor; 0: unknown, the run ended its process
     rtf: float | None = None  # simulated per wall time
     rtf_below_0_9_pct: float | None = None  # ticks slower than that
 

@@ -24,11 +24,11 @@ class Search(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What is searched, and how; `search.json` in the folder."""
 
     run: dict[str, Any]  # the template, as config.yaml holds runs
-    space: Space
-    method: str
-    objective: str
-    budget: int
-    seed: int
+    space: Space  # what varies, and how
+    method: str  # how points are chosen
+    objective: str  # what is looked for
+    budget: int  # number of runs
+    seed: int  # of all draws
 
     @property
     def template(self) -> RunSpec:

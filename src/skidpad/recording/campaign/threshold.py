@@ -13,18 +13,18 @@ from skidpad.recording.campaign.results import Columns
 class ThresholdKey:
     """Which run a row is about, and how it ended."""
 
-    driver: str
-    actors: str  # core.run.ActorMode
+    driver: str  # who drives the ego
+    actors: str  # how the others are moved
     start: str  # headway or distance behind the lead, in words
-    speed_kmh: float  # of both, before a seed varies it
-    gap_m: float  # bumper to bumper, likewise
-    deceleration: float  # m/s^2 demanded of the lead, likewise
+    speed_kmh: float  # km/h, of both, before a seed varies it
+    gap_m: float  # m, bumper to bumper, before a seed varies it
+    deceleration: float  # m/s^2, demanded of the lead, before a seed varies it
     road_mu: float  # friction of every tyre
     preset: str  # weather of the study whose statistical ratio leaves it; empty: none
-    seed: int
-    outcome: str  # core.Outcome
-    version: str = ""
-    log_hash: str | None = None  # equal hashes are equal drives
+    seed: int  # seed of the run
+    outcome: str  # how the run ended
+    version: str = ""  # of Skidpad
+    log_hash: str | None = None  # content hash of the tick log; equal hashes are equal drives
 
 
 THRESHOLD = Columns(

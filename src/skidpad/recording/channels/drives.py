@@ -35,12 +35,12 @@ def column(meaning: str, source: str) -> Any:
 class DriveKey:
     """Which segment a row is about, and how it ended."""
 
-    route: str
-    seed: int
-    drive_by: str
-    outcome: str  # core.Outcome
-    version: str = ""
-    log_hash: str | None = None  # of the recording
+    route: str  # name of the route
+    seed: int  # seed of the segment
+    drive_by: str  # the arbiter, or the channel that drives alone
+    outcome: str  # how the run ended
+    version: str = ""  # of Skidpad
+    log_hash: str | None = None  # content hash of the recording
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,12 +62,12 @@ class DriveMetrics:
 class DriveOutcome(DriveMetrics):
     """The same with the segment's identity, as it stands beside the recording."""
 
-    route: str
-    seed: int
-    drive_by: str
-    driving_s: dict[str, float]
-    content_hash: str = ""
-    cpu_s: float = 0.0  # outside every hash
+    route: str  # name of the route
+    seed: int  # seed of the segment
+    drive_by: str  # the arbiter, or the channel that drives alone
+    driving_s: dict[str, float]  # s, that each channel drove
+    content_hash: str = ""  # of the recording
+    cpu_s: float = 0.0  # s, of the processor; outside every hash
     way: tuple[tuple[float, float], ...] = ()  # m, places of the ego WAY_STEP apart
 
 

@@ -14,15 +14,15 @@ from skidpad.recording.files import read_parquet, require_columns, write_parquet
 
 FILE = "indicators.parquet"
 TYPES = {
-    "cycle": pl.Int64,
-    "t": pl.Float64,
-    "subject": pl.String,
-    "indicator": pl.String,
-    "value": pl.Float64,
-    "evaluated": pl.Boolean,
-    "threshold": pl.Float64,
-    "violated": pl.Boolean,
-    "claim": pl.String,
+    "cycle": pl.Int64,  # number of the cycle
+    "t": pl.Float64,  # s, time of the cycle
+    "subject": pl.String,  # name of the channel, or of a pair as a+b
+    "indicator": pl.String,  # name of the indicator
+    "value": pl.Float64,  # in the units of the indicator; null: not evaluated
+    "evaluated": pl.Boolean,  # whether there is a value
+    "threshold": pl.Float64,  # bound of the value; null: none
+    "violated": pl.Boolean,  # the value is beyond its bound
+    "claim": pl.String,  # id of the claim in monitor.json that the bound belongs to; null: none
 }
 
 

@@ -42,21 +42,21 @@ class InvolvedObject:
 class HazardRecord:
     """Record of one hazardous scene, with the worlds around it."""
 
-    id: str
-    type: HazardType
-    profile: str
-    forms: str
+    id: str  # h and its number, as h0001
+    type: HazardType  # which hazard
+    profile: str  # name of the profile of rules
+    forms: str  # forms of the formulas
     t_start: float  # s, first cycle in which the rule fired
     t_end: float  # s, last one
-    t_worst: float
+    t_worst: float  # s, when it was worst
     count: int  # cycles in which it fired
     extremes: dict[str, float]  # signals when the hazard was worst
     channels: tuple[str, ...]  # all channels, in the order of the worlds
-    driving: str | None
-    involved: tuple[str, ...]
-    objects: tuple[InvolvedObject, ...] = ()
+    driving: str | None  # name of the channel that drove; null: none
+    involved: tuple[str, ...]  # names of the channels that it is about
+    objects: tuple[InvolvedObject, ...] = ()  # that it is about, m in the world frame
     flags: tuple[str, ...] = ()  # "assumed": OLSS without a pair; "cut": the world ends early
-    context: dict[str, str]
+    context: dict[str, str]  # map and weather of the drive
     worlds: tuple[Cycle, ...] = ()  # from 5 s before to 5 s after
 
 

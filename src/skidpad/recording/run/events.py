@@ -19,44 +19,44 @@ from skidpad.core.vocabulary import LightState, RelocationReason
 class Relocation:
     """The supervisor put the ego somewhere else (A-194)."""
 
-    tick: int
-    reason: RelocationReason
+    tick: int  # number of the tick
+    reason: RelocationReason  # why the ego was put elsewhere
     shift: float  # m moved back along the lane to find clearance
-    old: Pose
-    new: Pose
+    old: Pose  # pose before, m and rad
+    new: Pose  # pose afterwards, m and rad
 
 
 @dataclass(frozen=True, slots=True)
 class LightChange:
     """A traffic light of the map changed; the first tick lists every light."""
 
-    tick: int
+    tick: int  # number of the tick
     signal: int  # OpenDRIVE signal id
-    state: LightState
+    state: LightState  # state from this tick on
 
 
 @dataclass(frozen=True, slots=True)
 class PutBack:
     """A vehicle of the background stood without a cause or off its lane and was put elsewhere (M-7)."""
 
-    tick: int
-    actor: int
+    tick: int  # number of the tick
+    actor: int  # index of the vehicle
 
 
 @dataclass(frozen=True, slots=True)
 class MovedOn:
     """A vehicle of the background that was far from the ego was moved to a place nearer to it."""
 
-    tick: int
-    actor: int
+    tick: int  # number of the tick
+    actor: int  # index of the vehicle
 
 
 @dataclass(frozen=True, slots=True)
 class RolledOver:
     """A vehicle, the ego or another one, came to lie on its side."""
 
-    tick: int
-    actor: int
+    tick: int  # number of the tick
+    actor: int  # index of the vehicle
 
 
 class NoticeSource(str, Enum):
@@ -72,9 +72,9 @@ class NoticeSource(str, Enum):
 class Notice:
     """An error of the stack, a retry of the supervisor (A-192), a wreck put back (M-7)."""
 
-    tick: int
-    source: NoticeSource
-    text: str
+    tick: int  # number of the tick
+    source: NoticeSource  # part of the program that says it
+    text: str  # one sentence
 
 
 Event = (

@@ -13,7 +13,14 @@ from skidpad.core.errors import FileError
 from skidpad.recording.files import write_bytes
 
 FILE = "lamps.csv"
-COLUMNS = ("time", "entity", "lamp", "mode", "on", "off")
+COLUMNS = {
+    "time": "s, since the start",
+    "entity": "name of the vehicle",
+    "lamp": "which lamp, in the words of OpenSCENARIO",
+    "mode": "on, off or flashing",
+    "on": "s, that a flash lasts",
+    "off": "s, between two flashes",
+}
 FLASH = 0.5  # s on, and off, where a file does not say it; the standard's default
 ROUNDING = 1e-9  # s
 

@@ -28,38 +28,38 @@ from skidpad.recording.run.events import (
 class ActorSeries(NamedTuple):
     """Motion of n actors over T ticks, arrays (T, n); column 0 is the ego."""
 
-    x: Floats32
-    y: Floats32
-    z: Floats32
-    yaw: Floats32
-    vx: Floats32
-    vy: Floats32
-    yaw_rate: Floats32
-    ax: Floats32  # body frame
-    ay: Floats32
+    x: Floats32  # m, world frame, centre of the footprint
+    y: Floats32  # m, world frame, centre of the footprint
+    z: Floats32  # m, height of the road there
+    yaw: Floats32  # rad, counter-clockwise from the x-axis
+    vx: Floats32  # m/s, world frame
+    vy: Floats32  # m/s, world frame
+    yaw_rate: Floats32  # rad/s, left positive
+    ax: Floats32  # m/s^2, along the body, forward
+    ay: Floats32  # m/s^2, across the body, left
 
 
 class EgoSeries(NamedTuple):
     """What localisation and the ego's own sensors said, arrays (T,)."""
 
-    x: Floats
-    y: Floats
-    yaw: Floats
-    speed: Floats
-    yaw_rate: Floats
-    ax: Floats
-    ay: Floats
-    gear: Floats
+    x: Floats  # m, world frame, as localisation says
+    y: Floats  # m, world frame, as localisation says
+    yaw: Floats  # rad, as localisation says
+    speed: Floats  # m/s, along the body, negative in reverse
+    yaw_rate: Floats  # rad/s, left positive
+    ax: Floats  # m/s^2, forward
+    ay: Floats  # m/s^2, left
+    gear: Floats  # -1 reverse, 0 neutral, 1 and up forward
 
 
 class CommandSeries(NamedTuple):
     """Commands, arrays (T,); booleans as 0 and 1."""
 
-    throttle: Floats
-    brake: Floats
-    steer: Floats
-    handbrake: Floats
-    reverse: Floats
+    throttle: Floats  # 0 to 1
+    brake: Floats  # 0 to 1
+    steer: Floats  # -1 to 1, left positive
+    handbrake: Floats  # whether it is pulled
+    reverse: Floats  # whether reverse gear is asked for
 
 
 class ReportSeries(NamedTuple):
@@ -105,16 +105,16 @@ class RunLog:
 
     header: LogHeader
     table: ActorTable
-    tick: Ints  # (T,)
+    tick: Ints  # (T,) number of the tick
     actors: ActorSeries
-    present: NDArray[np.bool_]  # (T, n)
-    mu: Floats32  # (T, n, 4) at the tyres FL, FR, RL, RR; NaN where there is none
+    present: NDArray[np.bool_]  # (T, n) who is in the world, the ego first
+    mu: Floats32  # (T, n, 4) friction at the tyres FL, FR, RL, RR of each actor; NaN where there is none
     ego: EgoSeries
     applied: CommandSeries  # what drove the ego into this moment
     requested: CommandSeries  # what the stack asked for in answer to it
     report: ReportSeries
-    supervision: Ints  # (T,) core.Supervision
-    weather: Ints  # (T,) index into `weathers`
+    supervision: Ints  # (T,) phase of the supervisor
+    weather: Ints  # (T,) index into the weathers that the footer lists
     weathers: tuple[str, ...]  # slugs
     events: tuple[Event, ...]  # in order of ticks
 

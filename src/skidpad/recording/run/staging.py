@@ -32,14 +32,14 @@ class FileCriterion(Struct, frozen=True, kw_only=True):
 
 
 class Staging(Struct, frozen=True, kw_only=True):
-    """Holds what the file stages. partners: those that its events move, in the order of entities."""
+    """Holds what the file stages."""
 
     scenario: str  # name of the file, without its ending
-    ego: str
+    ego: str  # name of the ego
     driven_by_file: bool  # the file drives the ego, or there is none: nothing is under test
-    partners: tuple[str, ...] = ()
-    events: tuple[StagedEvent, ...] = ()
-    criteria: tuple[FileCriterion, ...] = ()
+    partners: tuple[str, ...] = ()  # those that its events move, in the order of entities
+    events: tuple[StagedEvent, ...] = ()  # those that act on others than the ego
+    criteria: tuple[FileCriterion, ...] = ()  # that the file states
     unreversed: bool = False  # the file lets the ego go backwards, and it never did
     unturned: bool = False  # the file leads the ego round a corner, and it went another way
 
@@ -80,7 +80,7 @@ class Judging(Struct, frozen=True, kw_only=True):
     """Holds how the runs of a folder are judged, so that its page can be written again."""
 
     expect: tuple[str, ...] = ()  # rules of `--expect`
-    left_out: tuple[LeftOut, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()  # files that could not be played, and why
 
 
 def write_judging(folder: Path, judging: Judging) -> None:

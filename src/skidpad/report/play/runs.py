@@ -36,6 +36,32 @@ from skidpad.roads.queries import RoadMap
 
 ERROR, CONFIG = "error.txt", "config.yaml"  # of a run's folder
 CSV = "results.csv"
+COLUMNS = {
+    "run": "name of the run",
+    "scenario": "name of the scenario",
+    "weather": "name of the weather",
+    "friction": "original or reduced",
+    "seed": "seed of the run",
+    "verdict": "passed, failed, void, not judged or error",
+    "criterion": "what was judged by",
+    "reasons": "why the verdict is what it is",
+    "duration_s": "s, simulated time",
+    "contacts_with": "what the ego touched first; null: nothing",
+    "counterpart": "name of the other actor of this row",
+    "staged": "an event of the file moves it",
+    "met": "both came near an interaction",
+    "min_distance_m": "m, least distance to the ego",
+    "crossed_after_s": "s, ego behind (+) or before (-) the other at the same place; null: no such place",
+    "min_gap_m": "m, least gap, bumper to bumper",
+    "min_ttc_s": "s, least time to collision",
+    "min_thw_s": "s, least time headway",
+    "max_drac_mps2": "m/s^2, largest deceleration to avoid a crash at constant speeds",
+    "max_required_mps2": "m/s^2, largest required deceleration",
+    "min_pet_s": "s, least post-encroachment time",
+    "contact_t_s": "s, when both touched",
+    "contact_kmh": "km/h, closing speed at the contact",
+    "ego_at_contact_kmh": "km/h, speed of the ego at the contact",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -205,15 +231,11 @@ def write_results_csv(played: Played) -> Path:
 
 def _row(run: PlayRun, other: Counterpart | None) -> dict[str, Any]:
     """Returns a row of the results table; None for `other` leaves the counterpart's fields empty."""
-    row: dict[str, Any] = {
+    row = dict.fromkeys(COLUMNS) | {
         "run": run.name, "scenario": run.scenario, "weather": run.weather,
         "friction": run.friction, "seed": run.seed, "verdict": run.verdict.value,
         "criterion": run.judged.criterion, "reasons": "; ".join(run.judged.reasons),
         "duration_s": run.duration, "contacts_with": None if run.contact is None else run.contact[1],
-        "counterpart": None, "staged": None, "met": None, "min_distance_m": None,
-        "crossed_after_s": None, "min_gap_m": None, "min_ttc_s": None, "min_thw_s": None,
-        "max_drac_mps2": None, "max_required_mps2": None, "min_pet_s": None,
-        "contact_t_s": None, "contact_kmh": None, "ego_at_contact_kmh": None,
     }  # fmt: skip
     if other is not None:
         row |= other.pair._asdict()

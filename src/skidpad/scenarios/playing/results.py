@@ -18,6 +18,11 @@ from skidpad.scenarios.reading.entities import Box
 from skidpad.scenarios.scene import Happening
 
 TRAJECTORIES, STORY = "trajectories.csv", "storyboard.csv"
+STORY_COLUMNS = {
+    "time": "s, since the start",
+    "element": "path of the element in the storyboard, parted by ::",
+    "what": "its transition, or what a condition says",
+}
 
 
 def write_results(folder: Path, log: RunLog, played: Played) -> None:
@@ -45,9 +50,9 @@ def log_rows(log: RunLog, boxes: Mapping[str, Box]) -> Iterator[Row]:
 
 
 def story_csv(story: Iterable[Happening]) -> str:
-    """Returns the story as CSV with the columns time,element,what."""
+    """Returns the story as CSV with STORY_COLUMNS."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("time", "element", "what"))
+    writer.writerow(STORY_COLUMNS)
     writer.writerows((f"{h.t:.3f}", "::".join(h.path), h.what) for h in story)
     return text.getvalue()

@@ -32,19 +32,16 @@ KINDS = {
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One entity at one time; the place of its reference point, m, rad, m/s.
+    """One entity at one time; the place of its reference point."""
 
-    speed: over ground, negative backwards.
-    """
-
-    time: float
-    id: int
-    name: str
-    x: float
-    y: float
-    z: float
-    h: float
-    speed: float
+    time: float  # s, since the start
+    id: int  # index of the entity
+    name: str  # name of the entity
+    x: float  # m, world frame
+    y: float  # m, world frame
+    z: float  # m, world frame
+    h: float  # rad, heading
+    speed: float  # m/s, over ground, negative backwards
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,7 +36,7 @@ class GripKey:
     friction: str  # original or reduced
     seed: int  # seed of the run
     cutin: str  # variant of the cut-in
-    controller: str  # who drives the ego
+    controller: str  # driver of the ego
     sensors: str  # objects or pixels
     model: str  # model of grip of the reduced friction
     overlay: bool  # rain drops on the cameras

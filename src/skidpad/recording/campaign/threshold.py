@@ -13,7 +13,7 @@ from skidpad.recording.campaign.results import Columns
 class ThresholdKey:
     """Which run a row is about, and how it ended."""
 
-    driver: str  # who drives the ego
+    driver: str  # driver of the ego
     actors: str  # how the others are moved
     start: str  # headway or distance behind the lead, in words
     speed_kmh: float  # km/h, of both, before a seed varies it

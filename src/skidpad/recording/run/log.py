@@ -107,7 +107,7 @@ class RunLog:
     table: ActorTable
     tick: Ints  # (T,) number of the tick
     actors: ActorSeries
-    present: NDArray[np.bool_]  # (T, n) who is in the world, the ego first
+    present: NDArray[np.bool_]  # (T, n) whether the actor is in the world, the ego first
     mu: Floats32  # (T, n, 4) friction at the tyres FL, FR, RL, RR of each actor; NaN where there is none
     ego: EgoSeries
     applied: CommandSeries  # what drove the ego into this moment

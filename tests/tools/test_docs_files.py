@@ -13,9 +13,7 @@ import pytest
 from msgspec import json
 from typer.testing import CliRunner
 
-from channel_worlds import Eyes, World, drive
 from docs_files import ADDED, PARTS, files_page
-from runs import scenario_run, segment_run
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.recipes import channels, grip
 from skidpad.campaign.runs.play import run_to
@@ -36,6 +34,8 @@ from skidpad.recording.run.events import (
 )
 from skidpad.report.play.page import write_play_report
 from skidpad.scenarios.shipped import FOLDER
+from support.channel_worlds import Eyes, World, drive
+from support.runs import scenario_run, segment_run
 
 WORLD = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(-11.0, 0, 0, 15.5, 0), (50.0, 3.5, 0, 15, 0)]))
 EYES = (Eyes("lav", 0.03), Eyes("tfuse", 0.03, blind=(0,)))

@@ -30,6 +30,7 @@ from skidpad.search.branching import Drives
 from skidpad.search.margin import approach, closeness
 from skidpad.search.risk import split_all
 from skidpad.search.space import disturbance_variables
+from skidpad.search.splitting import split_paths, splitting_estimate
 
 CALL = (
     "lead_slowdown", "--stack", "0", "--param", "TriggerDistance=10000", "--disturb", "lead=accel(0.6,2)",
@@ -179,3 +180,36 @@ def test_the_page_shows_how_branches_diverge_and_what_they_stem_from(tmp_path):
     assert "repetitions of splitting" in page
     assert "disturbance of lead" in page
     assert "disturb.lead.3" not in page
+
+
+# of BRUTE independent drives FAILED did: `python tests/search/test_disturbed_search.py`, 2026-11-26
+BRUTE, FAILED = 600, 13
+
+
+def test_splitting_finds_the_probability_that_brute_force_finds():
+    asked, ps, runs = ask(118, 40), [], 0
+    for repetition in range(10):
+        drives = Drives(asked, repetition)
+        found = split_paths(drives, 40, np.random.default_rng(repetition), 1.0)
+        drives.close()
+        ps.append(found.p)
+        runs += found.paths
+    estimate, truth = splitting_estimate(ps, runs), FAILED / BRUTE
+    error = np.sqrt(truth * (1.0 - truth) / BRUTE)
+    assert estimate.low <= truth + 2.0 * error
+    assert estimate.high >= truth - 2.0 * error
+    assert estimate.half_width < 2.0
+
+
+def count_failures(drives):
+    """Returns how many of so many independent drives of the test above fail."""
+    plain, failed = ask(118, 30).run, 0
+    for seed in range(1, drives + 1):
+        driven = drive(run_from_plain(plain | {"seed": seed}, "test"))
+        near = closeness(driven.log, load_map(driven.road), driven.off_road, "combined")
+        failed += near.margin <= 0.0
+    return failed
+
+
+if __name__ == "__main__":
+    print(count_failures(600))

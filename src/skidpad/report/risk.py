@@ -43,7 +43,7 @@ CRASH = (
     "A crash is a contact above 5 km/h (with a person or a two-wheeler any), or a departure with all "
     "wheels off every lane."
 )
-SUBSET = "subset simulation"
+PER_LEVEL = ("subset simulation", "splitting")  # methods that --per-level narrows
 AIMED = 0.45  # relative half-width, a little below the largest that determines something
 SCALED = "times the probability when all values of the input are multiplied so"
 INTERVALS = (
@@ -102,11 +102,11 @@ def answer(asked: Risk, found: RiskFound) -> str:
 
 
 def _advice(asked: Risk, found: RiskFound) -> str:
-    """Returns a sentence on how many runs of a level would narrow subset simulation enough, or ""."""
-    subset = next((e for e in found.probabilities if e.method == SUBSET and e.p > 0.0), None)
-    if subset is None or subset.high is None or SUBSET not in found.why_not:
+    """Returns a sentence on how many runs of a level would narrow the method that is too wide, or ""."""
+    wide = next((e for e in found.probabilities if e.method in found.why_not and e.p > 0.0), None)
+    if wide is None or wide.high is None or wide.method not in PER_LEVEL:
         return ""
-    factor = (log(subset.high / subset.p) / log(1.0 + AIMED)) ** 2
+    factor = (log(wide.high / wide.p) / log(1.0 + AIMED)) ** 2
     wanted = 50 * ceil(asked.per_level * factor / 50)
     return f" About --per-level {wanted} would narrow it enough."
 

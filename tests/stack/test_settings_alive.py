@@ -219,6 +219,22 @@ def on_road(road_map: RoadMap) -> NDArray[np.bool_]:
     return lanes[road_map.samples.lane]
 
 
+def beside_lorry(settings: Settings) -> float:
+    """Yaw of a car that rolls beside the front of a lorry for a second."""
+    ready = cell(settings)
+    setup = stage_of(ready).setup
+    place = figure8().place(setup.ego.place)
+    ego = replace(setup.ego, place=place.pose, speed=25.0)
+    lorry = replace(ego, name="lorry", type="truck", place=place.pose.moved(-4.0, 3.5))
+    backend = EmbeddedBackend()
+    backend.reset(replace(setup, ego=ego, actors=(lorry,), traffic=None), ready.seed)
+    for _ in range(20):
+        backend.step(VehicleCommand())
+    yaw = float(backend.truth().states.yaw[0])
+    backend.close()
+    return yaw
+
+
 def in_wind(**also: Any) -> Outcome:
     """A short drive in a wind."""
     return lambda s: short_drive("rain-noon")(s.with_values({"wind": True, **also}))
@@ -348,6 +364,7 @@ OTHERS: dict[str, Scenario] = {
     "anti_lock": Scenario("wheel_speeds", full_brake),
     "stability": Scenario("wheel_speeds", swerve),
     "roll_over": Scenario(True, tight_bend),
+    "wakes": Scenario(True, beside_lorry),
     "wind": Scenario(True, short_drive("rain-noon")),
     "wind_speed": Scenario(12.0, in_wind()),
     "wind_direction_deg": Scenario(0.0, in_wind(wind_speed=12.0)),

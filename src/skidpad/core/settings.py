@@ -105,6 +105,9 @@ class WorldSettings(SettingsPart):
         "stability control, with `esc`: ideal, or by wheel speeds and yaw rate",
     )
     roll_over: bool = setting_field(False, "M-1, T-11", "vehicles can tip over in bends")
+    wakes: bool = setting_field(
+        False, "M-1, T-11", "air that lorries, buses and vans push aside acts on vehicles"
+    )
     wind: bool = setting_field(False, "M-1, T-11", "wind pushes vehicles")
     wind_speed: float | None = setting_field(
         None,

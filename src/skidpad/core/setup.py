@@ -131,6 +131,7 @@ class Setup:
     stability_control: StabilityControl = StabilityControl.IDEAL  # where there is one
     roll_over: bool = False  # vehicles can tip over their outer wheels (embedded backend)
     wind: Wind | None = None  # that pushes vehicles; None: no air moves (embedded backend)
+    wakes: bool = False  # lorries, buses and vans push air aside (embedded backend)
     level: SensorLevel = SensorLevel.PIXELS
     asked: frozenset[str] = frozenset()  # ids among specs whose readings go to `frame.extra` (L-3)
     render_all: bool = False  # every image every tick, read or not

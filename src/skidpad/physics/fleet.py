@@ -82,7 +82,7 @@ class Fleet:
         self.mu, self.stiffness = self.feel[:, :STIFFNESS], self.feel[:, STIFFNESS:WATER]
         self.water = self.feel[:, WATER:]
         self.stiffness[:] = 1.0
-        self._flat = np.zeros(n)
+        self._flat, self._air = np.zeros(n), np.zeros((n, 2))
 
     def __len__(self) -> int:
         return len(self.types)
@@ -134,6 +134,7 @@ class Fleet:
                 f"fleet of {len(self)}: commands must be (n, 5) and mu (n, 4), "
                 f"got {commands.shape} and {mu.shape}"
             )
+        self._air[:] = self.wind
         np.multiply(mu, self.tire_friction, out=self.mu)
         self.mu /= TIRE_FRICTION_REFERENCE
         step_vehicles(
@@ -145,7 +146,7 @@ class Fleet:
             self._flat if grade is None else grade,
             self._flat if bank is None else bank,
             self.states.present if active is None else active,
-            *self.wind,
+            self._air,
             self.dt / self.steps,
             self.steps,
         )

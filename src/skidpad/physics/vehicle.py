@@ -454,8 +454,7 @@ def step_vehicles(
     grade: Floats,
     bank: Floats,
     active: NDArray[np.bool_],
-    wind_x: float,
-    wind_y: float,
+    air: Floats,
     h: float,
     steps: int,
 ) -> None:
@@ -463,14 +462,16 @@ def step_vehicles(
 
     commands (n, 5): throttle, brake, steer (left positive), handbrake, reverse. feel (n, 12): `params`.
     grade (n,): slope along the heading, rad, uphill positive. bank (n,): roll of the
-    road about the heading, rad, left side up positive. wind_x, wind_y: m/s of the air.
+    road about the heading, rad, left side up positive. air (n, 2): its velocity at each vehicle, m/s
+    in world axes.
     """
     for i in range(active.shape[0]):
         if active[i]:
             car = _car(i, params, commands[i], grade[i], bank[i])
             g_x, g_y = -G * sin(grade[i]), -G * sin(bank[i])
             turn_max = params.steer_rate[i] * h
-            _advance(i, states, wheels, car, feel[i], g_x, g_y, turn_max, wind_x, wind_y, h, steps)
+            _advance(i, states, wheels, car, feel[i], g_x, g_y, turn_max, air[i, 0], air[i, 1],
+                     h, steps)  # fmt: skip
             states.pitch[i] = -grade[i] - params.pitch_gradient[i] * wheels.a_load[i, 0]
             lean = params.roll_gradient[i] * wheels.a_load[i, 1]
             states.roll[i] = bank[i] + (

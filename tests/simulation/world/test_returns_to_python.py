@@ -19,6 +19,7 @@ TYRES = {
     "tyres": "summer",
     "tyre_stiffness": True,
     "water_drag": True,
+    "wakes": True,
     "anti_lock": "wheel_speeds",
     "stability": "wheel_speeds",
 }
@@ -57,7 +58,7 @@ def test_without_effects_a_step_is_one_call_of_the_compiled_tick(off):
     assert sum(off.values()) < 30 * TICKS
 
 
-def test_tyres_of_their_own_stiffness_drag_and_controls_add_no_python(off):
+def test_tyres_stiffness_drag_controls_and_wakes_add_no_python(off):
     assert calls(TYRES) == off
 
 
@@ -68,6 +69,7 @@ def test_a_surface_adds_one_compiled_call_however_many_patches_and_vehicles(off)
     icy = SurfacePatch(ice_mm=1.0, circle=(0.0, 0.0, 20.0), air_below_c=1.0)
     added = calls(TYRES, (*roads, icy)) - off
     assert added == {("skidpad.simulation.world.patches", "Patches.fill"): TICKS}
+    assert calls({**TYRES, "sheet_flow": True}) - off == added
     few = calls({}, vehicles=4)
     assert calls(TYRES, tuple(roads[:1]), vehicles=4) - few == added
 

@@ -316,6 +316,7 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
         stability_control=world.stability,
         roll_over=world.roll_over,
         wind=wind_of(spec),
+        wakes=world.wakes,
         level=spec.sensors,
         render_all=spec.render is Render.ALL or _foreign_on_carla(spec),
         patches=spec.surface,

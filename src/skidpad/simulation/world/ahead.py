@@ -24,7 +24,7 @@ def vehicles_of_nobody() -> tuple[Any, ...]:
     active = np.zeros(0, dtype=np.bool_)
     return (
         rows.states, fleet.wheels, fleet.params, rows.commands, fleet.feel, rows.grade, rows.bank,
-        active, 0.0, 0.0, DT, 1,
+        active, np.zeros((0, 2)), DT, 1,
     )  # fmt: skip
 
 

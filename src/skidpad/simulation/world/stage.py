@@ -36,6 +36,7 @@ def build_world(setup: Setup, seed: int) -> World:
         stability_control=setup.stability_control,
         roll_over=setup.roll_over,
         wind=setup.wind,
+        wakes=setup.wakes,
     )
     world = World(map, Lights.build_pretimed(map, seed, setup.dt), conditions)
     traffic = setup.traffic or TrafficSetup(vehicles=0)

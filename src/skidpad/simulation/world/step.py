@@ -20,6 +20,7 @@ from skidpad.physics.params import STIFFNESS, WATER, VehicleParams, WheelStates
 from skidpad.physics.segments import Segments
 from skidpad.physics.types import TIRE_FRICTION_REFERENCE
 from skidpad.physics.vehicle import step_vehicles
+from skidpad.physics.wakes import Displacing, fill_air
 from skidpad.roads.kernels import LaneArrays
 from skidpad.simulation.world.ground import settle
 from skidpad.simulation.world.rows import Rows
@@ -46,6 +47,8 @@ class Wheeled(NamedTuple):
     patch_stiffness: Floats  # (w, 4) slip stiffness over the dry one in patches; below 0: no patch
     patch_film: Floats  # (w, 4) m of water in patches; below 0: no patch
     feel: Floats  # (w, 12) at the tyres, see `params`
+    displacing: Displacing  # vehicles that push air aside
+    air: Floats  # (w, 2) m/s of the air at each vehicle, in world axes
     active: Flags  # (w,) moved by physics in this step
 
 
@@ -142,9 +145,10 @@ def _drive(
     feel_grip(rows, w)
     for i in range(len(w.active)):
         w.active[i] = s.present[i] and rows.simulated[i] and not moved[i]
+    fill_air(s, w.displacing, wx, wy, w.air)
     step_vehicles(
         s, w.wheels, w.params, rows.commands, w.feel, rows.grade, rows.bank, w.active,
-        wx, wy, dt / substeps, substeps,
+        w.air, dt / substeps, substeps,
     )  # fmt: skip
     for i in range(len(w.active)):
         for k in range(4):

@@ -23,6 +23,7 @@ from skidpad.physics.contact import CONTACT_LAW, Contacts
 from skidpad.physics.fleet import Fleet
 from skidpad.physics.grip import GripParams, Road
 from skidpad.physics.types import TIRE_FRICTION_REFERENCE, VehicleType
+from skidpad.physics.wakes import displacing
 from skidpad.physics.wind import Gusts
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.world.ground import ROAD_NOISE, RoadSigns, read_signs
@@ -64,6 +65,7 @@ class Conditions:
     stability_control: StabilityControl = StabilityControl.IDEAL
     roll_over: bool = False  # vehicles can tip over their outer wheels
     wind: Wind | None = None  # None: no air moves
+    wakes: bool = False  # lorries, buses and vans push air aside
     road_noise: float = ROAD_NOISE  # rad of cross slope, decision M-11
     all_lanes: bool = False  # actors stand on sidewalks and shoulders too
 
@@ -189,6 +191,8 @@ class World:
             np.full((w, 4), NO_PATCH),
             np.full((w, 4), NO_PATCH),
             self.fleet.feel,
+            displacing(self.fleet.types, self.conditions.wakes),
+            np.zeros((w, 2)),
             np.zeros(w, dtype=np.bool_),
         )
         self._fill_grips()

@@ -7,7 +7,6 @@ from math import hypot, pi
 import numpy as np
 import pytest
 
-from runs import adas_run
 from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import kernel
@@ -15,6 +14,7 @@ from skidpad.core.states import ActorStates, VehicleCommand
 from skidpad.physics.types import traffic_types, vehicle_type
 from skidpad.physics.wakes import FRONTAL_LEAST, displacing, fill_air
 from skidpad.simulation.embedded.engine import EmbeddedBackend
+from support.runs import adas_run
 
 LORRY, CAR = vehicle_type("truck"), vehicle_type("hatchback")
 AREA = 2.5 * 3.6  # m^2

@@ -54,7 +54,7 @@ def fill_air(
 ) -> None:
     """Writes the velocity of the air at each vehicle, (n, 2) in m/s in world axes.
 
-    wind_x, wind_y: m/s of the air that nobody moves.
+    wind_x, wind_y: m/s of the undisturbed air.
     """
     for i in range(len(air)):
         air[i, 0], air[i, 1] = wind_x, wind_y

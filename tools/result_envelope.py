@@ -1,7 +1,8 @@
 """Tables and the Pareto picture of the speed envelope's proof, made of committed results.
 
 A campaign `envelope-MAP` has the bare stack, the fixed limit, the envelope and the reference driver; the
-rivals lie beside it in `envelope-MAP-GOVERN`. Events: contacts of 5 km/h and more, and departures.
+rivals lie beside it in `envelope-MAP-GOVERN`; a stack of a user is bare in its campaign. Events: contacts of
+5 km/h and more, and departures.
 Weathers in which everything moved alike count once (decision T-3).
 """
 
@@ -20,7 +21,8 @@ from skidpad.report.elements.figures import scatter
 
 OWN = {"3": "bare", "4": "fixed 80 km/h", "5": "envelope", "reference": "reference driver"}
 RIVALS = {
-    "table": "table of three speeds", "rss": "RSS, constant grip", "oracle": "envelope, true grip",
+    "envelope": "envelope", "table": "table of three speeds", "rss": "RSS, constant grip",
+    "oracle": "envelope, true grip",
     "pulses": "envelope with brake pulses", "only-sight": "sight alone", "only-lead": "lead alone",
     "only-bend": "bend alone", "only-water": "water alone", "grip-low": "grip 30 % too low",
     "grip-high": "grip 30 % too high", "first-curve": "envelope, resume ends behind the first bend",
@@ -46,6 +48,7 @@ def read_drivers(folder: Path) -> dict[str, pl.DataFrame]:
         for config, name in OWN.items()
         if config in own["config"].to_list()
     }
+    found = found or {BARE: own}  # a stack of a user
     for govern, name in RIVALS.items():
         file = folder.with_name(f"{folder.name}-{govern}") / "results.parquet"
         if file.is_file():
@@ -116,40 +119,62 @@ def rivals(folder: Path) -> str:
 
 
 def goals(folder: Path) -> str:
-    """Returns one row per surface over the maps that are driven: is the envelope as good as was asked?
+    """Returns one row per surface over the maps that are driven, and one per map: are the goals reached?
 
     folder: of any map of the proof. Units of the tests are seeds of a map.
     """
-    maps = [read_drivers(path) for name in MAPS if (path := folder.with_name(name)).is_dir()]
-    maps = [m for m in maps if {ENVELOPE, TABLE, ORACLE} <= set(m)]
+    maps = {
+        name.removeprefix("envelope-"): read_drivers(path)
+        for name in MAPS
+        if (path := folder.with_name(name)).is_dir()
+    }
+    maps = {name: m for name, m in maps.items() if {ENVELOPE, TABLE, ORACLE} <= set(m)}
     if not maps:
         return "No map has all rivals yet.\n"
+    every = list(maps.values())
+    cells = {"rain, snow and ice": (every, SLIPPERY)}
+    cells |= {f"the same on {name}": ([m], SLIPPERY) for name, m in maps.items()}
+    cells |= {name: (every, (name,)) for name in SURFACES}
     rows: list[list[str]] = []
     p_values: list[float] = []
-    for title, surfaces in {
-        "rain, snow and ice": SLIPPERY, **{name: (name,) for name in SURFACES}
-    }.items():  # fmt: skip
+    for title, (drivers, surfaces) in cells.items():
         seen = {
-            n: [on_surfaces(m[n], surfaces) for m in maps] for n in (BARE, TABLE, ENVELOPE, ORACLE)
+            n: [on_surfaces(m[n], surfaces) for m in drivers]
+            for n in (BARE, TABLE, ENVELOPE, ORACLE)
         }
-        all_maps = {n: pl.concat(t, how="diagonal") for n, t in seen.items()}
-        if all_maps[BARE].is_empty():
+        runs = {n: pl.concat(t, how="diagonal") for n, t in seen.items()}
+        if runs[BARE].is_empty():
             continue
         p_values += [fewer_by_seed(seen[n], seen[ENVELOPE]) for n in (BARE, TABLE)]
-        speed = {n: float(all_maps[n]["mean_speed_kmh"].mean()) for n in (ENVELOPE, ORACLE)}  # type: ignore[arg-type]
         rows.append([
             title,
-            *(f"{events(all_maps[n])} in {all_maps[n]['distance_km'].sum():.0f} km"
-              for n in (BARE, TABLE, ENVELOPE)),
-            *(times_fewer(all_maps[n], all_maps[ENVELOPE]) for n in (BARE, TABLE)),
-            f"{100.0 * speed[ENVELOPE] / speed[ORACLE]:.0f} %",
+            *(count_text(runs[n]) for n in (BARE, TABLE, ENVELOPE)),
+            times_fewer(runs[BARE], runs[ENVELOPE]),
+            factor_text(*(int(runs[n]["serious_contacts"].sum()) for n in (BARE, ENVELOPE)),
+                        way_ratio(runs[BARE], runs[ENVELOPE])),
+            times_fewer(runs[TABLE], runs[ENVELOPE]),
+            f"{100.0 * mean_speed(runs[ENVELOPE]) / mean_speed(runs[ORACLE]):.0f} %",
+            speed_text(seen[ENVELOPE], seen[TABLE]),
         ])  # fmt: skip
     adjusted = [f"{p:.2g}" if p >= 0.001 else "< 0.001" for p in holm(p_values)]
     rows = [row + adjusted[2 * i : 2 * i + 2] for i, row in enumerate(rows)]
     head = ["surface", "bare", TABLE, ENVELOPE, "times fewer than bare (95 % bound)",
-            "times fewer than the table (95 % bound)", "of the speed with true grip",
-            "p against bare (Holm)", "p against the table (Holm)"]  # fmt: skip
-    return f"{len(maps)} of {len(MAPS)} maps.\n\n" + markdown(head, rows)
+            "contacts alone", "times fewer than the table (95 % bound)", "of the speed with true grip",
+            "km/h more than the table (95 %)", "p against bare (Holm)",
+            "p against the table (Holm)"]  # fmt: skip
+    text = f"{len(maps)} of {len(MAPS)} maps. Contacts of 5 km/h + departures.\n\n"
+    return text + markdown(head, rows)
+
+
+def count_text(runs: pl.DataFrame) -> str:
+    """Returns contacts, departures and km of runs: "2 + 9 in 102 km"."""
+    contacts, departures = (int(runs[c].sum()) for c in ("serious_contacts", "road_departures"))
+    return f"{contacts} + {departures} in {runs['distance_km'].sum():.0f} km"
+
+
+def mean_speed(runs: pl.DataFrame) -> float:
+    """Returns the mean of the runs' mean speeds in km/h."""
+    return float(runs["mean_speed_kmh"].to_numpy().mean())
 
 
 def on_surfaces(runs: pl.DataFrame, surfaces: tuple[str, ...]) -> pl.DataFrame:
@@ -166,6 +191,22 @@ def times_fewer(rival: pl.DataFrame, governed: pl.DataFrame) -> str:
 def way_ratio(rival: pl.DataFrame, governed: pl.DataFrame) -> float:
     """Returns the way of the governed runs as a share of the rival's."""
     return float(governed["distance_km"].sum()) / float(rival["distance_km"].sum())
+
+
+def speed_text(governed: list[pl.DataFrame], rivals: list[pl.DataFrame]) -> str:
+    """Returns how much faster the governed runs are on average, with limits over the seeds of all maps."""
+    speeds = [
+        np.concatenate([
+            t.group_by("seed").agg(pl.col("mean_speed_kmh").mean()).sort("seed").to_series(1).to_numpy()
+            for t in tables
+        ])
+        for tables in (governed, rivals)
+    ]  # fmt: skip
+    found = compare_pairs(speeds[0] - speeds[1])
+    limits = "no limits" if found.interval is None else (
+        f"{found.interval.low:+.1f} to {found.interval.high:+.1f}"
+    )  # fmt: skip
+    return f"{found.mean:+.1f} ({limits})"
 
 
 def fewer_by_seed(rivals: list[pl.DataFrame], governed: list[pl.DataFrame]) -> float:

@@ -83,16 +83,22 @@ def test_goals_are_judged_over_the_maps_that_are_driven(tmp_path):
         write_runs(tmp_path / f"{name}-oracle", {"3": 0})
     text = proof.goals(tmp_path / proof.MAPS[0])
     assert text.startswith("2 of 3 maps.")
-    rows = {line.split("|")[1].strip(): line.split("|")[2:] for line in text.splitlines()[2:]}
-    bare, table, envelope, by_bare, by_table, speed, p_bare, p_table = (
-        cell.strip() for cell in rows["snow"][:8]
+    rows = {
+        line.split("|")[1].strip(): line.split("|")[2:]
+        for line in text.splitlines()[2:]
+        if "|" in line
+    }
+    bare, table, envelope, by_bare, contacts, by_table, speed, faster, p_bare, p_table = (
+        cell.strip() for cell in rows["snow"][:10]
     )
-    assert (bare, table, envelope) == ("72 in 120 km", "48 in 120 km", "0 in 120 km")
-    assert by_bare == f"above {power.factor_bound(72, 0):.1f}"
+    assert (bare, table, envelope) == ("72 + 0 in 120 km", "48 + 0 in 120 km", "0 + 0 in 120 km")
+    assert "36 + 0 in 60 km" in rows["the same on motorway"][0]
+    assert contacts == by_bare == f"above {power.factor_bound(72, 0):.1f}"
     assert by_table == f"above {power.factor_bound(48, 0):.1f}"
     assert speed == f"{100 * 37 / 41:.0f} %"
+    assert faster.startswith("-4.0 (")
     assert max(float(p_bare), float(p_table)) < 0.01
-    assert rows["dry"][4].strip() == "too few (0)"
+    assert rows["dry"][5].strip() == "too few (0)"
 
 
 def test_a_factor_is_of_events_per_km(tmp_path):

@@ -132,7 +132,9 @@ def goals(folder: Path) -> str:
     if not maps:
         return "No map has all rivals yet.\n"
     every = list(maps.values())
-    cells = {"rain, snow and ice": (every, SLIPPERY)}
+    cells: dict[str, tuple[list[dict[str, pl.DataFrame]], tuple[str, ...]]] = {
+        "rain, snow and ice": (every, SLIPPERY)
+    }
     cells |= {f"the same on {name}": ([m], SLIPPERY) for name, m in maps.items()}
     cells |= {name: (every, (name,)) for name in SURFACES}
     rows: list[list[str]] = []
@@ -150,8 +152,7 @@ def goals(folder: Path) -> str:
             title,
             *(count_text(runs[n]) for n in (BARE, TABLE, ENVELOPE)),
             times_fewer(runs[BARE], runs[ENVELOPE]),
-            factor_text(*(int(runs[n]["serious_contacts"].sum()) for n in (BARE, ENVELOPE)),
-                        way_ratio(runs[BARE], runs[ENVELOPE])),
+            contacts_fewer(runs[BARE], runs[ENVELOPE]),
             times_fewer(runs[TABLE], runs[ENVELOPE]),
             f"{100.0 * mean_speed(runs[ENVELOPE]) / mean_speed(runs[ORACLE]):.0f} %",
             speed_text(seen[ENVELOPE], seen[TABLE]),
@@ -186,6 +187,12 @@ def on_surfaces(runs: pl.DataFrame, surfaces: tuple[str, ...]) -> pl.DataFrame:
 def times_fewer(rival: pl.DataFrame, governed: pl.DataFrame) -> str:
     """Returns how many times fewer events per km the governed runs have, or that there are too few."""
     return factor_text(events(rival), events(governed), way_ratio(rival, governed))
+
+
+def contacts_fewer(rival: pl.DataFrame, governed: pl.DataFrame) -> str:
+    """Returns how many times fewer contacts per km the governed runs have, or that there are too few."""
+    contacts = [int(runs["serious_contacts"].sum()) for runs in (rival, governed)]
+    return factor_text(contacts[0], contacts[1], way_ratio(rival, governed))
 
 
 def way_ratio(rival: pl.DataFrame, governed: pl.DataFrame) -> float:

@@ -90,7 +90,7 @@ _LOW = np.float32(0.02)  # climb of a ray per metre, below which veils are not d
 _VEIL = np.float32(1.0 / 70.0)  # texels of a layer of veils per metre of its height
 _SOFT = np.float32(6.0)  # veils reach their full strength this steeply above the horizon
 _AROUND, _CLOSE, _DEEP = np.float32(0.26), np.float32(0.26), np.float32(0.32)
-_VEILED, _TINTED, _WARM = np.float32(0.40), np.float32(0.14), np.float32(0.08)
+_VEILED, _TINTED, _WARM = np.float32(0.28), np.float32(0.11), np.float32(0.08)
 _HALF = np.float32(0.5)
 _GREEN = np.float32(0.35)
 

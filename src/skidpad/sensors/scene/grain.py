@@ -14,21 +14,21 @@ NO_GRAIN = np.zeros((0, 4), dtype=np.float32)
 
 # shares by which grains, patches, tints and repairs change a colour: about three standard deviations
 GRAIN: dict[Material, tuple[float, float, float, float]] = {
-    Material.ASPHALT: (0.26, 1.05, 0.42, 0.32),
-    Material.NEW_ASPHALT: (0.20, 0.80, 0.30, 0.0),
-    Material.WORN_ASPHALT: (0.30, 1.05, 0.42, 0.40),
-    Material.SHOULDER: (0.26, 1.05, 0.42, 0.0),
-    Material.MARKING: (0.20, 0.66, 0.10, 0.10),
-    Material.GRASS: (0.38, 1.00, 0.60, 0.0),
-    Material.EMBANKMENT: (0.38, 1.00, 0.62, 0.0),
-    Material.MEDIAN: (0.38, 0.95, 0.58, 0.0),
-    Material.SIDEWALK: (0.14, 0.75, 0.24, 0.22),
-    Material.CONCRETE: (0.12, 0.60, 0.16, 0.0),
+    Material.ASPHALT: (0.26, 0.95, 0.18, 0.30),
+    Material.NEW_ASPHALT: (0.20, 0.70, 0.14, 0.0),
+    Material.WORN_ASPHALT: (0.30, 0.95, 0.18, 0.36),
+    Material.SHOULDER: (0.26, 0.95, 0.22, 0.0),
+    Material.MARKING: (0.20, 0.60, 0.06, 0.10),
+    Material.GRASS: (0.38, 1.00, 0.56, 0.0),
+    Material.EMBANKMENT: (0.38, 1.00, 0.58, 0.0),
+    Material.MEDIAN: (0.38, 0.95, 0.54, 0.0),
+    Material.SIDEWALK: (0.14, 0.70, 0.18, 0.22),
+    Material.CONCRETE: (0.12, 0.55, 0.12, 0.0),
     Material.KERB: (0.10, 0.22, 0.06, 0.0),
     Material.FENCE: (0.12, 0.20, 0.08, 0.0),
     Material.ROOF: (0.16, 0.40, 0.16, 0.0),
 }
-LEAVES, WALLS = (0.70, 0.90, 0.40, 0.0), (0.10, 0.75, 0.26, 0.0)
+LEAVES, WALLS = (0.70, 0.90, 0.40, 0.0), (0.10, 0.70, 0.20, 0.0)
 
 
 def grain_table(boxes: Iterable[tuple[int, int]]) -> Floats32:

@@ -1,5 +1,6 @@
 """`--surface`: a run on a surface is felt, stored and driven again; without one nothing moves."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from time import process_time
@@ -85,6 +86,25 @@ def test_carla_has_no_surfaces():
             surface=read_surface(EXAMPLE),
             backend=BackendChoice(backend=BackendKind.CARLA),
         )
+
+
+@pytest.mark.parametrize("command", [["adas", "--configs", "4"], ["drive", "--no-browser"]])
+@pytest.mark.parametrize(
+    ("patch", "sentence"),
+    [
+        ("{ice_mm: 4, bridges: true}", "map figure8 names no <bridge>"),
+        ("{ice_mm: 4, road: 999}", "map figure8 has no road 999; it has 1, 3"),
+    ],
+)
+def test_a_surface_that_does_not_fit_the_map_is_refused_before_anything_drives(
+    tmp_path, command, patch, sentence
+):
+    file, out = tmp_path / "ice.yaml", tmp_path / "out"
+    file.write_text(f"patches:\n  - {patch}\n", encoding="utf-8")
+    done = CliRunner().invoke(app, [*command, "--surface", str(file), "--out", str(out)])
+    with pytest.raises(ConfigError, match=re.escape(f"ice.yaml: patches[0]: {sentence}")):
+        raise done.exception
+    assert not out.exists()
 
 
 def coast(*surface, **settings):

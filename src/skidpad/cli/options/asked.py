@@ -13,6 +13,7 @@ from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.run import (
     DriverSpec,
     Friction,
+    Roads,
     RunSpec,
 )
 from skidpad.core.vocabulary import GripModel
@@ -195,6 +196,20 @@ class Tuned(Struct, frozen=True):
         settings = load_profile(self.profile, values)
         surface = () if self.surface is None else read_surface(self.surface)
         return structs.replace(run, settings=settings, surface=surface)
+
+    def require_surface_on(self, roads: Roads) -> None:
+        """Raises ConfigError, with the file's name, where the surface does not fit the map of the course."""
+        if self.surface is None:
+            return
+        from skidpad.campaign.driving.surfaces import read_surface
+        from skidpad.campaign.user_files import road_file
+        from skidpad.roads.bundled import load_map
+        from skidpad.simulation.world.patches import fit_patches
+
+        try:
+            fit_patches(load_map(road_file(roads)), read_surface(self.surface))
+        except ConfigError as error:
+            raise ConfigError(f"{self.surface}: {error}") from None
 
 
 class PlayCross(Struct, frozen=True):

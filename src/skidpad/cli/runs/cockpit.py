@@ -91,6 +91,7 @@ def drive(
     )
     if isinstance(spec.course, Roads) and spec.backend.backend != BackendKind.CARLA:
         require_map(spec.course.map)
+        tuned.require_surface_on(spec.course)
     from skidpad.cockpit.about import About
     from skidpad.cockpit.driving import about, drive_job
     from skidpad.cockpit.producer import Producer

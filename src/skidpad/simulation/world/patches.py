@@ -71,9 +71,7 @@ class Patches:
                 asks for bridges where the map names none.
         """
         self.map, self.lanes, self.sheet_flow = map, lanes or {}, sheet_flow
-        for k, patch in enumerate(patches):
-            _check(k, patch, map)
-        self.patches = spread_over_bridges(map, patches)
+        self.patches = fit_patches(map, patches)
         self._place, self._tyres = np.zeros((0, 4, 2)), list[str]()
         self.lay(road)
 
@@ -238,6 +236,17 @@ def in_zone(zone: FrictionZone, s: ActorStates) -> NDArray[np.bool_]:
         & (np.abs(s.z - zone.pose.z) <= zone.half[2] + 1.0)
     )
     return inside
+
+
+def fit_patches(map: RoadMap, patches: Sequence[SurfacePatch]) -> tuple[SurfacePatch, ...]:
+    """Returns the patches as they lie on a map, those of its bridges one by one.
+
+    Raises ConfigError where a patch lies on no road of the map, none of its lanes has such a stretch, or it
+    asks for bridges where the map names none.
+    """
+    for k, patch in enumerate(patches):
+        _check(k, patch, map)
+    return spread_over_bridges(map, patches)
 
 
 def _check(k: int, patch: SurfacePatch, map: RoadMap) -> None:

@@ -192,7 +192,7 @@ def test_locale_time_zone_and_hash_seed_change_no_result(tmp_path):
         "LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0", "TZ": "Pacific/Kiritimati",
         "PYTHONHASHSEED": "77", "PYTHONPATH": os.pathsep.join([str(TESTS), *sys.path]),
     }  # fmt: skip
-    script = Path(__file__).parent / "odd_place.py"
+    script = TESTS / "support" / "faults" / "odd_place.py"
     ended = subprocess.run(
         [sys.executable, str(script), str(tmp_path / "ö ç"), yaml.safe_dump(run.to_plain())],
         env=os.environ | odd, capture_output=True, timeout=600, check=False,

@@ -13,7 +13,7 @@ PROJECT = (Path(__file__).resolve().parents[2] / "pyproject.toml").read_text(enc
 def test_every_dependency_is_tried_with_the_least_version_that_it_allows():
     pinned = versions_check.oldest_versions(PROJECT)
     (block,) = re.findall(r"^dependencies = \[\n(.*?)^\]", PROJECT, re.DOTALL | re.MULTILINE)
-    assert len(pinned) == len(block.strip().splitlines()) >= 20
+    assert len(pinned) == len(block.strip().splitlines()) >= 19
     assert "numpy==1.26" in pinned
     assert versions_check.oldest_versions('dependencies = [\n    "a-b>=1.2.3",\n]\n') == [
         "a-b==1.2.3"

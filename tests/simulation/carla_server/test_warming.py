@@ -28,7 +28,7 @@ def test_parts_are_compiled_for_the_types_of_a_step(served: Served) -> None:
         world.states, world.bodies, world.obstacles.segments, world.touching
     )
     (
-        states, wheels, params, commands, mu, grade, bank, active, wind_x, wind_y, dt, substeps
+        states, wheels, params, commands, mu, grade, bank, active, wind, dt, substeps
     ) = vehicles_of_nobody()  # fmt: skip
     assert types(wheels, params, commands, mu, grade, bank, active) == types(
         world.fleet.wheels,
@@ -39,7 +39,7 @@ def test_parts_are_compiled_for_the_types_of_a_step(served: Served) -> None:
         world.rows.bank,
         world.on_wheels.active,
     )
-    assert types(wind_x, wind_y, dt, substeps) == [numba.float64] * 3 + [numba.int64]
+    assert types(wind, dt, substeps) == [numba.float64[:, ::1], numba.float64, numba.int64]
 
 
 class Child:

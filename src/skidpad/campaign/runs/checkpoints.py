@@ -7,6 +7,7 @@ from skidpad.core.errors import CheckpointError
 from skidpad.physics.segments import Segments
 from skidpad.roads.kernels import LaneArrays
 from skidpad.roads.queries import RoadMap
+from skidpad.scenarios.reading.document import Node
 from skidpad.sensors.object_level.boxes import Walls
 from skidpad.sensors.object_level.object_camera import CameraScratch, Eye
 from skidpad.sensors.object_level.object_radar import RadarScratch
@@ -16,9 +17,9 @@ from skidpad.sensors.raster.passes import Pass
 from skidpad.sensors.scene.static import StaticScene
 from skidpad.simulation.world.traffic.network import Network
 
-# the map and what is made of it; arrays that each tick fills before it reads them
+# the map and what is made of it; elements of a file; arrays that each tick fills before it reads them
 FIXED = (
-    RoadMap, LaneArrays, Network, Segments, Walls, StaticScene,
+    RoadMap, Node, LaneArrays, Network, Segments, Walls, StaticScene,
     Eye, CameraScratch, RadarScratch, Pass, Shading, CameraNoise,
 )  # fmt: skip
 

@@ -188,14 +188,16 @@ class Tuned(Struct, frozen=True):
         """
         from msgspec import structs
 
-        from skidpad.campaign.driving.surfaces import read_surface
         from skidpad.core.settings import load_profile, parse_assignments
 
         values = parse_assignments(self.set)
         values |= parse_assignments(f"{k}={v}" for k, v in more.items() if v is not None)
         settings = load_profile(self.profile, values)
-        surface = () if self.surface is None else read_surface(self.surface)
-        return structs.replace(run, settings=settings, surface=surface)
+        if self.surface is None:
+            return structs.replace(run, settings=settings)
+        from skidpad.campaign.driving.surfaces import read_surface
+
+        return structs.replace(run, settings=settings, surface=read_surface(self.surface))
 
     def require_surface_on(self, roads: Roads) -> None:
         """Raises ConfigError, with the file's name, where the surface does not fit the map of the course."""

@@ -6,12 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lxml import etree
 
 import skidpad
 from skidpad.campaign.cells.matrix import describe_run
 from skidpad.campaign.driving.drivers import describe_driver
+from skidpad.campaign.runs.checkpoints import FIXED
 from skidpad.campaign.runs.run import OpenRun
 from skidpad.campaign.runs.run import run as drive
+from skidpad.core.checkpoint import Checkpoint
 from skidpad.core.errors import CheckpointError
 from skidpad.core.run import Roads, RunSpec
 from skidpad.core.settings import load_profile
@@ -213,3 +216,13 @@ def test_every_kind_of_state_counts(monkeypatch):
         run.restore(saved)
         go_on(run)
         assert log_hash(run.finish().log) != whole, kind
+
+
+def test_an_element_of_a_file_is_no_state_of_a_run():
+    held = {"of": etree.Element("Action"), "at": [1]}
+    with pytest.raises(CheckpointError, match="_Element cannot be saved"):
+        Checkpoint(held)
+    checkpoint = Checkpoint(held, FIXED)
+    held["at"].append(2)
+    checkpoint.restore()
+    assert held["at"] == [1]

@@ -16,6 +16,7 @@ import polars as pl
 
 from envelope_power import ENOUGH, factor_bound
 from result_texts import markdown
+from skidpad.core.arrays import Floats
 from skidpad.evidence.statistics import compare_pairs, holm, mean_limits, poisson_interval
 from skidpad.report.elements.figures import scatter
 
@@ -35,6 +36,9 @@ SURFACES = {
     "dry": ("clear-noon", "clear-night"),
 }  # fmt: skip
 SLIPPERY = ("rain", "snow", "ice")
+EVENTS_PER_KM = (pl.col("serious_contacts") + pl.col("road_departures")).sum() / pl.col(
+    "distance_km"
+).sum()
 
 
 def read_drivers(folder: Path) -> dict[str, pl.DataFrame]:
@@ -200,16 +204,17 @@ def way_ratio(rival: pl.DataFrame, governed: pl.DataFrame) -> float:
     return float(governed["distance_km"].sum()) / float(rival["distance_km"].sum())
 
 
+def by_seed(tables: list[pl.DataFrame], of: pl.Expr) -> Floats:
+    """Returns the value of each seed of each map, the maps in turn and their seeds in order."""
+    return np.concatenate(
+        [t.group_by("seed").agg(of).sort("seed").to_series(1).to_numpy() for t in tables]
+    )
+
+
 def speed_text(governed: list[pl.DataFrame], rivals: list[pl.DataFrame]) -> str:
     """Returns how much faster the governed runs are on average, with limits over the seeds of all maps."""
-    speeds = [
-        np.concatenate([
-            t.group_by("seed").agg(pl.col("mean_speed_kmh").mean()).sort("seed").to_series(1).to_numpy()
-            for t in tables
-        ])
-        for tables in (governed, rivals)
-    ]  # fmt: skip
-    found = compare_pairs(speeds[0] - speeds[1])
+    speed = pl.col("mean_speed_kmh").mean()
+    found = compare_pairs(by_seed(governed, speed) - by_seed(rivals, speed))
     limits = "no limits" if found.interval is None else (
         f"{found.interval.low:+.1f} to {found.interval.high:+.1f}"
     )  # fmt: skip
@@ -218,17 +223,9 @@ def speed_text(governed: list[pl.DataFrame], rivals: list[pl.DataFrame]) -> str:
 
 def fewer_by_seed(rivals: list[pl.DataFrame], governed: list[pl.DataFrame]) -> float:
     """Returns the one-sided p value that the governed runs have fewer events per km; unit: a map's seed."""
-    rates = [
-        np.concatenate([
-            t.group_by("seed").agg(
-                (pl.col("serious_contacts") + pl.col("road_departures")).sum()
-                / pl.col("distance_km").sum()
-            ).sort("seed").to_series(1).to_numpy()
-            for t in tables
-        ])
-        for tables in (rivals, governed)
-    ]  # fmt: skip
-    return compare_pairs(rates[0] - rates[1]).p_greater
+    return compare_pairs(
+        by_seed(rivals, EVENTS_PER_KM) - by_seed(governed, EVENTS_PER_KM)
+    ).p_greater
 
 
 def factor_text(bare: int, governed: int, way: float = 1.0) -> str:
@@ -248,13 +245,9 @@ def against_table(folder: Path) -> dict[str, str]:
     for weather, drivers in cells(folder):
         if ENVELOPE not in drivers or TABLE not in drivers:
             continue
-        rates = [
-            drivers[name].sort("seed").select(
-                (pl.col("serious_contacts") + pl.col("road_departures")) / pl.col("distance_km")
-            ).to_series().to_numpy()
-            for name in (ENVELOPE, TABLE)
-        ]  # fmt: skip
-        differences = rates[0] - rates[1]
+        differences = np.subtract(
+            *(by_seed([drivers[name]], EVENTS_PER_KM) for name in (ENVELOPE, TABLE))
+        )
         found[weather] = 1.0 if not np.any(differences) else compare_pairs(differences).p
     adjusted = iter(holm([p for p in found.values() if p is not None]))
     return {w: "too few seeds" if p is None else f"{next(adjusted):.2f}" for w, p in found.items()}

@@ -107,3 +107,8 @@ class SurfacePatch(
 def present_patches(surface: Iterable[SurfacePatch], air_c: float) -> tuple[SurfacePatch, ...]:
     """Returns the patches that are there in air of this temperature, in degrees Celsius."""
     return tuple(p for p in surface if p.air_below_c is None or air_c < p.air_below_c)
+
+
+def place_in_file(k: int, patch: SurfacePatch) -> str:
+    """Returns where a patch stands in its file, for messages: "patches[2] (puddle)"."""
+    return f"patches[{k}]{f' ({patch.name})' if patch.name else ''}"

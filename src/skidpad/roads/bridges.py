@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from msgspec import structs
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.surface import SurfacePatch
+from skidpad.core.surface import SurfacePatch, place_in_file
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.roadside import Bridge
 
@@ -27,8 +27,9 @@ def _parts(map: RoadMap, k: int, patch: SurfacePatch) -> Iterator[SurfacePatch]:
         return
     bridges = map.roadside.bridges
     if not bridges:
-        where = f"patches[{k}]{f' ({patch.name})' if patch.name else ''}"
-        raise ConfigError(f"{where}: map {map.name} names no <bridge>; say road and s of each one")
+        raise ConfigError(
+            f"{place_in_file(k, patch)}: map {map.name} names no <bridge>; say road and s of each one"
+        )
     for bridge in bridges:
         for lane in _lanes(map, bridge):
             yield structs.replace(

@@ -54,7 +54,7 @@ class Closeness:
 
 def _rising(value: float | None, scale: float) -> float:
     """Returns 0 for a value of 0, 1/2 at the scale, 1 for None, a value that never applied."""
-    return 1.0 if value is None else max(value, 0.0) / (max(value, 0.0) + scale)
+    return float(_rise_of(np.array(np.inf if value is None else value), scale))
 
 
 def _least(found: Sequence[Pair], name: str) -> float | None:
@@ -151,10 +151,9 @@ def approach(log: RunLog, off_road: np.ndarray) -> Floats:
 
 
 def _rise_of(values: Floats, scale: float) -> Floats:
-    """Returns what `_rising` does for an array, in which inf stands for a value that never applied."""
-    return np.where(
-        np.isinf(values), 1.0, values / (np.where(np.isinf(values), 0.0, values) + scale)
-    )
+    """Returns 0 for values of 0 and less, 1/2 at the scale, 1 for inf, a value that never applied."""
+    low = np.maximum(values, 0.0)
+    return np.divide(low, low + scale, out=np.ones_like(low), where=np.isfinite(low))
 
 
 def is_failure(contact: Contact) -> bool:

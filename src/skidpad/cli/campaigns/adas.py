@@ -60,7 +60,7 @@ def adas(
     chosen, weathers = drivers.find_drivers(), climate.find_weathers()
     if backend.backend != BackendKind.CARLA:
         require_map(roads.map)
-        tuned.require_surface_on(roads)
+        tuned.require_surface_on(roads, run.surface)
     from skidpad.campaign.campaign import Campaign
     from skidpad.campaign.recipes.matrix import RECIPE
     from skidpad.campaign.user_files import found_again, keep_maps

@@ -16,6 +16,7 @@ from skidpad.core.run import (
     Roads,
     RunSpec,
 )
+from skidpad.core.surface import SurfacePatch
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 
@@ -199,17 +200,16 @@ class Tuned(Struct, frozen=True):
 
         return structs.replace(run, settings=settings, surface=read_surface(self.surface))
 
-    def require_surface_on(self, roads: Roads) -> None:
-        """Raises ConfigError, with the file's name, where the surface does not fit the map of the course."""
+    def require_surface_on(self, roads: Roads, surface: tuple[SurfacePatch, ...]) -> None:
+        """Raises ConfigError, with the file's name, where its patches do not fit the map of the course."""
         if self.surface is None:
             return
-        from skidpad.campaign.driving.surfaces import read_surface
         from skidpad.campaign.user_files import road_file
         from skidpad.roads.bundled import load_map
         from skidpad.simulation.world.patches import fit_patches
 
         try:
-            fit_patches(load_map(road_file(roads)), read_surface(self.surface))
+            fit_patches(load_map(road_file(roads)), surface)
         except ConfigError as error:
             raise ConfigError(f"{self.surface}: {error}") from None
 

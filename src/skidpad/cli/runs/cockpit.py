@@ -18,6 +18,8 @@ from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.vocabulary import Bodywork, Scenery
 
 if TYPE_CHECKING:
+    from skidpad.cockpit.source import Source
+    from skidpad.cockpit.studio import Looks
     from skidpad.pages.server import Place
 
 
@@ -32,6 +34,38 @@ class Pages(Struct, frozen=True, kw_only=True):
         str, Meta(description="Address of the page; others than 127.0.0.1 let others in.")
     ] = "127.0.0.1"
     no_browser: Annotated[bool, Meta(description="Print the address, open nothing.")] = False
+
+
+class Sheet(Struct, frozen=True, kw_only=True):
+    """A picture of one moment in place of the page."""
+
+    picture: Annotated[
+        Path | None,
+        Meta(description="Write the moment --at as a picture (.png, .jpg or .webp), no page."),
+    ] = None
+    weather: Annotated[
+        str | None,
+        Meta(
+            description="Of the picture, one for each: all, or presets and YAML files parted by commas; "
+            "default: as it was."
+        ),
+    ] = None
+    drops: Annotated[bool, Meta(description="The picture also with rain drops on the lens.")] = (
+        False
+    )
+
+    def write(self, source: Source, views: list[str], at: float | None, looks: Looks) -> Path:
+        """Writes the picture of the moment at s, None: the opening one, and returns its path."""
+        from skidpad.cockpit.sheet import Shots, write_sheet
+        from skidpad.cockpit.source import index_at, opening_tick
+        from skidpad.cockpit.studio import View
+        from skidpad.core.setup import DT
+
+        assert self.picture is not None
+        weathers = () if self.weather is None else Climate(self.weather).find_weathers()
+        moment = index_at(source, opening_tick(source) if at is None else round(at / DT))
+        shots = Shots([View(v) for v in views], weathers, self.drops)
+        return write_sheet(source, moment, shots, self.picture, looks)
 
 
 class OnClose(str, Enum):
@@ -91,7 +125,7 @@ def drive(
     )
     if isinstance(spec.course, Roads) and spec.backend.backend != BackendKind.CARLA:
         require_map(spec.course.map)
-        tuned.require_surface_on(spec.course)
+        tuned.require_surface_on(spec.course, spec.surface)
     from skidpad.cockpit.about import About
     from skidpad.cockpit.driving import about, drive_job
     from skidpad.cockpit.producer import Producer
@@ -150,6 +184,7 @@ def replay(
         ),
     ],
     pages: Pages,
+    sheet: Sheet,
     beside: Annotated[
         Path | None, typer.Option(help="Another run, shown beside it in step.")
     ] = None,
@@ -165,12 +200,6 @@ def replay(
     ] = None,
     begin: Annotated[float, typer.Option("--from", help="s, of the film.")] = 0.0,
     end: Annotated[float, typer.Option("--to", help="s, of the film.")] = 10.0,
-    picture: Annotated[
-        Path | None,
-        typer.Option(
-            help="Write the moment --at as a picture (.png, .jpg or .webp) instead of a page."
-        ),
-    ] = None,
     view: Annotated[
         str,
         typer.Option(
@@ -178,16 +207,6 @@ def replay(
             "parted by commas."
         ),
     ] = "follow",
-    weather: Annotated[
-        str | None,
-        typer.Option(
-            help="Of the picture, one for each: all, or presets and YAML files parted by commas; "
-            "default: as it was."
-        ),
-    ] = None,
-    drops: Annotated[
-        bool, typer.Option("--drops", help="The picture also with rain drops on the lens.")
-    ] = False,
     scenery: Annotated[
         Scenery,
         typer.Option(help="Beside the roads in the pictures, whatever the run had: full or none."),
@@ -209,23 +228,18 @@ def replay(
     from skidpad.cockpit.producer import Producer
     from skidpad.cockpit.replaying import replay_job
     from skidpad.cockpit.serving import serve
-    from skidpad.cockpit.sheet import Shots, write_sheet
-    from skidpad.cockpit.source import index_at, opening_tick, timeline
+    from skidpad.cockpit.source import timeline
     from skidpad.cockpit.studio import Looks, View
     from skidpad.core.errors import require_choice
-    from skidpad.core.setup import DT
 
-    if picture is None and (drops or weather is not None):
+    if sheet.picture is None and (sheet.drops or sheet.weather is not None):
         raise ConfigError("--weather and --drops are of a picture: give it with --picture FILE.png")
     source = open_source(run, hazard)
     other = None if beside is None else open_source(beside)
     looks, known = Looks(scenery, bodywork), [v.value for v in View]
-    if picture is not None:
-        views = [View(require_choice("--view", v.strip(), known)) for v in view.split(",")]
-        weathers = () if weather is None else Climate(weather).find_weathers()
-        moment = index_at(source, opening_tick(source) if at is None else round(at / DT))
-        shots = Shots(views, weathers, drops)
-        typer.echo(write_sheet(source, moment, shots, picture, looks))
+    if sheet.picture is not None:
+        views = [require_choice("--view", v.strip(), known) for v in view.split(",")]
+        typer.echo(sheet.write(source, views, at, looks))
         return
     if film is not None:
         seen = View(require_choice("--view", view, known))

@@ -105,7 +105,7 @@ def _walker(
 
 
 def _head(label: int, style: WalkerStyle) -> list[Mesh]:
-    """Neck, head and hair."""
+    """Returns the neck, the head and the hair of a walker."""
     neck, half = style.neck, style.head
     nape = (0.0, 0.0, neck - 0.02), (0.01, 0.0, neck + 0.04)
     parts = [

@@ -14,7 +14,7 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import hold
 from skidpad.core.states import ActorStates
-from skidpad.core.surface import SurfacePatch, present_patches
+from skidpad.core.surface import SurfacePatch, place_in_file, present_patches
 from skidpad.physics.grip import GripParams, Road, road_surface
 from skidpad.physics.slush import slush_grip
 from skidpad.physics.types import VehicleType
@@ -251,7 +251,7 @@ def fit_patches(map: RoadMap, patches: Sequence[SurfacePatch]) -> tuple[SurfaceP
 
 def _check(k: int, patch: SurfacePatch, map: RoadMap) -> None:
     """Raises ConfigError where the patch's road is unknown or its stretch covers nothing of the lane."""
-    where = f"patches[{k}]{f' ({patch.name})' if patch.name else ''}"
+    where = place_in_file(k, patch)
     if patch.road is None:
         return
     roads = sorted({int(road) for road in map.lanes.road})

@@ -37,7 +37,7 @@ CLAIMS = RESULTS / "claims.md"
 REFERENCE = "matrix-figure8"  # what others on the same seeds are held against
 REMEDIES = "remedy-none"  # what remedies of the same commit are held against
 MATRICES = (REFERENCE, "matrix-motorway", "matrix-foreign", "matrix-pixels-two")
-PAGES = ("docs/matrix.md", "docs/grip.md", "docs/envelope-proof.md")
+PAGES = ("docs/matrix.md", "docs/matrix-tables.md", "docs/grip.md", "docs/envelope-proof.md")
 BLOCK = re.compile(r"(<!-- results: (\S+) (\S+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
 

@@ -1,9 +1,9 @@
-"""The tables of docs/channels-evaluation.md, made of docs/results/channels.
+"""Writes the tables of docs/channels-evaluation.md and docs/channels-tables.md from docs/results/channels.
 
-    python tools/channels_tables.py            # writes the page anew
-    python tools/channels_tables.py --check    # exit code 1 when it is not what is made
+    python tools/channels_tables.py            # writes the pages anew
+    python tools/channels_tables.py --check    # exit code 1 when one is not what is made
 
-A table stands between `<!-- table: NAME -->` and `<!-- end -->`; all else on the page is written by hand.
+A table stands between `<!-- table: NAME -->` and `<!-- end -->`; all else on a page is written by hand.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = ROOT / "docs" / "channels-evaluation.md"
+PAGES = (ROOT / "docs" / "channels-evaluation.md", ROOT / "docs" / "channels-tables.md")
 RESULTS = ROOT / "docs" / "results" / "channels"
 FIGURE = RESULTS / "reference.svg"
 REFERENCE = "reference "  # before the limit, in the names of rules.json
@@ -30,19 +30,21 @@ TRACKED = {  # names in rules.json of what `tracked` has, the newest first
     "ego_tailgating": ("tracked",),
     "ego_tailgated": ("tracked",),
 }
+DEFAULT_AND_BEFORE = ("before: a dry road, vote", "tracked")
 Rows = list[list[str]]
 
 
 def main(words: list[str] | None = None) -> int:
-    """Write the page, or say whether it is up to date."""
+    """Writes the pages, or returns 1 when one is out of date (`--check`)."""
     words = sys.argv[1:] if words is None else words
-    before = PAGE.read_text(encoding="utf-8")
-    after = filled(before, RESULTS)
+    before = {page: page.read_text(encoding="utf-8") for page in PAGES}
+    after = {page: filled(text, RESULTS) for page, text in before.items()}
     known = PRECISION.read_text(encoding="utf-8")
     measured = with_tracked_precision(known, RESULTS)
     if "--check" in words:
         return int(before != after or known != measured)
-    PAGE.write_text(after, encoding="utf-8")
+    for page, text in after.items():
+        page.write_text(text, encoding="utf-8")
     if measured != known:
         PRECISION.write_text(measured, encoding="utf-8")
     if (RESULTS / "rules.json").is_file():
@@ -205,6 +207,11 @@ def rules(results: Path) -> str:
     return _rules_table(results, "rules")
 
 
+def answer(results: Path) -> str:
+    """Returns the default rules beside the ones before them, on the same drives."""
+    return _rules_table(results, "rules", only=DEFAULT_AND_BEFORE)
+
+
 def variants(results: Path) -> str:
     """The same on further drives, with variants that came later."""
     return _rules_table(results, "variants")
@@ -215,7 +222,9 @@ def further(results: Path) -> str:
     return _rules_table(results, "further", HAZARDS[:1])
 
 
-def _rules_table(results: Path, name: str, hazards: tuple[str, ...] = HAZARDS) -> str:
+def _rules_table(
+    results: Path, name: str, hazards: tuple[str, ...] = HAZARDS, only: tuple[str, ...] = ()
+) -> str:
     told = _rules_of(results, name)
     if told is None:
         return "Not driven.\n"
@@ -229,6 +238,7 @@ def _rules_table(results: Path, name: str, hazards: tuple[str, ...] = HAZARDS) -
         for hazard in hazards
         for rule, of in part["rules"].items()
         if (row := of.get(hazard)) and row["tp"] + row["fn"] and not rule.startswith(REFERENCE)
+        and (not only or rule in only)
     ]  # fmt: skip
     hours = ", ".join(f"{p['hours']:.2f} h {n} ({_segments(p)})" for n, p in told["drives"].items())
     when = f"Driven {told['date']} at commit `{told['commit']}`, seeds from {seeds}: {hours}."
@@ -330,7 +340,7 @@ def _false_rate(row: dict[str, Any]) -> str:
 
 
 TABLES: dict[str, Callable[[Path], str]] = {
-    "driven": driven, "scores": scores, "missed": missed, "ice": ice, "curves": curves,
+    "answer": answer, "driven": driven, "scores": scores, "missed": missed, "ice": ice, "curves": curves,
     "redundancy": redundancy, "rules": rules, "reference": reference, "rarity": rarity,
     "ways": ways, "variants": variants, "further": further,
 }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Variants of the rules `tracked` that were tried: each is a row of docs/channels-evaluation.md.
+"""Variants of the rules `tracked` that were tried: each is a row of docs/channels-tables.md.
 
 They judge what lookouts have seen, as `Tracked` does. Their settings were chosen on drives with seeds
 from 9000000 to 9999999 alone.

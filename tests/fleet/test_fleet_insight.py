@@ -150,7 +150,7 @@ def test_hazards_per_hour_count_the_drives_without_any(world):
 
 
 def test_the_precision_of_alarms_is_that_of_the_published_table():
-    page = (Path(__file__).parents[2] / "docs" / "channels-evaluation.md").read_text()
+    page = (Path(__file__).parents[2] / "docs" / "channels-tables.md").read_text()
     table = page.split("<!-- table: scores -->")[1].split("<!-- end -->")[0]
     rows = [
         [cell.strip() for cell in line.split("|")[1:-1]]

@@ -1,7 +1,7 @@
 """Files with one element each, against what esmini made of them: equal places at equal times.
 
-The tables beside the files name esmini's version; where the two differ, docs/openscenario.md says who
-follows the standard.
+The tables beside the files name esmini's version; where the two differ, docs/openscenario-results.md says
+which follows the standard.
 """
 
 from __future__ import annotations

@@ -15,8 +15,8 @@ from skidpad.scenarios.scenario import compile_scenario
 from support.oracle.cases import CASES
 from support.oracle.reference import OWN, deviations, file_hash, read_reference, write_case
 
-DOCS = Path(__file__).parents[2] / "docs" / "openscenario.md"
-# where the standard decides against esmini; docs/openscenario.md names what decides
+DOCS = Path(__file__).parents[2] / "docs" / "openscenario-results.md"
+# where the standard decides against esmini; docs/openscenario-results.md names what decides
 EXCEPTIONS = (
     "profile_relative_curve",
     "beside_straight",

@@ -1,4 +1,4 @@
-"""Counts the breaches of the language rules in `src` that can be counted, and lets no count grow.
+"""Counts breaches of the language rules in `src`, README and `docs`, and lets no count grow.
 
     python tools/language_lint.py            the counts; exit status 1 when one is above its limit
     python tools/language_lint.py --list     every breach with its place
@@ -20,13 +20,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-SOURCE = Path(__file__).resolve().parents[1] / "src" / "skidpad"
+ROOT = Path(__file__).resolve().parents[1]
+SOURCE = ROOT / "src" / "skidpad"
 LIMITS = Path(__file__).with_name("language_limits.json")
 PARTICIPLE = "function named by a bare participle"
 PERSON = "part of the program spoken of as a person"
 THEATRE = "word of theatre or masonry in a name"
 SHORT = "first docstring line of four words or fewer"
-RULES = (PARTICIPLE, PERSON, THEATRE, SHORT)
+PAGE = "word for a person on a page of docs or in README"
+RULES = (PARTICIPLE, PERSON, THEATRE, SHORT, PAGE)
 
 _IRREGULAR = (
     "asked begun bound bought broken brought built caught chosen come cut done drawn driven fed felt "
@@ -43,6 +45,7 @@ EXCEPTIONS = {  # names that read like a breach and are none, each with its reas
     "cut": "the verb",
 }
 PERSONS = re.compile(r"\b(who|whoever|somebody|nobody|anybody)\b", re.IGNORECASE)
+CODE = re.compile(r"^```.*?^```|`[^`\n]*`", re.DOTALL | re.MULTILINE)
 THEATRE_WORDS = frozenset(
     {
         "cast",
@@ -103,12 +106,23 @@ def _is_participle(word: str) -> bool:
     return regular or word in IRREGULAR
 
 
+def find_page_breaches(text: str) -> Iterator[Breach]:
+    """Yields every banned word in the prose and tables of a page; code is left out."""
+    text = CODE.sub(lambda code: "\n" * code[0].count("\n"), text)
+    for number, line in enumerate(text.splitlines(), 1):
+        for match in PERSONS.finditer(line):
+            yield Breach(PAGE, number, line[max(match.start() - 30, 0) : match.end() + 30])
+
+
 def all_breaches() -> Iterator[tuple[Path, Breach]]:
-    """Yields every breach below `src`, with its file."""
+    """Yields every breach in the code, then in README and the pages of `docs`, with its file."""
     for path in sorted(SOURCE.rglob("*.py")):
         if not path.name.endswith("_pb2.py"):
             for breach in find_breaches(path.read_text(encoding="utf-8")):
                 yield path, breach
+    for path in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
+        for breach in find_page_breaches(path.read_text(encoding="utf-8")):
+            yield path, breach
 
 
 def main(arguments: list[str]) -> int:
@@ -117,7 +131,7 @@ def main(arguments: list[str]) -> int:
     for path, breach in all_breaches():
         counts[breach.rule] += 1
         if "--list" in arguments:
-            print(f"{path.relative_to(SOURCE)}:{breach.line}: {breach.rule}: {breach.text!r}")
+            print(f"{path.relative_to(ROOT)}:{breach.line}: {breach.rule}: {breach.text!r}")
     if "--write" in arguments:
         LIMITS.write_text(json.dumps(counts, indent=2) + "\n", encoding="utf-8")
     limits: dict[str, int] = json.loads(LIMITS.read_text(encoding="utf-8"))

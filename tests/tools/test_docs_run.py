@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,13 @@ def test_blocks_of_a_page_run(page: Path, tmp_path: Path) -> None:
     for block in docs_run.blocks_of(page):
         if block.is_run:
             docs_run.run_block(block, tmp_path, quick=True)
+
+
+def test_every_block_of_a_page_ends() -> None:
+    """An open block swallows the text behind it, as it did with three sections of channels.md."""
+    for page in docs_run.pages():
+        fences = re.findall(r"^```", page.read_text(encoding="utf-8"), re.MULTILINE)
+        assert len(fences) % 2 == 0, page.name
 
 
 def test_a_block_without_a_language_holds_no_command() -> None:

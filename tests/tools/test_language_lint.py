@@ -10,12 +10,14 @@ from language_lint import (
     EXCEPTIONS,
     IRREGULAR,
     LIMITS,
+    PAGE,
     PARTICIPLE,
     PERSON,
     RULES,
     SHORT,
     THEATRE,
     find_breaches,
+    find_page_breaches,
 )
 
 FINE = '''
@@ -49,6 +51,12 @@ def test_plain_names_and_sentences_are_fine() -> None:
 )
 def test_each_breach_is_found_once(source: str, rule: str) -> None:
     assert [b.rule for b in find_breaches(source)] == [rule]
+
+
+def test_words_of_a_page_are_found_outside_of_code() -> None:
+    page = "# A page\n`who` and\n```console\n$ whoami who\n```\n| Nobody | stops |\n"
+    (breach,) = find_page_breaches(page)
+    assert (breach.rule, breach.line) == (PAGE, 6)
 
 
 @pytest.mark.parametrize("name", EXCEPTIONS)

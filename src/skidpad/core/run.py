@@ -190,6 +190,15 @@ class Roads(Struct, frozen=True, kw_only=True, tag="roads", forbid_unknown_field
     edges: Annotated[
         Edges, Meta(description="rail: guard rails along the roads of a map without barriers.")
     ] = Edges.NONE
+    route_km: Annotated[
+        float,
+        Meta(
+            ge=0.0,
+            le=1000.0,
+            description="The run ends after so many km along the road, at the latest after --duration, "
+            "and tells how much of them was driven; 0: no end.",
+        ),
+    ] = 0.0
 
 
 class Scenario(Struct, frozen=True, kw_only=True, tag="scenario", forbid_unknown_fields=True):
@@ -403,6 +412,8 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             for name in ("disturb", "draws"):
                 if not getattr(self.course, name):
                     del plain["course"][name]
+        if isinstance(self.course, Roads) and not self.course.route_km:  # likewise
+            del plain["course"]["route_km"]
         return plain
 
 

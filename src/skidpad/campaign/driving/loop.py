@@ -22,6 +22,7 @@ from skidpad.core.setup import ActorCommand
 from skidpad.core.slots import fill_slots
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import Supervision
+from skidpad.roads.journeys import Journey
 from skidpad.simulation.backend import Backend
 from skidpad.simulation.recovery import Action
 
@@ -132,6 +133,24 @@ class Timer:
         """Counts one tick down and returns the script's commands."""
         self.left -= 1
         return () if self.script is None else self.script.step(truth)
+
+
+class Arrival:
+    """A script that moves nobody and ends when the ego has come to the end of its way."""
+
+    def __init__(self, journey: Journey) -> None:
+        self.journey = journey
+
+    @property
+    def ended(self) -> bool:
+        """Returns True when the ego has arrived."""
+        return self.journey.ended
+
+    def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
+        """Follows the ego and returns no commands."""
+        s = truth.states
+        self.journey.follow(float(s.x[0]), float(s.y[0]), float(s.z[0]))
+        return ()
 
 
 def loop(

@@ -13,7 +13,7 @@ from skidpad.campaign.driving.file_drivers import FILE_DRIVERS
 from skidpad.campaign.driving.file_stack import NAME as STACK_NAME
 from skidpad.campaign.driving.file_stack import PilotConditions, PilotMaker
 from skidpad.campaign.driving.governing import apply_envelope
-from skidpad.campaign.driving.loop import Script, Supervising, Timer, Unsupervised
+from skidpad.campaign.driving.loop import Arrival, Script, Supervising, Timer, Unsupervised
 from skidpad.campaign.driving.starts import start_of
 from skidpad.campaign.user_files import road_file
 from skidpad.core.errors import ConfigError, FileError, StackError
@@ -42,6 +42,7 @@ from skidpad.core.vocabulary import Control, Outcome
 from skidpad.physics.types import EGO_TYPE, vehicle_type
 from skidpad.physics.wind import wind_of_intensity
 from skidpad.roads.bundled import load_map
+from skidpad.roads.journeys import Journey
 from skidpad.roads.queries import RoadMap
 from skidpad.scenarios import scenario as scenarios
 from skidpad.scenarios.playing.disturbing import Disturbances, read_disturbances
@@ -192,7 +193,19 @@ def _roads(spec: RunSpec, course: Roads) -> Stage:
     )
     setup = replace(setup_of(spec, file, ego), traffic=traffic)
     supervisor = Supervisor(map, recovery_settings(s), setup.dt)
-    return Stage(map, setup, supervisor, Timer(round(spec.duration / setup.dt)))
+    journey = journey_of(course, map)
+    arrival = None if journey is None else Arrival(journey)
+    return Stage(map, setup, supervisor, Timer(round(spec.duration / setup.dt), arrival))
+
+
+def journey_of(course: Roads, map: RoadMap) -> Journey | None:
+    """Returns the ego's way where the course has an end, with nothing driven yet; else None.
+
+    ConfigError where the map's road ends before.
+    """
+    if not course.route_km:
+        return None
+    return Journey(map, map.place(start_of(map)), 1000.0 * course.route_km)
 
 
 def _scenario(spec: RunSpec, course: Scenario) -> Stage:

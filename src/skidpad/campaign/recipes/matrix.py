@@ -57,9 +57,11 @@ def drive_one(out: Path, cell: RunSpec) -> Driven[RunKey, Metrics]:
     """Drives a run, writes its folder (one that is there is replaced) and returns its row."""
     # numba and friends are imported only where they are needed, not in the parent.
     from skidpad.campaign.driving.backends import WATCHDOG, keep_server, make_backend
+    from skidpad.campaign.driving.run_setup import journey_of
     from skidpad.campaign.runs.run import run
     from skidpad.evidence.drive.added import measure_added
     from skidpad.evidence.drive.metrics import run_metrics
+    from skidpad.evidence.drive.route import measure_route
     from skidpad.recording.campaign.added_metrics import write_added_metrics
     from skidpad.recording.run.motion import motion_hash
     from skidpad.roads.bundled import load_map
@@ -79,6 +81,8 @@ def drive_one(out: Path, cell: RunSpec) -> Driven[RunKey, Metrics]:
         road = load_map(road_file(roads_of(here)))
         metrics = run_metrics(driven.log, road, metric_settings(cell))
         added = measure_added(driven.log, road, metric_settings(cell))
+        journey = journey_of(roads_of(here), road)
+        added += () if journey is None else measure_route(driven.log, journey)
         write_added_metrics(folder, added)
     return Driven(
         key=run_key(

@@ -96,6 +96,7 @@ def drive(
     duration: float = 500.0,
     traffic: str = "fixed",
     vehicles: int = 20,
+    route_km: float = 0.0,
     sensors: str = "pixels",
     profile: str = "recommended",
     settings: Mapping[str, Plain] | None = None,
@@ -114,6 +115,7 @@ def drive(
         duration: simulated seconds. 500 s take minutes with pixels, and seconds with objects.
         traffic: "fixed", "random" or "pack": where background vehicles begin and stay.
         vehicles: how many there are, 0 to 80.
+        route_km: the run ends after so many km along the road, as `--route-km`; 0: no end.
         sensors: "pixels" for real images, or "objects", which is much faster.
         profile: "recommended", "thesis_text", "thesis_listing" or "preliminary".
         settings: single settings over the profile, as `--set`; `skidpad profiles` lists them.
@@ -140,6 +142,7 @@ def drive(
             map=str(map),
             traffic=TrafficStart(require_choice("traffic", traffic, words[1])),
             vehicles=vehicles,
+            route_km=route_km,
         ),
         duration=duration,
         settings=load_profile(profile, settings),

@@ -8,7 +8,7 @@ import typer
 from msgspec import structs
 
 from skidpad.campaign.cells.matrix import cross
-from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.campaign.driving.run_setup import journey_of, stage_of
 from skidpad.campaign.recipes.matrix import missing_vehicles, roads_of
 from skidpad.campaign.user_files import road_file
 from skidpad.cli.options.carla_backend import map_of
@@ -29,7 +29,7 @@ def plan(
     """
     roads = roads_of(run)
     roads = structs.replace(roads, map=map_of(roads.map, run.backend))
-    load_map(road_file(roads))
+    journey_of(roads, load_map(road_file(roads)))
     if roads.map not in bundled_maps():  # published places need not fit somebody else's roads
         roads = structs.replace(roads, allow_fewer=True)
         _say_missing(structs.replace(run, course=roads))

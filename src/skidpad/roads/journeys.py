@@ -1,0 +1,67 @@
+"""A way with an end: so many metres along the road from a start, and how far a car got on it."""
+
+from __future__ import annotations
+
+from math import hypot
+
+import numpy as np
+
+from skidpad.core.arrays import Floats
+from skidpad.core.errors import ConfigError
+from skidpad.roads.queries import LanePoint, RoadMap
+
+STEP = 5.0  # m between the places of a journey
+WINDOW = 16  # places ahead of the last one among which a car is looked for
+NEAR = 15.0  # m from a place within which a car is on its way: beside it on a road of four lanes
+LEVEL = 4.0  # m above or below: farther is another road (decision M-12)
+
+
+class Journey:
+    """A way along the road; at forks it goes the straightest way, as lanes do (A-148)."""
+
+    def __init__(self, map: RoadMap, start: LanePoint, length: float) -> None:
+        """Lays `length` m of way from a start; ConfigError where the road ends before."""
+        steps = max(round(length / STEP), 1)
+        further = map.trace_ahead(start, STEP, steps)
+        if len(further) < steps:
+            raise ConfigError(
+                f"route-km must be at most {len(further) * STEP / 1000.0:g} on map {map.name}, where "
+                f"the road from the start ends; got {length / 1000.0:g}"
+            )
+        self.length = length
+        self.places: list[tuple[float, float, float]] = [
+            (start.x, start.y, start.z),
+            *((x, y, z) for x, y, z, _ in further.tolist()),
+        ]
+        self.reached = 0  # index of the furthest place that the car came by
+
+    def follow(self, x: float, y: float, z: float) -> float:
+        """Takes where the car is now, and returns the m of the way that it has come by.
+
+        Call it in each tick. A car that is beside the way comes no further, one that turns back keeps
+        what it had.
+        """
+        best, least = self.reached, NEAR
+        for k in range(self.reached, min(self.reached + WINDOW, len(self.places))):
+            px, py, pz = self.places[k]
+            distance = hypot(px - x, py - y)
+            if distance < least and abs(pz - z) < LEVEL:
+                best, least = k, distance
+        self.reached = best
+        return self.progress
+
+    @property
+    def progress(self) -> float:
+        """M of the way that the car has come by, by the furthest place."""
+        return self.length * self.reached / (len(self.places) - 1)
+
+    @property
+    def ended(self) -> bool:
+        """Whether the car has come to the end."""
+        return self.reached == len(self.places) - 1
+
+
+def progress_along(journey: Journey, x: Floats, y: Floats, z: Floats) -> Floats:
+    """Returns (T,) m of the way that a car at these (T,) places had come by in each tick."""
+    ways = zip(x.tolist(), y.tolist(), z.tolist(), strict=True)
+    return np.array([journey.follow(*way) for way in ways])

@@ -1,4 +1,4 @@
-"""How far must be driven for the envelope's proof: `python tools/envelope_power.py` prints the table.
+"""How far must be driven for the envelope's proof: `python tools/envelope_power.py` prints the tables.
 
 Events are contacts above 5 km/h and departures. Two drivers go the same distance; their counts are Poisson.
 The factor's lower bound is the exact one-sided one, given the sum of the counts (Clopper and Pearson).
@@ -14,6 +14,7 @@ from scipy import stats
 GOAL, LEAST = 10.0, 3.0  # times fewer events: aimed at, and excluded from below
 LEVEL, POWER = 0.05, 0.8  # one-sided; chance to show it where it is so
 ENOUGH = 30  # events of the bare stack, below which no factor is printed
+ROUTES = 30.0  # km: ten seeds of a route of 3 km
 STEPS = np.geomspace(20.0, 20_000.0, 61)  # km
 
 
@@ -58,5 +59,20 @@ def table() -> str:
     return text
 
 
+def routes_table() -> str:
+    """Returns the chances of the routes with an end: ROUTES km, by events and by how much it is better."""
+    text = (
+        f"| in {ROUTES:.0f} km, events of the bare stack per 100 km | bound of 3, if 10 times | "
+        "bound of 3, if 8 times | fewer at all, if 4 times |\n|---|---|---|---|\n"
+    )
+    for rate in (30.0, 50.0, 100.0, 200.0, 400.0):
+        chances = [
+            chance_to_show(rate, ROUTES, better, least)
+            for better, least in ((GOAL, LEAST), (8, LEAST), (4, 1))
+        ]
+        text += f"| {rate:.0f} | " + " | ".join(f"{100.0 * c:.0f} %" for c in chances) + " |\n"
+    return text
+
+
 if __name__ == "__main__":
-    print(table(), end="")
+    print(table(), routes_table(), sep="\n", end="")

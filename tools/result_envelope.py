@@ -30,6 +30,7 @@ RIVALS = {
 }  # fmt: skip
 BARE, ENVELOPE, TABLE, ORACLE = "bare", "envelope", RIVALS["table"], RIVALS["oracle"]
 PICTURE = "pareto.svg"
+COMPLETION, UNAIDED = "route_completion_pct", "route_unaided_pct"  # of routes with an end
 MAPS = ("envelope-figure8", "envelope-motorway", "envelope-town")
 SURFACES = {
     "rain": ("rain-noon", "rain_100"), "snow": ("snow",), "ice": ("icy_30", "icy_100"),
@@ -251,6 +252,43 @@ def against_table(folder: Path) -> dict[str, str]:
         found[weather] = 1.0 if not np.any(differences) else compare_pairs(differences).p
     adjusted = iter(holm([p for p in found.values() if p is not None]))
     return {w: "too few seeds" if p is None else f"{next(adjusted):.2f}" for w, p in found.items()}
+
+
+def routes(folder: Path) -> str:
+    """Returns one row per weather and driver of routes with an end: do they arrive, and how?"""
+    rows = []
+    for weather, drivers in cells(folder):
+        for name, runs in drivers.items():
+            if runs.is_empty():
+                continue
+            rows.append([
+                weather, name, str(len(runs)),
+                *(share_text(runs, column) for column in (COMPLETION, UNAIDED)),
+                "" if name == BARE else difference_text(drivers[BARE], runs, UNAIDED),
+                f"{mean_speed(runs):.1f}", count_text(runs),
+                times_fewer(drivers[BARE], runs) if name == ENVELOPE else "",
+            ])  # fmt: skip
+    head = ["weather", "driver", "runs", "route driven, % (arrived)", "until first put back, % (arrived)",
+            "the latter, more than bare (95 %)", "mean speed, km/h", "contacts of 5 km/h + departures",
+            "times fewer than bare (95 % bound)"]  # fmt: skip
+    return markdown(head, rows)
+
+
+def share_text(runs: pl.DataFrame, column: str) -> str:
+    """Returns the mean of a share in % and how many runs have all of it: "93 (8)"."""
+    shares = runs[column].fill_null(0.0).to_numpy()
+    return f"{shares.mean():.0f} ({int((shares >= 100.0).sum())})"
+
+
+def difference_text(rival: pl.DataFrame, governed: pl.DataFrame, column: str) -> str:
+    """Returns how much more of a column governed runs have, with limits over the seeds they share."""
+    both = rival.join(governed, on="seed", suffix="_governed").sort("seed")
+    differences = both[f"{column}_governed"].fill_null(0.0) - both[column].fill_null(0.0)
+    found = compare_pairs(differences.to_numpy())
+    limits = "no limits" if found.interval is None else (
+        f"{found.interval.low:+.0f} to {found.interval.high:+.0f}"
+    )  # fmt: skip
+    return f"{found.mean:+.0f} ({limits})"
 
 
 def pareto(folder: Path) -> str:

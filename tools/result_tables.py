@@ -109,6 +109,7 @@ def block(name: str, which: str, folder: Path) -> str:
         ),
         "adas envelope": result_envelope.rivals,
         "adas goals": result_envelope.goals,
+        "adas routes": result_envelope.routes,
         "adas pareto": result_envelope.pareto,
         "grip completion": result_grip.completion,
         "grip claims": result_grip.claims,

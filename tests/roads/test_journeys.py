@@ -24,7 +24,7 @@ def driven(map: RoadMap, length: float, aside: float = 0.0) -> tuple[np.ndarray,
 def test_a_car_that_follows_the_road_comes_to_the_end(figure8: RoadMap, aside: float) -> None:
     journey = Journey(figure8, figure8.on_lane(1, -2, 20.0), 3000.0)  # more than one round
     way = progress_along(journey, *driven(figure8, 3010.0, aside))
-    assert journey.ended
+    assert journey.is_done
     assert way[-1] == 3000.0
     assert (np.diff(way) >= 0.0).all()
     assert np.abs(way[:3000] - np.arange(3000)).max() < 20.0
@@ -38,7 +38,7 @@ def test_a_car_that_leaves_its_way_or_turns_back_keeps_what_it_had(figure8: Road
     assert progress_along(journey, x[::-1], y[::-1], z[::-1])[-1] == had
     assert progress_along(journey, x + 30.0, y + 30.0, z)[-1] == had
     assert journey.follow(x[-1], y[-1], z[-1] + 6.0) == had  # on a bridge over it
-    assert not journey.ended
+    assert not journey.is_done
 
 
 def test_a_way_that_is_longer_than_the_road_is_refused() -> None:

@@ -130,3 +130,24 @@ def test_the_page_has_the_table_of_the_power():
     page = (ROOT / "docs" / "envelope-proof.md").read_text(encoding="utf-8")
     assert "| 30 | 100 | 126 | 142 |" in page
     assert power.needed_km(30.0, 10.0, 3.0) == pytest.approx(126.0, abs=0.5)
+
+
+def test_a_route_is_told_by_what_was_driven_of_it_and_compared_by_seed(tmp_path):
+    folder = tmp_path / "envelope-route"
+    write_runs(folder, {"3": 3, "5": 0})
+    runs = pl.read_parquet(folder / "results.parquet").with_columns(
+        pl.lit(100.0).alias(proof.COMPLETION),
+        pl.when(pl.col("config") == "5").then(100.0).otherwise(20.0 + pl.col("seed")).alias(
+            proof.UNAIDED
+        ),
+    )  # fmt: skip
+    runs.write_parquet(folder / "results.parquet")
+    snow = rows_of(proof.routes(folder), "snow")
+    assert snow["bare"][3:6] == ["100 (12)", "26 (0)", ""]
+    assert snow["envelope"][3:5] == ["100 (12)", "100 (12)"]
+    assert snow["envelope"][5].startswith("+74 (+7")
+
+
+def test_ten_seeds_of_3_km_have_power_where_there_are_many_events():
+    assert power.chance_to_show(200.0, power.ROUTES, 8.0, power.LEAST) > power.POWER
+    assert power.chance_to_show(30.0, power.ROUTES, 8.0, power.LEAST) < 0.2

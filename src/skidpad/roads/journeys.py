@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from math import hypot
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError
 from skidpad.roads.queries import LanePoint, RoadMap
 
+AnyFloats = NDArray[np.floating[Any]]
 STEP = 5.0  # m between the places of a journey
 WINDOW = 16  # places ahead of the last one among which a car is looked for
 NEAR = 15.0  # m from a place within which a car is on its way: beside it on a road of four lanes
@@ -56,12 +58,14 @@ class Journey:
         return self.length * self.reached / (len(self.places) - 1)
 
     @property
-    def ended(self) -> bool:
+    def is_done(self) -> bool:
         """Whether the car has come to the end."""
         return self.reached == len(self.places) - 1
 
 
-def progress_along(journey: Journey, x: Floats, y: Floats, z: Floats) -> Floats:
+def progress_along(
+    journey: Journey, x: AnyFloats, y: AnyFloats, z: AnyFloats
+) -> NDArray[np.float64]:
     """Returns (T,) m of the way that a car at these (T,) places had come by in each tick."""
     ways = zip(x.tolist(), y.tolist(), z.tolist(), strict=True)
     return np.array([journey.follow(*way) for way in ways])

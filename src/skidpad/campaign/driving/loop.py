@@ -136,20 +136,16 @@ class Timer:
 
 
 class Arrival:
-    """A script that moves nobody and ends when the ego has come to the end of its way."""
+    """A script without commands that ends when the ego has come to the end of its way."""
 
     def __init__(self, journey: Journey) -> None:
-        self.journey = journey
-
-    @property
-    def ended(self) -> bool:
-        """Returns True when the ego has arrived."""
-        return self.journey.ended
+        self.journey, self.ended = journey, False
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
         """Follows the ego and returns no commands."""
         s = truth.states
         self.journey.follow(float(s.x[0]), float(s.y[0]), float(s.z[0]))
+        self.ended = self.journey.is_done
         return ()
 
 

@@ -9,7 +9,7 @@ TEST_ARGS ?=
 DRIVE_ARGS ?=
 NIGHTLY_ARGS ?=
 
-.PHONY: cockpit run published results test test-all test-times quick-share test-bare check wheel-check versions-check bench oracle fuzz nightly soak refs data fleet fleet-load docs figures gallery arm64 channels campaigns tables docs-run clean
+.PHONY: cockpit run published results test test-all test-times quick-share quick-mutants test-bare check wheel-check versions-check bench oracle fuzz nightly soak refs data fleet fleet-load docs figures gallery arm64 channels campaigns tables docs-run clean
 
 # ten seeds of every distinct cell on objects, one of them once more on pixels
 run: $(VENV)/.installed
@@ -43,6 +43,11 @@ test-times: $(VENV)/.tested-with
 QUICK_SHARE_ARGS ?=
 quick-share: $(VENV)/.checked-with
 	$(BIN)/python tools/quick_share.py $(QUICK_SHARE_ARGS)
+
+# faults that `make test` notices of those that all tests notice; goes on where it stopped
+QUICK_MUTANTS_ARGS ?=
+quick-mutants: $(VENV)/.tested-with
+	$(BIN)/python tools/quick_mutants.py $(QUICK_MUTANTS_ARGS)
 
 # the tests that need a program of the system, with all such programs hidden: they skip, and say why
 BARE := tests/test_programs.py tests/fleet tests/report/test_in_browser.py tests/cockpit/test_cockpit_in_browser.py \

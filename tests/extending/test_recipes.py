@@ -64,6 +64,24 @@ def replayed_readings(folder: Path, out: str) -> str:
     return call(folder, "-c", replay)
 
 
+# what the cockpit says of the run that a recipe drives
+PARTS = {
+    "A driving function": ("out/assisted", "isa: Intelligent speed assistance [package isa]"),
+    "A weather preset": ("out/fog", "freezing-fog: Freezing fog [package freezing-fog]"),
+    "A backend": ("out/late", "Pedals and steering act 0.15 s late [package late-actuators]"),
+    "A map": ("out/circle", "[package circle"),
+}
+
+
+def check_cockpit(folder: Path, out: str, part: str) -> None:
+    """The cockpit lists the part of the package for a run, and opens the run without the package."""
+    listed = "from skidpad.cockpit.parts import list_parts; "
+    listed += "from skidpad.cockpit.replay import RecordedRun; from pathlib import Path; "
+    listed += f"print(list_parts(RecordedRun(next(Path('{out}/runs').iterdir())).spec))"
+    assert part in call(folder, "-c", listed, packages=folder / "packages")
+    assert "[package" not in call(folder, "-c", listed)
+
+
 def check_sensor(folder: Path) -> None:
     """The report, and the cockpit's replay without the package, show the sensor."""
     assert "Radar to the rear" in (folder / "out/behind/report.html").read_text("utf-8")
@@ -140,6 +158,8 @@ def test_a_recipe_works_as_printed_and_its_runs_open_without_it(title: str, tmp_
     assert commands
     if title in CHECKS:
         CHECKS[title](tmp_path)
+    if title in PARTS:
+        check_cockpit(tmp_path, *PARTS[title])
     for command in commands:
         if command.startswith(("skidpad show ", "skidpad safety-case ")):
             with_it = call(tmp_path, "-m", *command.split(), packages=packages)
@@ -149,7 +169,7 @@ def test_a_recipe_works_as_printed_and_its_runs_open_without_it(title: str, tmp_
 def test_every_registry_has_a_recipe() -> None:
     groups = {registry.group for registry in extension_points()}
     assert groups == set(re.findall(r'entry-points."([\w.]+)"', PAGE.read_text("utf-8")))
-    assert set(CHECKS) <= set(RECIPES)
+    assert set(CHECKS) | set(PARTS) <= set(RECIPES)
 
 
 def test_the_relay_of_the_recipe_takes_alerts(tmp_path: Path) -> None:

@@ -17,3 +17,4 @@ class About(NamedTuple):
     again: Mapping[str, str] = MappingProxyType(
         {}
     )  # changes with which a replay can be driven again
+    parts: tuple[tuple[str, str], ...] = ()  # what the run is made of: kind and name

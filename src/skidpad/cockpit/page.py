@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from functools import lru_cache
 from importlib import resources
@@ -194,6 +194,7 @@ def build(bridge: Bridge, about: About) -> Callable[[], None]:
                 if kind == "drive":
                     drive_controls(panel)
                     weather_controls(panel)
+                part_lines(about.parts)
                 ui.label("?: what every key does").classes("help")
         ui.timer(SYNC, panel.sync)
 
@@ -239,6 +240,15 @@ def extra_switch(panel: Panel, extra: Extra) -> None:
         EXTRAS[extra], on_change=lambda e: panel.apply_change(name, e.value, "extra", word)
     )
     panel.follow(name, switch.props("dense"), lambda _: _has(panel.bridge.told.get("extras"), word))
+
+
+def part_lines(parts: Sequence[tuple[str, str]]) -> None:
+    """Draws what the run is made of: stack, functions, road, weather, simulator."""
+    if not parts:
+        return
+    with ui.expansion("this run").props("dense"):
+        for kind, name in parts:
+            ui.label(f"{kind}  {name}").classes("help part")
 
 
 def drive_controls(panel: Panel) -> None:

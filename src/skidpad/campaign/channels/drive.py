@@ -1,6 +1,6 @@
 """One segment: channels with their arbiter as a driver, their recording as a sink (decision L-5).
 
-    each 0.1 s:  view   = frame.extra[channel]         measured by the backend; nothing else is seen
+    each 0.1 s:  view   = read_sensor(frame, channel)  measured by the backend; nothing else is seen
                  frame  = channel.update(view)
                  scores = safety_scores(frames)        from evidence
                  choice = arbiter.update(frames, scores)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import isfinite
 
 from skidpad.campaign.driving.loop import Moment, Sink
-from skidpad.core.sensor_types import SensorType, find_sensor_type
+from skidpad.core.sensor_types import SensorType, find_sensor_type, read_sensor
 from skidpad.core.setup import Setup
 from skidpad.envelope.govern import GovernedStack
 from skidpad.envelope.limits import Binding
@@ -48,7 +48,7 @@ class ReadingsRecorder(Sink):
         row: dict[str, float] = {"tick": moment.truth.tick}
         for id, kind in self._kinds.items():
             assert kind.numbers is not None
-            row |= _columns(id, kind.numbers(moment.frame.extra[id]))
+            row |= _columns(id, kind.numbers(read_sensor(moment.frame, id, kind.reading)))
         for name, numbers in {} if self._added is None else self._added.numbers().items():
             row |= _columns(name, numbers)
         if self._governed is not None and self._governed.allowed is not None:

@@ -128,6 +128,7 @@ def drive(
         tuned.require_surface_on(spec.course, spec.surface)
     from skidpad.cockpit.about import About
     from skidpad.cockpit.driving import about, drive_job
+    from skidpad.cockpit.parts import list_parts
     from skidpad.cockpit.producer import Producer
     from skidpad.cockpit.serving import serve
     from skidpad.recording.files import require_free
@@ -139,7 +140,8 @@ def drive(
     producer = Producer(drive_job, about(spec, folder, rate, paused, own_gc))
     course = spec.course
     most = course.vehicles + course.reserve if isinstance(course, Roads) else 0
-    shown = About("drive", vehicles=most, pauses=on_close is OnClose.PAUSE)
+    pauses = on_close is OnClose.PAUSE
+    shown = About("drive", vehicles=most, pauses=pauses, parts=list_parts(spec))
     typer.echo(serve(producer, shown, place_of(pages), typer.echo, not pages.no_browser))
 
 
@@ -225,7 +227,9 @@ def replay(
     from skidpad.cockpit.again import list_changes
     from skidpad.cockpit.film import stretch_of, write_film
     from skidpad.cockpit.opening import open_source
+    from skidpad.cockpit.parts import list_parts
     from skidpad.cockpit.producer import Producer
+    from skidpad.cockpit.replay import RecordedRun
     from skidpad.cockpit.replaying import replay_job
     from skidpad.cockpit.serving import serve
     from skidpad.cockpit.source import timeline
@@ -254,7 +258,8 @@ def replay(
         "bodywork": bodywork.value,
     }
     producer = Producer(replay_job, what)
-    shown = About("replay", timeline(source), again=list_changes(source))
+    parts = list_parts(source.spec) if isinstance(source, RecordedRun) else ()
+    shown = About("replay", timeline(source), again=list_changes(source), parts=parts)
     typer.echo(serve(producer, shown, place_of(pages), typer.echo, not pages.no_browser))
 
 

@@ -15,21 +15,18 @@ from skidpad.evidence.statistics import Rate, compare_pairs, event_rate
 from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.recording.campaign.folder import CampaignFolder
 from skidpad.recording.campaign.matrix import MatrixEntry
+from skidpad.recording.campaign.quantities import name_of
 from skidpad.report.matrix.data import Matrix, config_title, rate_by_seed, weather_title
 
 COUNTS = {
-    "crashes_vehicle": "crashes with vehicles",
-    "road_departures": "departures",
-    "fatal_collisions": "interventions",
-    "fatal_first": "first of chain",
+    column: name_of(column)
+    for column in ("crashes_vehicle", "road_departures", "fatal_collisions", "fatal_first")
 }
 COMPARED = {
-    "fatal_collisions": "interventions",
-    "crashes_vehicle": "crashes with vehicles",
-    "road_departures": "departures",
+    **{c: name_of(c) for c in ("fatal_collisions", "crashes_vehicle", "road_departures")},
     "mean_speed_kmh": "mean speed, km/h",
     "dropout_pct": "dropout, percentage points",
-    "mean_error_m": "mean error of distance, m",
+    "mean_error_m": "mean distance error, m",
 }
 
 

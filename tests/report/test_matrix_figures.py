@@ -85,7 +85,13 @@ def test_the_bars_over_all_weathers_and_the_variance_are_those_of_the_rows(page)
 def test_every_panel_of_configuration_3_has_its_own_quantity(page):
     html, rows = page
     svg = figure(html, "Configuration 3 in every weather")
-    labels = ("crashes", "dropout, %", "mean error, m", "variance, m²", "radar FPR, %")
+    labels = (
+        "crashes",
+        "dropout, %",
+        "mean distance error, m",
+        "variance of the distance error, m²",
+        "radar false positives, %",
+    )
     assert set(labels) <= {t for t, *_ in texts(svg)}
     columns = ("crashes", "dropout_pct", "mean_error_m", "headway_variance_m2", "radar_fpr_pct")
     expected = [v for column in columns for v in means(rows, column, "3")]

@@ -92,9 +92,9 @@ def test_runs_that_did_not_finish_are_said_and_left_out(tmp_path):
 def test_metrics_are_named_in_words_with_their_units(html):
     for name in (
         "mean speed, km/h",
-        "ttc below 1.5, s",
-        "fatal collisions",
-        "headway variance, m²",
+        "time with a TTC below 1.5 s, s",
+        "interventions",
+        "variance of the distance error, m²",
     ):
         assert f">{name}<" in html
 
@@ -122,8 +122,8 @@ def test_every_metric_has_its_mean_in_a_table_per_configuration_with_all_weather
         assert [title for title, _ in table.columns] == [
             "metric", *map(weather_title, matrix.weathers)
         ]  # fmt: skip
-        assert len(table.rows) == len(fields(Metrics))
-        for metric, row in zip(fields(Metrics), table.rows, strict=True):
+        once = [f for f in fields(Metrics) if f.name != "interventions"]  # also published otherwise
+        for metric, row in zip(once, table.rows, strict=True):
             for weather, cell in zip(matrix.weathers, row[1:], strict=True):
                 values = [
                     getattr(m, metric.name)
@@ -143,7 +143,7 @@ def test_crashes_departures_and_the_time_to_the_first_lead_the_page(tmp_path):
     matrix = load_matrix(tmp_path)
     hits = sum(m.crashes_vehicle for k, m in rows if k.config != "0")
     numbers = headline_numbers(matrix).items
-    assert [n.label for n in numbers[:2]] == ["crashes with vehicles", "departures from the road"]
+    assert [n.label for n in numbers[:2]] == ["crashes with vehicles", "departures"]
     assert numbers[0].value == str(hits), "the baseline stands in no total"
     assert numbers[0].note == f"{100 * hits / (4 * 6 * 7 * 7.0):.1f} per 100 km"
     assert (

@@ -22,6 +22,7 @@ from skidpad.evidence.statistics import (
     no_limits_text,
     pairs_needed,
 )
+from skidpad.recording.campaign.quantities import heading_of
 
 NOT_RUN = frozenset(  # leave every denominator (L-7)
     {Outcome.AGENT_ERROR.value, Outcome.CRASHED.value, Outcome.TIMEOUT.value}
@@ -126,7 +127,7 @@ class Paired:
     def label(self) -> str:
         """Returns what is positive if the claim is true, in words."""
         within = f" in {self.where.name}" if self.where and self.where.name else ""
-        sides = f"{self.column}{within}, {self.more.name} minus {self.less.name}"
+        sides = f"{heading_of(self.column)}{within}, {self.more.name} minus {self.less.name}"
         return {
             Claim.MORE: sides,
             Claim.HARDLY_MORE: f"{self.amount} minus the difference of {sides}",
@@ -190,7 +191,7 @@ class Outweighs:
         )
         if not len(first) or len(first) != len(second):
             return None
-        label = f"{self.column}, effect of {self.factor} minus effect of {self.other}"
+        label = f"{heading_of(self.column)}, effect of {self.factor} minus effect of {self.other}"
         return contrast_pairs(label, first - second.abs(), self.margin.value)
 
 

@@ -28,7 +28,7 @@ COMMANDS: dict[str, dict[str, str]] = {
         "replay": "replay out/mine/runs/3_rain-night-001",
         "shadow": "shadow out/mine/runs/3_rain-night-001 --driver reference",
         "watch": "watch out/mine",
-        "compare": "compare out/before out/after --fail-if 'fatal_collisions > 0.1'",
+        "compare": "compare out/before out/after --fail-if 'interventions > 0.1'",
         "export": "export out/mine/runs/3_rain-night-001",
     },
     "Channels and fleet": {

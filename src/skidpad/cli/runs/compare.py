@@ -31,7 +31,7 @@ class Undecided(str, Enum):
 
 
 SHOWN = (
-    "fatal_collisions",
+    "interventions",
     "crashes_vehicle",
     "road_departures",
     "lane_invasions",
@@ -70,7 +70,7 @@ def compare(
     missing or crashed and on columns without values. Of the folders of two runs, as a drive by hand
     leaves one, the metrics are shown side by side.
 
-    Example: skidpad compare before after --fail-if "fatal_collisions > 0"
+    Example: skidpad compare before after --fail-if "interventions > 0"
     """
     from skidpad.cli.options.folders import require_campaigns_or_runs
     from skidpad.core.errors import ConfigError
@@ -130,7 +130,7 @@ def _compare(a: Path, b: Path, rules: list[Rule], gate: Gate) -> dict[str, list[
     from skidpad.recording.fingerprint import comparison_text
 
     wanted = list(dict.fromkeys([*SHOWN, *(r.column for r in rules)]))
-    before, after = (read_results(folder, MATRIX) for folder in (a, b))
+    before, after = (_with_interventions(read_results(folder, MATRIX)) for folder in (a, b))
     changes, alone_a, alone_b = compare_campaigns(before, after, wanted)
     _print(changes)
     typer.echo(comparison_text(*(_places(t) for t in (before, after))))
@@ -145,6 +145,15 @@ def _compare(a: Path, b: Path, rules: list[Rule], gate: Gate) -> dict[str, list[
     for rule in rules:
         _say(rule, judged, gate.undecided)
     return failures
+
+
+def _with_interventions(results: pl.DataFrame) -> pl.DataFrame:
+    """Returns results with the column `interventions`, which older ones have under its published name."""
+    import polars as pl
+
+    return results.with_columns(
+        pl.coalesce("interventions", "fatal_collisions").alias("interventions")
+    )
 
 
 def _places(results: pl.DataFrame) -> set[str]:

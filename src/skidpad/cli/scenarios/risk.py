@@ -46,7 +46,7 @@ def risk(
 ) -> None:
     """Estimate the probability of a crash in one encounter, by two methods that must agree.
 
-    A crash is a contact above 5 km/h (with a person or a two-wheeler any) or a departure from the road.
+    A crash is a contact above 5 km/h (with a person or a two-wheeler any) or a departure.
     Where the methods disagree or are too uncertain, the answer is "not determined".
     """
     from skidpad.recording.campaign.risks import Risk

@@ -77,7 +77,7 @@ ACCEPTANCE: tuple[Finding, ...] = (
     Finding(
         "A-278",
         "The preliminary script has fewer radar false positives and more misses.",
-        "false positive and false negative rate, final against preliminary profile",
+        "radar false positives and radar false negatives, final against preliminary profile",
         "its own study: both profiles",
         (
             variants("radar_fpr_pct", "final", "preliminary", POINT),

@@ -1,4 +1,4 @@
-"""The findings that speak of collisions: once for all fatal ones, once for vehicle crashes alone.
+"""The findings that speak of collisions: once for all interventions, once for vehicle crashes alone.
 
 What the sources count holds barriers and wrong ways too (A-247); a reader who asks about traffic asks
 for crashes with vehicles. Each claim is judged on both, the second under its own id with a v behind.
@@ -37,7 +37,7 @@ class Crashes(NamedTuple):
 
 
 IN_BENDS = f"configurations 1 and 2 on a map with bends tighter than {BEND_RADIUS:g} m"
-FATAL = Crashes("fatal_collisions", "", "collisions", "fatal collisions")
+FATAL = Crashes("fatal_collisions", "", "collisions", "interventions")
 VEHICLE = Crashes("crashes_vehicle", "v", "crashes with vehicles", "crashes with vehicles")
 
 
@@ -123,7 +123,7 @@ def _rain(kind: Crashes) -> Finding:
 FASTER = Finding(
     "F-05",
     "Lane centring raises the speed.",
-    "mean, 95th percentile and bend speed, configuration 2 minus 1",
+    "mean speed, its 95th percentile and speed in bends, configuration 2 minus 1",
     IN_BENDS,
     tuple(configs(f"{which}_speed_kmh", "2", "1", SPEED) for which in ("mean", "p95", "bend")),
 )

@@ -64,7 +64,7 @@ OTHERS: tuple[Finding, ...] = (
     ),
     Finding(
         "F-12", "Night raises distance error and variance without more dropout.",
-        "mean error, variance and dropout, night minus day, configurations 1 to 4",
+        "mean distance error, its variance and dropout, night minus day, configurations 1 to 4",
         "night and day, both clear or both in rain",
         (
             at_night("mean_error_m", METRES),
@@ -76,7 +76,7 @@ OTHERS: tuple[Finding, ...] = (
     Finding(
         "F-16",
         "False positives are highest without assistance, and the wide pre-filter makes them.",
-        "false positive rate: configuration 0 minus 1 to 4; pre-filter minus lane check",
+        "radar false positives: configuration 0 minus 1 to 4; pre-filter minus lane check",
         "configuration 0 and one of 1 to 4",
         (
             Paired(

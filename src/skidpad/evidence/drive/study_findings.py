@@ -13,7 +13,7 @@ CHANGES = Amount(0.5, "changes per minute")
 JERK = Amount(0.1, "m/s3")
 SPINS = Amount(0.1, "spins per run")
 HITS = Amount(0.1, "hits per run")
-CHAINED = "fatal events per run that follow on a relocation"
+CHAINED = "interventions per run that follow on a relocation"
 
 
 def unequal_logs(table: pl.DataFrame) -> tuple[int, int]:
@@ -89,7 +89,7 @@ STUDY_FINDINGS: tuple[Finding, ...] = (
     ),
     Finding(
         "F-21", "Map-matched radar trades false positives for fewer misses and dropouts.",
-        "false positive, false negative and dropout rate, map-matched against corridor",
+        "radar false positives, radar false negatives and dropout, map-matched against corridor",
         "its own study: both radar filters, all else equal",
         (
             variants("radar_fpr_pct", "map_matched", "corridor", POINT),

@@ -38,7 +38,9 @@ class Metrics:
 
     # collisions
     fatal_collisions: int | None = metric("recoveries, wrong ways and departures", "A-247, R-6")
-    crashes_vehicle: int | None = metric("fatal collisions with vehicles", "A-190, R-6")
+    crashes_vehicle: int | None = metric(
+        "interventions after a contact with a vehicle", "A-190, R-6"
+    )
     road_departures: int | None = metric(
         "into a barrier, off the road, facing the wrong way, or rolled over", "R-6"
     )
@@ -47,21 +49,25 @@ class Metrics:
     off_road: int | None = metric("times that the car left the road and was put back", "R-6")
     wrong_way: int | None = metric("wrong-way corrections", "A-199")
     roll_overs: int | None = metric("times that the car lay on its side", "T-11")
-    fatal_first: int | None = metric("fatal ones that follow on no relocation (8 s, 100 m)", "R-6")
+    fatal_first: int | None = metric(
+        "interventions that follow on no relocation (8 s, 100 m)", "R-6"
+    )
     crashes_vehicle_first: int | None = metric("of these with vehicles", "R-6")
     road_departures_first: int | None = metric(
         "of these static, off the road, wrong way, rolled over", "R-6"
     )
-    first_fatal_s: float | None = metric("time to the first fatal one; none: beyond the run", "R-6")
+    first_fatal_s: float | None = metric(
+        "time to the first intervention; none: beyond the run", "R-6"
+    )
     contacts: int | None = metric("contacts, also those within the cool-down", "A-189")
     rear_ended: int | None = metric(
-        "of the vehicle collisions: struck from behind; until the morning of 2026-11-25 also at the side",
+        "of collisions_vehicle: struck from behind; until the morning of 2026-11-25 also at the side",
         "M-8",
     )
     bend_exits: int | None = metric(
         "static, off the road, rolled over: in a bend without a lead", "M-6"
     )
-    stuck_relocations: int | None = metric("relocations of a stuck ego, not fatal", "A-253")
+    stuck_relocations: int | None = metric("relocations of a stuck ego, no interventions", "A-253")
     max_impact_kmh: float | None = metric("largest closing speed at a collision", "A-249")
     max_impact_vehicle_kmh: float | None = metric("the same, with a vehicle", "F-05")
     # severity: contacts with road users by delta-v, the larger of the two (T-4)
@@ -74,7 +80,9 @@ class Metrics:
     contacts_repeated: int | None = metric("the same one touched again within 8 s", "T-4")
     contacts_static: int | None = metric("contacts with all that is no road user", "T-4")
     max_delta_v_kmh: float | None = metric("largest delta-v at a contact with a road user", "T-4")
-    interventions: int | None = metric("times put back; published as fatal collisions", "T-4")
+    interventions: int | None = metric(
+        "times put back after a crash; published as fatal collisions", "T-4"
+    )
     first_intervention_s: float | None = metric("time to the first, if no reset precedes", "T-5")
     undisturbed_s: float | None = metric("time to the first reset, else of the run", "T-5")
     # lanes
@@ -95,8 +103,8 @@ class Metrics:
     max_drac_true: float | None = metric("largest deceleration needed, m/s2", "M-8")
     min_gap_true_m: float | None = metric("least true gap to the lead while driving", "M-8")
     # perception
-    radar_fpr_pct: float | None = metric("radar false positive rate, lane-checked", "A-238")
-    radar_fnr_pct: float | None = metric("radar false negative rate, lane-checked", "A-238")
+    radar_fpr_pct: float | None = metric("radar false positives, lane-checked", "A-238")
+    radar_fnr_pct: float | None = metric("radar false negatives, lane-checked", "A-238")
     radar_fpr_pct_pre: float | None = metric("the same after the pre-filter", "A-239")
     radar_fnr_pct_pre: float | None = metric("the same after the pre-filter", "A-239")
     radar_fpr_pct_final: float | None = metric("the same of the final decision", "A-239")
@@ -120,10 +128,10 @@ class Metrics:
     bend_speed_kmh: float | None = metric("ego speed in bends, 95th percentile", "F-05")
     distance_km: float | None = metric("distance driven", "M-8")
     duration_s: float | None = metric("simulated time", "M-8")
-    fatal_per_100_km: float | None = metric("fatal collisions per 100 km", "M-8")
+    fatal_per_100_km: float | None = metric("interventions per 100 km", "M-8")
     crashes_vehicle_per_100_km: float | None = metric("crashes with vehicles per 100 km", "R-6")
     serious_contacts_per_100_km: float | None = metric("serious contacts per 100 km", "T-4")
-    road_departures_per_100_km: float | None = metric("departures from the road per 100 km", "R-6")
+    road_departures_per_100_km: float | None = metric("departures per 100 km", "R-6")
     off_lanes_pct: float | None = metric("ticks off all lanes, less counted departures", "R-6")
     # the background
     traffic_contacts: int | None = metric("contacts among background vehicles", "R-5")

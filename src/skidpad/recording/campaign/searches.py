@@ -111,7 +111,7 @@ class Trial(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         if not self.is_failure:
             return "no failure"
         if not self.other:
-            return "departure from the road"
+            return "departure"
         if self.side == FRONT:
             return f"front into {self.other}"
         return f"{self.other} into the {self.side}"

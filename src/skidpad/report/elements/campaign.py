@@ -15,6 +15,7 @@ from skidpad.core.wording import count_text
 from skidpad.evidence.contrasts import NOT_RUN
 from skidpad.recording.campaign.folder import CampaignFolder
 from skidpad.recording.campaign.ledger import E
+from skidpad.recording.campaign.quantities import ENDINGS, NAMES, unit_of
 from skidpad.recording.campaign.results import Columns, definitions_of
 from skidpad.report.elements.page import Block, Code, Definitions, Text, words
 
@@ -24,17 +25,6 @@ CLOCKS = {
     "cpu_s": ("processor time", " s"),
     "rtf": ("real-time factor", ""),
 }
-UNITS = {
-    "_m": "m",
-    "_m2": "m²",
-    "_s": "s",
-    "_kmh": "km/h",
-    "_km": "km",
-    "_pct": "%",
-    "_deg": "deg",
-    "_deg_s": "deg/s",
-}
-ENDINGS = sorted(UNITS, key=len, reverse=True)
 
 
 @dataclass(frozen=True)
@@ -47,15 +37,17 @@ class Metric:
 
     @property
     def title(self) -> str:
-        """Returns the metric's name in words, without the unit."""
+        """Returns the name of the metric's quantity, else its column's name in words, without the unit."""
+        if self.name in NAMES:
+            return NAMES[self.name]
         ending = next((end for end in ENDINGS if self.name.endswith(end)), "")
         return re.sub(r"(\d) (\d)", r"\1.\2", words(self.name.removesuffix(ending)))
 
     @property
     def heading(self) -> str:
         """Returns the metric's title with its unit, as "speed, km/h"."""
-        if self.unit and self.title.endswith(" per 100"):
-            return f"{self.title} {self.unit}"
+        if self.unit and self.title.endswith((" per 100", f" per 100 {self.unit}")):
+            return f"{self.title.removesuffix(self.unit).strip()} {self.unit}"
         return f"{self.title}, {self.unit}" if self.unit else self.title
 
 
@@ -65,11 +57,6 @@ def metrics_of(rows: type[Any]) -> list[Metric]:
         Metric(name, unit_of(name), f"{meaning} ({source})")
         for name, meaning, source in definitions_of(rows)
     ]
-
-
-def unit_of(name: str) -> str:
-    """Returns the unit that a column's suffix stands for, "" without one."""
-    return next((UNITS[end] for end in ENDINGS if name.endswith(end)), "")
 
 
 @dataclass(frozen=True)

@@ -353,10 +353,10 @@ def published_value(column: str, config: str, weather: str) -> float | None:
 
 
 PRELIMINARY = (
-    ("collisions", "prelim_total_collisions", "final_collisions"),
-    ("lane invasions", "prelim_lane_invasions", "final_lane_invasions"),
-    ("radar FPR, %", "prelim_fpr_pct", "final_fpr_pct"),
-    ("radar FNR, %", "prelim_fnr_pct", "final_fnr_pct"),
+    ("interventions", "prelim_total_collisions", "final_collisions"),
+    ("solid markings crossed", "prelim_lane_invasions", "final_lane_invasions"),
+    ("radar false positives, %", "prelim_fpr_pct", "final_fpr_pct"),
+    ("radar false negatives, %", "prelim_fnr_pct", "final_fnr_pct"),
     ("dropout, %", "prelim_dropout_pct", "final_dropout_pct"),
 )
 

@@ -26,13 +26,14 @@ from skidpad.report.matrix.data import (
     config_title,
     rate_by_seed,
 )
+from skidpad.report.matrix.tables import METRICS
 
 PANEL = (
     (EVENTS, EVENTS),
-    ("dropout_pct", "dropout, %"),
-    ("mean_error_m", "mean error, m"),
-    ("headway_variance_m2", "variance, m²"),
-    ("radar_fpr_pct", "radar FPR, %"),
+    *(
+        (name, METRICS[name].heading)
+        for name in ("dropout_pct", "mean_error_m", "headway_variance_m2", "radar_fpr_pct")
+    ),
 )
 GREY = 5  # of the palette
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from skidpad.core.wording import count_text
 from skidpad.evidence.statistics import ASSUMED, Interval, Rate, median_time
+from skidpad.recording.campaign.quantities import name_of
 from skidpad.report.elements.page import Block, Cell, Number, Numbers, Table, Text
 from skidpad.report.elements.tables import Column, Format, Quantity, table
 from skidpad.report.matrix.data import (
@@ -31,14 +32,18 @@ from skidpad.report.matrix.tables import (
 
 SERIOUS = (
     "serious_contacts",
-    "serious contacts",
+    name_of("serious_contacts"),
     "5 km/h of change of speed or more, or any with a person or two wheels",
 )
-STRUCK = ("crashes_vehicle", "crashes with vehicles", "the ego hit a vehicle or was hit by one")
-LEFT = ("road_departures", "departures", "into a barrier, off the road, or facing the wrong way")
+STRUCK = ("crashes_vehicle", name_of("crashes_vehicle"), "the ego hit a vehicle or was hit by one")
+LEFT = (
+    "road_departures",
+    name_of("road_departures"),
+    "into a barrier, off the road, or facing the wrong way",
+)
 PUT_BACK = (
     INTERVENTIONS,
-    "interventions",
+    name_of(INTERVENTIONS),
     "times put back, each with its first cause; published as collisions",
 )
 DISTANCE = Format(",.0f")
@@ -61,8 +66,8 @@ def headline_numbers(matrix: Matrix) -> Numbers:
     return Numbers(
         [
             Number(f"{hits:,}", contacts, per_100_km(hits)),
-            Number(f"{left:,}", "departures from the road", per_100_km(left)),
-            Number(f"{put_back:,}", "interventions", _meaning(put_back, first)),
+            Number(f"{left:,}", LEFT[1], per_100_km(left)),
+            Number(f"{put_back:,}", PUT_BACK[1], _meaning(put_back, first)),
             Number(
                 f"{len(t):,}",
                 "different drives",

@@ -12,6 +12,7 @@ from skidpad.evidence.drive.acceptance import ACCEPTANCE
 from skidpad.evidence.drive.findings import FINDINGS, astray
 from skidpad.evidence.statistics import DISPERSION_ASSUMED, event_rate
 from skidpad.evidence.verdicts import Judgement, judge
+from skidpad.recording.campaign.quantities import name_of
 from skidpad.report.crashes.cards import Found
 from skidpad.report.elements.figures import Chart, Curve, curves
 from skidpad.report.elements.page import Block, Figure, Page, Section, Text, write_report_page
@@ -34,8 +35,7 @@ from skidpad.report.matrix.ways import way_blocks
 
 Level = tuple[str, float]  # functions, cruise target in km/h
 COUNTS = (
-    ("crashes_vehicle", "crashes with vehicles per run"),
-    ("road_departures", "departures per run"),
+    *((column, f"{name_of(column)} per run") for column in ("crashes_vehicle", "road_departures")),
     (EVENTS, f"{EVENTS} per run"),
 )
 CLAIMS = (*FINDINGS, *ACCEPTANCE)
@@ -45,7 +45,7 @@ the car hits a barrier, has all wheels off every lane for 1 s, is more than 3 m 
 the wrong way. In an intervention the car is put back on its lane, also after a light contact; the published \
 study counts interventions as collisions."""
 UNGRADED = """These results are older than the grading of contacts. A crash is every intervention: what puts \
-the car back on its lane after a contact, a departure from the road, or because it faces the wrong way."""
+the car back on its lane after a contact, a departure, or because it faces the wrong way."""
 LEAD = f"""\
 Each row is a set of driving functions, each column a weather. Seeds are common to all cells, so \
 differences between cells are paired. Intervals are 95 %, over seeds, from 8 seeds on. Those of counts hold \
@@ -151,7 +151,7 @@ def _verdicts(matrix: Matrix, judged: Sequence[Judgement]) -> list[Block]:
         "“By construction” says that both sides must be the same drive, “same drives” that they were, "
         "since what differs never came into play. An id that ends in v is the same claim for crashes with "
         "vehicles alone. "
-        "The sources call an intervention a fatal collision, so claims and columns carry that name."
+        "The sources call an intervention a collision, and so do their claims."
     )
     own = ", ".join(f.id for f in CLAIMS if f.study)
     rest = Text(f"Claims that need runs of their own are judged by `skidpad study`: {own}.")

@@ -21,6 +21,7 @@ from skidpad.evidence.statistics import (
     rate_remark,
 )
 from skidpad.recording.campaign.matrix import Metrics
+from skidpad.recording.campaign.quantities import name_of
 from skidpad.report.elements.campaign import Metric, metrics_of
 from skidpad.report.elements.page import Block, Cell, Table
 from skidpad.report.elements.tables import Column, Format, Quantity, table
@@ -34,25 +35,16 @@ from skidpad.report.matrix.data import (
 )
 
 METRICS = {m.name: m for m in metrics_of(Metrics)}
-NAMES = {  # one name for one quantity, in all tables
-    INTERVENTIONS: "interventions",
-    "road_departures": "departures",
-    "lane_invasions": "solid markings crossed",
-    "ttc_below_1_5_s": "time with a TTC below 1.5 s",
-    "mean_error_m": "mean distance error",
-    "headway_variance_m2": "variance of the distance error",
-    "radar_fpr_pct": "radar false positives",
-    "radar_fnr_pct": "radar false negatives",
-}
+SAME_AS_INTERVENTIONS = "interventions"  # the column of newer results; older ones lack it
 RATE = Format(".2f", absent="no run")
 MEANS = (
-    ("dropout_pct", "Dropout: ticks without a target or persisting, %"),
-    ("headway_variance_m2", "Variance of the distance error, m²"),
-    ("mean_error_m", "Mean distance error, m"),
-    ("radar_fpr_pct", "Radar false positive rate after the lane check, %"),
-    ("radar_fnr_pct", "Radar false negative rate after the lane check, %"),
-    ("mean_speed_kmh", "Mean speed, km/h"),
-)  # fmt: skip
+    ("dropout_pct", "ticks without a target or persisting"),
+    ("headway_variance_m2", ""),
+    ("mean_error_m", ""),
+    ("radar_fpr_pct", "after the lane check"),
+    ("radar_fnr_pct", "after the lane check"),
+    ("mean_speed_kmh", ""),
+)
 KINDS = (
     ("collisions_vehicle", "vehicles", "recoveries after hitting or being hit by a vehicle"),
     (
@@ -112,35 +104,29 @@ BACKGROUND_NOTE = (
 def collisions(matrix: Matrix) -> list[Block]:
     """Returns tables of crashes, interventions, and what they were."""
     return [
-        count_table(matrix, EVENTS, crash_caption(matrix)),
-        *(
-            [count_table(matrix, "serious_contacts", "Serious contacts per run")]
-            if matrix.has_grades
-            else []
-        ),
-        count_table(matrix, "road_departures", "Departures from the road per run"),
-        count_table(matrix, INTERVENTIONS, "Interventions per run (published as collisions)"),
-        count_table(
-            matrix, "fatal_first", "Interventions per run, without those soon after another one"
-        ),
+        count_table(matrix, EVENTS, crash_meaning(matrix)),
+        *([count_table(matrix, "serious_contacts")] if matrix.has_grades else []),
+        count_table(matrix, "road_departures"),
+        count_table(matrix, INTERVENTIONS, " (published as collisions)"),
+        count_table(matrix, "fatal_first", ": without those soon after another one"),
         kinds_table(matrix),
         grades_table(matrix),
         background_table(matrix),
     ]
 
 
-def crash_caption(matrix: Matrix) -> str:
-    """Returns the caption that says what a crash is in these results."""
+def crash_meaning(matrix: Matrix) -> str:
+    """Returns what a crash is in these results, to stand behind its name."""
     if matrix.has_grades:
-        return "Crashes per run: serious contacts and departures"
-    return "Crashes per run: interventions, as these results grade no contact"
+        return ": serious contacts and departures"
+    return ": interventions, as these results grade no contact"
 
 
 def others(matrix: Matrix) -> list[Block]:
     """Returns tables of lane invasions, dropouts and radar errors."""
     return [
-        count_table(matrix, "lane_invasions", "Solid markings crossed per run"),
-        *(mean_table(matrix, column, caption) for column, caption in MEANS),
+        count_table(matrix, "lane_invasions"),
+        *(mean_table(matrix, column, meaning) for column, meaning in MEANS),
     ]
 
 
@@ -167,8 +153,11 @@ def by_weather(
     return table(columns, matrix.configs, caption, note)
 
 
-def count_table(matrix: Matrix, column: str, caption: str) -> Table:
-    """Returns the table of events of `column` per run with intervals, shaded by the rate."""
+def count_table(matrix: Matrix, column: str, meaning: str = "") -> Table:
+    """Returns the table of events of `column` per run with intervals, shaded by the rate.
+
+    meaning: stands behind the quantity's name in the caption.
+    """
     rates = {
         (c, g): rate_by_seed(matrix.within(c, g), column)
         for c in matrix.configs
@@ -187,6 +176,7 @@ def count_table(matrix: Matrix, column: str, caption: str) -> Table:
     note = (
         f"Per run of {matrix.duration:g} s; small: 95 % interval {ASSUMED}.{few_seeds_note(matrix)}"
     )
+    caption = f"{name_of(column).capitalize()} per run{meaning}"
     return by_weather(matrix, of, RATE, caption, note)
 
 
@@ -221,15 +211,16 @@ def rate_hint(rate: Rate) -> str:
     return f"{events}, {seeds}"
 
 
-def mean_table(matrix: Matrix, column: str, caption: str) -> Table:
-    """Returns the table of means of `column` over seeds with intervals."""
+def mean_table(matrix: Matrix, column: str, meaning: str = "") -> Table:
+    """Returns the table of means of `column` over seeds with intervals; what it means stands in its note."""
 
     def of(group: WeatherGroup | None, config: str) -> Quantity:
         runs = matrix.cell(config) if group is None else matrix.within(config, group)
         return mean_quantity(runs, column)
 
-    note = f"Mean over seeds; small: 95 % interval over seeds.{few_seeds_note(matrix)}"
-    return by_weather(matrix, of, Format(), caption, note)
+    said = f"{meaning.capitalize()}. " if meaning else ""
+    note = f"{said}Mean over seeds; small: 95 % interval over seeds.{few_seeds_note(matrix)}"
+    return by_weather(matrix, of, Format(), METRICS[column].heading.capitalize(), note)
 
 
 def metric_quantity(runs: pl.DataFrame, column: str) -> Quantity:
@@ -359,5 +350,6 @@ def _metrics_table(matrix: Matrix, config: str) -> Table:
         ),
     ]
     note = "Means over seeds; small: 95 % interval, none where all seeds are alike."
-    found = table(columns, matrix.metrics, config_title(config), note, sortable=False)
+    metrics = [m for m in matrix.metrics if m.name != SAME_AS_INTERVENTIONS]
+    found = table(columns, metrics, config_title(config), note, sortable=False)
     return replace(found, folded=True)

@@ -23,13 +23,17 @@ from skidpad.report.matrix.data import (
     config_list,
     config_title,
 )
+from skidpad.report.matrix.tables import METRICS
 
-COMPARED = (
-    ("mean_speed_kmh", "mean speed", "km/h"),
-    ("dropout_pct", "dropout", "%"),
-    ("mean_error_m", "mean distance error", "m"),
-    ("radar_fpr_pct", "radar false positives", "%"),
-    ("radar_fnr_pct", "radar false negatives", "%"),
+COMPARED = tuple(
+    METRICS[column]
+    for column in (
+        "mean_speed_kmh",
+        "dropout_pct",
+        "mean_error_m",
+        "radar_fpr_pct",
+        "radar_fnr_pct",
+    )
 )
 
 
@@ -162,10 +166,11 @@ def _table(parity: Parity) -> Block:
         )
 
     def of(column: str) -> Column[Twin]:
-        title, unit = next(((t, u) for c, t, u in COMPARED if c == column), (column, ""))
+        metric = METRICS.get(column)
+        title, unit = (metric.title, metric.unit) if metric else (column, "")
         return Column(title, lambda twin: _both(column, twin), unit=unit, format=Format(".2f"))
 
-    columns = [Column("run", name), of(EVENTS), *(of(column) for column, _, _ in COMPARED)]
+    columns = [Column("run", name), of(EVENTS), *(of(metric.name) for metric in COMPARED)]
     note = "Large: on pixels; small: on objects, same seed. What moved alike is one row."
     return table(columns, parity.twins, "The same runs on pixels and on objects", note)
 
@@ -173,7 +178,7 @@ def _table(parity: Parity) -> Block:
 def _figure(parity: Parity) -> Figure:
     """Returns the figure of the first three compared quantities, on pixels over on objects."""
     charts = []
-    for column, title, unit in COMPARED[:3]:
+    for column, title, unit in ((m.name, m.title, m.unit) for m in COMPARED[:3]):
         pairs = [
             (str(t.pixels["config"]), x, y)
             for t in parity.twins

@@ -20,12 +20,12 @@ from skidpad.report.matrix.data import (
 )
 
 QUANTITIES = (
-    (INTERVENTIONS, "Collisions per run", "published: total collisions; ours: interventions"),
+    (INTERVENTIONS, "Interventions per run", "published as total collisions"),
     ("dropout_pct", "Dropout, %", "ticks without a target or persisting"),
     ("mean_error_m", "Mean distance error, m", ""),
     ("headway_variance_m2", "Variance of the distance error, m²", "published as headway variance"),
-    ("radar_fpr_pct", "Radar false positive rate, %", "after the lane check"),
-    ("radar_fnr_pct", "Radar false negative rate, %", "after the lane check"),
+    ("radar_fpr_pct", "Radar false positives, %", "after the lane check"),
+    ("radar_fnr_pct", "Radar false negatives, %", "after the lane check"),
     ("mean_speed_kmh", "Mean speed, km/h", ""),
 )
 PUBLISHED = {  # column of results: what the published experiment had, in words
@@ -106,7 +106,7 @@ def _figures(matrix: Matrix, configs: Sequence[str]) -> list[Block]:
     groups = [w.replace("-", "\n", 1) for w in weathers]
     figures: list[Block] = []
     for column, label, caption in (
-        (INTERVENTIONS, "collisions per run", "Interventions (bars) and published collisions (diamonds)."),
+        (INTERVENTIONS, "interventions per run", "Interventions (bars) and published collisions (diamonds)."),
         ("dropout_pct", "dropout, %", "Dropout (bars) and the published dropout (diamonds)."),
     ):  # fmt: skip
         series = [

@@ -14,7 +14,7 @@ from skidpad.report.elements.page import Block, Cell, Figure
 from skidpad.report.elements.tables import Column, Format, Quantity, table
 from skidpad.report.matrix.comparisons.contrasts import BY_RUN
 from skidpad.report.matrix.data import EVENTS, INTERVENTIONS, Matrix, config_title
-from skidpad.report.matrix.tables import METRICS, NAMES, metric_quantity
+from skidpad.report.matrix.tables import METRICS, metric_quantity
 
 SIDES = (("1", "2"), ("2", "4"))  # as the source sets them side by side
 ROWS = (
@@ -61,8 +61,7 @@ def _table(matrix: Matrix, first: str, second: str) -> Block:
 
 def _name(metric: Metric) -> Cell:
     """Returns a cell with the metric's title and unit, its meaning as note."""
-    title = NAMES.get(metric.name, metric.title)
-    return Cell(f"{title}, {metric.unit}" if metric.unit else title, note=metric.meaning)
+    return Cell(metric.heading, note=metric.meaning)
 
 
 def _mean(matrix: Matrix, config: str, metric: Metric) -> Quantity:

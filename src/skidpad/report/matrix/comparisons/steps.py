@@ -14,7 +14,7 @@ from skidpad.report.elements.page import Block, Cell, Text
 from skidpad.report.elements.tables import Column, Format, Quantity, table
 from skidpad.report.matrix.comparisons.contrasts import ALPHA, BY_RUN
 from skidpad.report.matrix.data import INTERVENTIONS, Matrix, config_title
-from skidpad.report.matrix.tables import METRICS, NAMES
+from skidpad.report.matrix.tables import METRICS
 
 STEPS = (("1", "2"), ("2", "3"), ("3", "4"), ("2", "4"))
 WORSE_UP = (INTERVENTIONS, "lane_invasions", "dropout_pct", "ttc_below_1_5_s", "mean_error_m")
@@ -48,7 +48,7 @@ def step_blocks(matrix: Matrix) -> list[Block]:
         ),
         *(
             Column[tuple[str, str]](
-                NAMES.get(name, metric.title),
+                metric.title,
                 partial(_found_step, found, name),
                 metric.meaning,
                 metric.unit,

@@ -92,3 +92,17 @@ def test_links_of_the_readme_lead_somewhere():
     assert len(targets) > 5
     for target in targets:
         assert (ROOT / target).exists(), target
+
+
+def test_numbers_of_what_it_found_stand_on_the_page_beside_them():
+    table = README.split("## What it found so far")[1].split("\n## ")[0]
+    rows = re.findall(r"^\| [^|]+\? \| ([^|]+) \| \[[^\]]+\]\(([^)#]+)", table, re.MULTILINE)
+    assert len(rows) > 4
+    for answer, page in rows:
+        text = (ROOT / page).read_text(encoding="utf-8")
+        numbers = re.findall(r"\d+(?:\.\d+)?", answer)
+        assert numbers, answer
+        lost = [
+            n for n in numbers if not re.search(rf"(?<![\d.]){re.escape(n)}(?![\d]|\.\d)", text)
+        ]
+        assert lost == [], page

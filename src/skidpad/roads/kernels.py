@@ -119,9 +119,20 @@ def project_kernel(
     Nearest in space with heights counted double (decision M-12). driving: only driving lanes and
     ramps.
     """
+    return project_within(a, x, y, z, driving, REACH * REACH)
+
+
+@inner_kernel
+def project_within(
+    a: LaneArrays, x: float, y: float, z: float, driving: bool, best: float
+) -> tuple[int, float, float]:
+    """Returns the nearest lane as `project_kernel` does, faster where it is known to be near.
+
+    best: m^2, more than the squared distance of the nearest lane by 2 SAME, or REACH^2.
+    """
     if not (abs(x) < inf and abs(y) < inf and abs(z) < inf):
         return -1, nan, nan
-    best, lane, s, offset = REACH * REACH, -1, nan, nan
+    lane, s, offset = -1, nan, nan
     size = a.cell_size
     rows, columns = a.cell_start.shape[0] - 1, a.cell_start.shape[1]
     u, v = (x - a.cell_origin[0]) / size, (y - a.cell_origin[1]) / size
@@ -138,9 +149,13 @@ def project_kernel(
             break
         for r in range(max(row - ring, 0), min(row + ring, rows - 1) + 1):
             whole = r == row - ring or r == row + ring
+            up = max(r - v, v - (r + 1), 0.0) * size
             step = 1 if whole or ring == 0 else 2 * ring
             for c in range(column - ring, column + ring + 1, step):
                 if not 0 <= c < columns:
+                    continue
+                aside = max(c - u, u - (c + 1), 0.0) * size
+                if aside * aside + up * up - HALF_STEP_SQ > best:
                     continue
                 begin = a.cell_start[r, c]
                 end = a.cell_start[r, c + 1] if c + 1 < columns else a.cell_start[r + 1, 0]

@@ -20,6 +20,7 @@ from skidpad.roads.bundled import FOLDER, bake_file, load_map
 from skidpad.roads.roadside import Bridge
 from skidpad.roads.surface_outlines import outline_patches
 from skidpad.simulation.world.patches import Patches
+from skidpad.simulation.world.placed import places_for
 
 ROAD = load_map("straight")
 X, Y, Z = (float(v[500]) for v in (ROAD.samples.x, ROAD.samples.y, ROAD.samples.z))
@@ -118,7 +119,7 @@ def test_a_road_that_has_dried_in_its_wheel_paths_is_wet_beside_them():
         states.z[0], states.yaw[0], states.vx[0] = Z, heading, 20.0
         states.present[0] = True
         share, stiffness, film = (np.zeros((1, 4)) for _ in range(3))
-        found.fill(states, share, stiffness, film)
+        found.fill(states, places_for(np.ones(1), np.ones(1)), share, stiffness, film)
         wet[left] = (share[0] < 1.0).tolist()
     assert wet == {0.0: [False] * 4, 0.4: [True] * 4}
 
@@ -276,6 +277,36 @@ def test_colder_weather_lays_the_ice_and_warmer_weather_takes_it(tmp_path):
     for air_c, icy in ((5.0, False), (-1.0, True), (5.0, False)):
         found.lay(replace(found.road, weather=replace(found.road.weather, air_temperature_c=air_c)))
         assert (friction_along(map, found)[1] < 0.5) is icy
+
+
+def test_a_known_place_makes_the_search_short_and_changes_nothing():
+    """Wheels of cars on, beside and far from the place that is told, on a road that crosses itself."""
+    town = load_map("figure8")
+    rng, chosen = np.random.default_rng(5), slice(0, None, 40)
+    laid = [
+        SurfacePatch(water_mm=4.0, road=int(road), side="wheel_paths")
+        for road in sorted(set(town.lanes.road.tolist()))
+    ]
+    found = Patches(town, laid, Road(find_weather("rain-noon"), GripModel.PHYSICAL))
+    samples = town.samples
+    n = len(samples.x[chosen])
+    found.set_vehicles([vehicle_type("mini_cooper_s")] * n)
+    states = ActorStates.empty(n)
+    states.x[:] = samples.x[chosen] + rng.normal(0.0, 2.0, n)
+    states.y[:] = samples.y[chosen] + rng.normal(0.0, 2.0, n)
+    states.z[:], states.yaw[:] = samples.z[chosen], rng.uniform(-np.pi, np.pi, n)
+    states.vx[:], states.present[:] = 20.0, True
+    unknown, near = (places_for(np.ones(n), np.ones(n)) for _ in range(2))
+    near["lane"], near["sample"] = samples.lane[chosen], np.arange(len(samples.x))[chosen]
+    far = near.copy()
+    far["lane"], far["sample"] = np.roll(near["lane"], 3), np.roll(near["sample"], 3)
+    filled = []
+    for placed in (unknown, near, far):
+        shares = tuple(np.zeros((n, 4)) for _ in range(3))
+        found.fill(states, placed, *shares)
+        filled.append(np.stack(shares).tobytes())
+    assert filled[0] == filled[1] == filled[2]
+    assert 0.1 < (np.frombuffer(filled[0]).reshape(3, n, 4)[0] < 1.0).mean() < 0.9
 
 
 def test_a_baked_file_keeps_the_bridges_and_they_change_no_hash(tmp_path):

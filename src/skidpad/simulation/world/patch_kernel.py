@@ -10,10 +10,25 @@ from skidpad.core.jit import Held, inner_kernel, kernel
 from skidpad.core.states import ActorStates
 from skidpad.core.surface import PATH_OFFSET, PATH_WIDTH
 from skidpad.physics.grip import grip_of_row, mu_at, stiffness_at
-from skidpad.roads.kernels import LaneArrays, project_kernel, s_road_kernel, sample_kernel
+from skidpad.roads.kernels import (
+    REACH,
+    S_ROAD,
+    SAME,
+    WIDTH,
+    Z_WEIGHT,
+    LaneArrays,
+    X,
+    Y,
+    Z,
+    closest_on_segment,
+    project_within,
+    segment_kernel,
+)
+from skidpad.simulation.world.placed import Places
 
 NO_PATCH = -1.0  # stiffness and film where no patch says them
 ANY = 2**40  # a lane id that means all lanes, a road id that means none
+NEAR_SAMPLES = 12  # m, more than from a vehicle's origin to its wheels
 BOTH, LEFT, RIGHT, PATHS, BESIDE = range(5)  # halves of a lane, its wheel paths, and the rest of it
 
 
@@ -31,6 +46,7 @@ class PatchArrays(NamedTuple):
     covered: Floats  # (T, P, fields of GripParams)
     material_start: Ints  # (L + 1,)
     material: Floats  # (K, 3) from and to along the road, and the share
+    near: Ints  # (P,) room for the patches near a vehicle
 
 
 class WheelPlaces(NamedTuple):
@@ -43,39 +59,44 @@ class WheelPlaces(NamedTuple):
 @kernel
 def fill_patches(
     map: Held[LaneArrays], patches: Held[PatchArrays], wheels: WheelPlaces, states: ActorStates,
-    share: Floats, stiffness: Floats, film: Floats,
+    placed: Places, share: Floats, stiffness: Floats, film: Floats,
 ) -> None:  # fmt: skip
     """Set what patches do to all wheels, (w, 4) at FL, FR, RL, RR; 1 and NO_PATCH where none is.
 
     The slippery one of the patches at a wheel counts; the lane's material multiplies its share. One
     body: inner kernels that are handed so many arrays for every wheel and patch would cost most.
+    placed: of the vehicles, where they stood last: it makes the search short and changes nothing else.
     """
     a, p = map.value, patches.value
     everywhere = len(p.material) > 0
     for i in range(len(wheels.kind)):
         for k in range(4):
             share[i, k], stiffness[i, k], film[i, k] = 1.0, NO_PATCH, NO_PATCH
-        near = everywhere
+        if not states.present[i]:
+            continue
+        count = 0
         for n in range(len(p.ratio)):
-            near = near or _is_in(p.bounds[n], states.x[i], states.y[i])
-        if not (near and states.present[i]):
+            if _is_in(p.bounds[n], states.x[i], states.y[i]):
+                p.near[count] = n
+                count += 1
+        if count == 0 and not everywhere:
             continue
         c, s = cos(states.yaw[i]), sin(states.yaw[i])
         v = sqrt(states.vx[i] * states.vx[i] + states.vy[i] * states.vy[i])
         kind, z = wheels.kind[i], states.z[i]
+        bare = mu_at(grip_of_row(p.outside, kind), v)
         for k in range(4):
             forward, left = wheels.place[i, k, 0], wheels.place[i, k, 1]
             x = states.x[i] + forward * c - left * s
             y = states.y[i] + forward * s + left * c
-            lane, offset, s_road, placed, found = -1, 0.0, 0.0, False, False
-            for n in range(len(p.ratio)):
-                if not _is_in(p.bounds[n], x, y):
-                    continue
+            lane, offset, s_road, searched, found = -1, 0.0, 0.0, False, False
+            for m in range(count):
+                n = p.near[m]
                 road = p.stretch[n, 0]
                 if road != ANY:
-                    if not placed:
-                        lane, offset, s_road = _place(a, x, y, z)
-                        placed = True
+                    if not searched:
+                        lane, offset, s_road = _place(a, placed[i].lane, placed[i].sample, x, y, z)
+                        searched = True
                     covers = lane >= 0 and _is_on_stretch(
                         road, p.stretch[n, 1], p.stretch[n, 2], p.s[n, 0], p.s[n, 1],
                         a.road[lane], a.lane_id[lane], offset, s_road,
@@ -90,14 +111,14 @@ def fill_patches(
                 own, own_stiffness, own_film = p.ratio[n], NO_PATCH, NO_PATCH
                 if isnan(own):
                     covered = grip_of_row(p.covered[kind], n)
-                    own = mu_at(covered, v) / mu_at(grip_of_row(p.outside, kind), v)
+                    own = mu_at(covered, v) / bare
                     own_stiffness, own_film = stiffness_at(covered, v), covered.film
                 if not found or own < share[i, k]:
                     share[i, k], stiffness[i, k], film[i, k] = own, own_stiffness, own_film
                     found = True
             if everywhere:
-                if not placed:
-                    lane, offset, s_road = _place(a, x, y, z)
+                if not searched:
+                    lane, offset, s_road = _place(a, placed[i].lane, placed[i].sample, x, y, z)
                 if lane >= 0:
                     for n in range(p.material_start[lane], p.material_start[lane + 1]):
                         if p.material[n, 0] <= s_road < p.material[n, 1]:
@@ -127,15 +148,50 @@ def _is_on_stretch(
 
 
 @inner_kernel
-def _place(a: LaneArrays, x: float, y: float, z: float) -> tuple[int, float, float]:
-    """Lane, offset to the left in m and s along the road of a point; lane -1: it is on none."""
-    lane, s, offset = project_kernel(a, x, y, z, True)
+def _place(
+    a: LaneArrays, near: int, sample: int, x: float, y: float, z: float
+) -> tuple[int, float, float]:
+    """Lane, offset to the left in m and s along the road of a point; lane -1: it is on none.
+
+    near, sample: lane of the vehicle, and its sample there, when it was placed last.
+    """
+    lane, s, offset = project_within(a, x, y, z, True, _near_bound(a, near, sample, x, y, z))
     if lane < 0:
         return -1, 0.0, 0.0
-    width = sample_kernel(a, lane, s)[5]
-    if abs(offset) > 0.5 * width:
+    i, u = segment_kernel(a, lane, s)
+    p, q = a.sample[i], a.sample[i + 1]
+    if abs(offset) > 0.5 * ((1.0 - u) * p[WIDTH] + u * q[WIDTH]):
         return -1, 0.0, 0.0
-    return lane, offset, s_road_kernel(a, lane, s)
+    return lane, offset, float((1.0 - u) * p[S_ROAD] + u * q[S_ROAD])
+
+
+@inner_kernel
+def _near_bound(a: LaneArrays, lane: int, sample: int, x: float, y: float, z: float) -> float:
+    """More than the squared distance in m^2, as lanes are compared, from a point to this driving lane.
+
+    sample: of the lane, some m from the point. REACH^2 where the lane is none, or ends before the point.
+    """
+    if lane < 0 or a.drivable[lane] == 0:
+        return REACH * REACH
+    first, last = a.first[lane], a.first[lane] + a.size[lane] - 2
+    i = min(max(sample, first), last)
+    for _ in range(2 * NEAR_SAMPLES):
+        p, q = a.sample[i], a.sample[i + 1]
+        cx, cy = q[X] - p[X], q[Y] - p[Y]
+        along = (x - p[X]) * cx + (y - p[Y]) * cy
+        if along < 0.0:
+            i -= 1
+        elif along > cx * cx + cy * cy:
+            i += 1
+        else:
+            share, _, d_sq, missed = closest_on_segment(a, i, x, y)
+            if missed != 0.0:
+                return REACH * REACH
+            rise = Z_WEIGHT * (z - (p[Z] + share * (q[Z] - p[Z])))
+            return min(d_sq + rise * rise + 4.0 * SAME, REACH * REACH)
+        if i < first or i > last:
+            return REACH * REACH
+    return REACH * REACH
 
 
 @inner_kernel

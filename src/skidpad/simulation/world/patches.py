@@ -32,6 +32,7 @@ from skidpad.simulation.world.patch_kernel import (
     WheelPlaces,
     fill_patches,
 )
+from skidpad.simulation.world.placed import Places, places_for
 from skidpad.simulation.world.sheet_flow import SheetFlow
 
 __all__ = ["NO_PATCH", "FrictionZone", "LaneFrictions", "Patches", "in_zone"]
@@ -108,12 +109,17 @@ class Patches:
         )
         self._held = hold(_arrays(self.map, self._here, self.lanes, self.road, self.kinds))
 
-    def fill(self, states: ActorStates, share: Floats, stiffness: Floats, film: Floats) -> None:
+    def fill(
+        self, states: ActorStates, placed: Places, share: Floats, stiffness: Floats, film: Floats
+    ) -> None:
         """Set what patches do to the wheels, (w, 4) at FL, FR, RL, RR.
 
-        share: of the friction without patches. stiffness: over the dry one. film: of water, m.
+        placed: where the vehicles stood last. share: of the friction without patches. stiffness: over
+        the dry one. film: of water, m.
         """
-        fill_patches(self.map.held, self._held, self._wheels, states, share, stiffness, film)
+        fill_patches(
+            self.map.held, self._held, self._wheels, states, placed, share, stiffness, film
+        )
 
     def ratio_at(self, x: float, y: float, z: float, v: float = 0.0) -> float:
         """Return the friction at a point of the road at a speed in m/s over that without patches.
@@ -125,7 +131,8 @@ class Patches:
         states.present[0] = True
         one = WheelPlaces(at, np.array([self.kinds.index(self.road.tyres)], np.int64))
         share, stiffness, film = (np.zeros((1, 4)) for _ in range(3))
-        fill_patches(self.map.held, self._held, one, states, share, stiffness, film)
+        placed = places_for(np.zeros(1), np.zeros(1))
+        fill_patches(self.map.held, self._held, one, states, placed, share, stiffness, film)
         return float(share[0, 0])
 
 
@@ -153,6 +160,7 @@ def _arrays(
         ).reshape(len(kinds), len(patches), len(GripParams._fields)),
         material_start=_starts(materials),
         material=np.array([m for of in materials for m in of], dtype=np.float64).reshape(-1, 3),
+        near=np.zeros(len(patches), np.int64),
     )
 
 

@@ -412,7 +412,7 @@ class World:
         """Writes what patches under the wheels do, and the tyres' friction in zones."""
         if self.patches is not None:
             w = self.on_wheels
-            self.patches.fill(self.states, w.patched, w.patch_stiffness, w.patch_film)
+            self.patches.fill(self.states, self.placed, w.patched, w.patch_stiffness, w.patch_film)
         if self.zones or self._zoned:
             self.fleet.tire_friction[:] = self.tyres
             for zone in self.zones:

@@ -96,12 +96,15 @@ def spray_of(
     A cloud: x, y, z of the middle of the rear at the road, yaw, length, half width, height in m,
     extinction in 1/m at its begin. azimuth (m,): of the columns of n / m beams each, roughly.
     distance (n,): m to the surface that ends each beam, where it has `met` one, else to the lidar's range.
-    Left out is what changes no return: answers below `least`, and the depth of beams that meet nothing
-    behind a cloud that is too far to answer.
+    Left out is what changes no return: answers below `least`, and the depth of beams that meet nothing, or
+    whose surface is lost already, where a cloud is too far to answer.
     """
     n = distance.size
     channels = n // azimuth.size
     depth, power, where = np.zeros(n), np.zeros(n), np.zeros(n)
+    lost = np.empty(n)  # depth at which not even a white surface is noticed
+    for i in range(n):
+        lost[i] = -0.5 * log(least * distance[i] * distance[i]) + 1e-6
     start = scrambled((key ^ SALT) + np.uint64(tick) * GOLDEN)
     for c in range(len(clouds)):
         x, y, z, yaw, length, half, high, first = clouds[c]
@@ -129,23 +132,29 @@ def spray_of(
                 low, far = _cut(left, aside, -half, half, low, far)
                 if far <= low:
                     continue
+                is_lost = not met[i] or depth[i] > lost[i]
+                if is_lost and low >= ANSWER_REACH:
+                    continue
                 bits = scrambled(start + np.uint64(i * 64 + c) * np.uint64(16) * GOLDEN)
                 step, jitter = (far - low) / STEPS, unit(bits)
-                tau, over = 0.0, min(ANSWERS, far - low)
+                tau, over, strongest = 0.0, min(ANSWERS, far - low), power[i]
                 mean = first * exp(-THIN * (back + gone * (low + jitter * step)) / length)
                 thins = exp(-THIN * gone * step / length)
-                strongest = power[i]
                 for s in range(STEPS):
                     t = low + (s + jitter) * step
+                    if is_lost and t >= ANSWER_REACH:
+                        break
                     bits += GOLDEN
                     here = DENSER[scrambled(bits) >> FIRST_BITS] * mean
                     tau += 0.5 * here * step
                     if NEAREST < t < ANSWER_REACH:
+                        overlap = min(max((t - MEETS[0]) / (MEETS[1] - MEETS[0]), 0.0), 1.0)
                         clear = (
                             pi * BACKSCATTER * here * over
-                        )  # without its own cloud, at full overlap
-                        if clear > CERTAIN * max(strongest, least) * t * t:
-                            overlap = min(max((t - MEETS[0]) / (MEETS[1] - MEETS[0]), 0.0), 1.0)
+                        )  # without its own cloud, full overlap
+                        noticed = CERTAIN * max(strongest, least) * t * t
+                        # exp(2 x) is at least 1 + 2 x + 2 x^2
+                        if clear * overlap > noticed * (1.0 + 2.0 * tau * (1.0 + tau)):
                             answer = clear * overlap * exp(-2.0 * tau) / (t * t)
                             if answer > strongest:
                                 strongest, where[i] = answer, t

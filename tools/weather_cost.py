@@ -21,13 +21,13 @@ from skidpad.core.vocabulary import SensorLevel
 from skidpad.roads.bundled import load_map
 
 SECONDS = 15.0
-TYRES = {
+TYRES: dict[str, object] = {
     "tyres": "all_season", "tyre_stiffness": True, "water_drag": True, "roll_over": True,
     "anti_lock": "wheel_speeds", "stability": "wheel_speeds", "wind": True, "wind_speed": 10.0,
     "wind_gusts": 0.2, "wakes": True,
 }  # fmt: skip
 PUDDLE = (SurfacePatch(name="puddle", water_mm=10.0, circle=(12.0, -3.5, 4.0)),)
-RADAR = {"radar_model": "physical"}
+RADAR: dict[str, object] = {"radar_model": "physical"}
 ARMS: dict[str, tuple[str, dict[str, object], str]] = {  # map, settings, surface
     "figure8": ("figure8", {}, ""),
     "tyres": ("figure8", TYRES, ""),

@@ -188,7 +188,7 @@ def _near_bound(a: LaneArrays, lane: int, sample: int, x: float, y: float, z: fl
             if missed != 0.0:
                 return REACH * REACH
             rise = Z_WEIGHT * (z - (p[Z] + share * (q[Z] - p[Z])))
-            return min(d_sq + rise * rise + 4.0 * SAME, REACH * REACH)
+            return float(min(d_sq + rise * rise + 4.0 * SAME, REACH * REACH))
         if i < first or i > last:
             return REACH * REACH
     return REACH * REACH

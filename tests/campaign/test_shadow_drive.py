@@ -18,7 +18,7 @@ from skidpad.recording.channels.cycles import cycles
 from skidpad.recording.hazards.records import HazardRecord
 from skidpad.recording.run.log_files import read_log
 from skidpad.scenarios.export.hazard_export import export_hazard
-from skidpad.scenarios.export.writer import OscVersion
+from skidpad.scenarios.export.version import OscVersion
 from skidpad.stack.configurations import functions_of
 from support.channel_worlds import Eyes, World
 from support.channel_worlds import drive as drive_channels

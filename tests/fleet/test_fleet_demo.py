@@ -20,7 +20,7 @@ from skidpad.cli.fleet.demo import (
     serving,
 )
 from skidpad.core.errors import FileError
-from skidpad.evidence.channels.hazards import Profile
+from skidpad.evidence.channels.choices import Profile
 from skidpad.fleet import recorded
 from skidpad.fleet.insight.worklist import rank_work
 from skidpad.fleet.loop.plan import Plan

@@ -15,7 +15,7 @@ from skidpad.recording.hazards.records import (
     HazardWriter,
 )
 from skidpad.scenarios.export.hazard_export import export_hazard
-from skidpad.scenarios.export.writer import OscVersion
+from skidpad.scenarios.export.version import OscVersion
 from support.asam import asam_verdicts, require_asam_python
 from support.channel_worlds import Eyes, World, drive, traffic
 from support.hazard_record import a_record, unwritten

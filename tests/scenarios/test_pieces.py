@@ -12,7 +12,8 @@ from skidpad.core.run import ActorMode, Passenger, Scenario
 from skidpad.core.vocabulary import Outcome, SemanticClass
 from skidpad.scenarios.export.hazard_export import export_hazard, road_under
 from skidpad.scenarios.export.tracks import Track, tracks
-from skidpad.scenarios.export.writer import OscVersion, Sheet, write_element, write_scenario
+from skidpad.scenarios.export.version import OscVersion
+from skidpad.scenarios.export.writer import Sheet, write_element, write_scenario
 from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.scenarios.scenario import compile_scenario
 from support.hazard_record import a_record

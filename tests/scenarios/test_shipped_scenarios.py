@@ -11,7 +11,7 @@ from lxml import etree
 
 from scenario_catalogue import SCENARIOS, file_name, write
 from skidpad.roads.bundled import FOLDER as MAPS
-from skidpad.scenarios.export.writer import OscVersion
+from skidpad.scenarios.export.version import OscVersion
 from skidpad.scenarios.reading.findings import Kind
 from skidpad.scenarios.scenario import check
 from skidpad.scenarios.shipped import FOLDER, NAMES

@@ -10,7 +10,8 @@ from skidpad.campaign.driving.outdoors import environment_of, weather_of
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.physics.presets import preset
 from skidpad.scenarios.export.tracks import Track
-from skidpad.scenarios.export.writer import OscVersion, Sheet, write_scenario
+from skidpad.scenarios.export.version import OscVersion
+from skidpad.scenarios.export.writer import Sheet, write_scenario
 from skidpad.scenarios.reading.environment import Environment, Fall
 from skidpad.scenarios.scenario import check
 

@@ -15,7 +15,7 @@ from skidpad.core.vocabulary import SensorLevel
 from skidpad.recording.hazards.records import TEXT_FILE, HazardRecord, read_hazards
 from skidpad.recording.run.log_files import TICKS
 from skidpad.scenarios.export.hazard_export import export_hazard
-from skidpad.scenarios.export.writer import OscVersion
+from skidpad.scenarios.export.version import OscVersion
 
 RECORDING = ".mcap"
 REPLAYS, SCENARIOS = "replays", "scenarios"  # folders within that of the hazards

@@ -18,7 +18,7 @@ import polars as pl
 from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError
 from skidpad.core.wording import count_text
-from skidpad.evidence.comparisons import parse_comparison
+from skidpad.evidence.comparisons import Flaw, parse_comparison
 from skidpad.evidence.contrasts import NOT_RUN
 from skidpad.evidence.statistics import (
     EVER_SIGNIFICANT,
@@ -126,14 +126,6 @@ def seeds_to_fire(hypotheses: int) -> int:
     Six at least: with fewer the mid-p raises more than 5 % of false alarms.
     """
     return max(EVER_SIGNIFICANT, ceil(log2(max(hypotheses, 1) / ALPHA)))
-
-
-class Flaw(str, Enum):
-    """Why a gate cannot be trusted; each fails it unless it is allowed by name."""
-
-    MISSING = "missing"  # a run of one campaign is not in the other
-    CRASHED = "crashed"  # a run crashed, timed out, or its stack failed
-    EMPTY = "empty"  # what a rule judges has no values in both
 
 
 def flaws(a: pl.DataFrame, b: pl.DataFrame, rules: Sequence[Rule]) -> dict[Flaw, str]:

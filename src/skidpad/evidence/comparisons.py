@@ -1,10 +1,11 @@
-"""`COLUMN > NUMBER`: a name, a comparison and a number, read before anything heavy loads."""
+"""`COLUMN > NUMBER`: a name, a comparison and a number, read before anything heavy loads; words of a gate."""
 
 from __future__ import annotations
 
 import operator
 import re
 from collections.abc import Callable
+from enum import Enum
 
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.told import describe_value
@@ -36,3 +37,11 @@ def parse_comparison(
             f"{option}: {describe_value(number, 100)} is no number, in {describe_value(text, 200)}"
         ) from None
     return column, OPERATORS[sign], limit
+
+
+class Flaw(str, Enum):
+    """Why a gate cannot be trusted; each fails it unless it is allowed by name."""
+
+    MISSING = "missing"  # a run of one campaign is not in the other
+    CRASHED = "crashed"  # a run crashed, timed out, or its stack failed
+    EMPTY = "empty"  # what a rule judges has no values in both

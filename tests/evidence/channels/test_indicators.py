@@ -16,6 +16,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import maximum_bipartite_matching
 
 from skidpad.core.errors import ConfigError
+from skidpad.evidence.channels.choices import Form
 from skidpad.evidence.channels.frames import usable
 from skidpad.evidence.channels.indicators import comfort, prediction, similarity
 from skidpad.evidence.channels.indicators.catalogue import (
@@ -27,7 +28,6 @@ from skidpad.evidence.channels.indicators.catalogue import (
     load_thresholds,
     safety_case,
 )
-from skidpad.evidence.channels.indicators.comfort import Form
 from skidpad.evidence.channels.indicators.layout import IndicatorReadings
 from skidpad.evidence.channels.indicators.panel import IndicatorPanel
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from skidpad.core.channels import Context, Cycle
 from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.channels.hazards import Clause, Profile, Signal, load_only_rules, load_rules
+from skidpad.evidence.channels.choices import Form, Profile
+from skidpad.evidence.channels.hazards import Clause, Signal, load_only_rules, load_rules
 from skidpad.evidence.channels.indicators.catalogue import Indicator
-from skidpad.evidence.channels.indicators.comfort import Form
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings, drive_events
 from skidpad.evidence.channels.recorder import WORLD_LIMIT

@@ -11,7 +11,8 @@ from skidpad.core.channels import Cycle
 from skidpad.core.constants import G
 from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.channels.hazards import Profile, Signal
+from skidpad.evidence.channels.choices import Profile
+from skidpad.evidence.channels.hazards import Signal
 from skidpad.evidence.channels.judging.truth.simulator import would_hit
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings, drive_events
 from skidpad.evidence.channels.tracked.distance import SafeDistance

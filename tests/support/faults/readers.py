@@ -96,7 +96,8 @@ def rules() -> list[bytes]:
 
 
 def read_rules(path: Path) -> object:
-    from skidpad.evidence.channels.hazards import Profile, load_rules
+    from skidpad.evidence.channels.choices import Profile
+    from skidpad.evidence.channels.hazards import load_rules
 
     return load_rules(Profile("practical"), path)
 

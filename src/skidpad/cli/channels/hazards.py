@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import typer
+
+from skidpad.scenarios.export.version import OscVersion
 
 hazards = typer.Typer(
     name="hazards", help="Hazardous scenes that a monitor found.", no_args_is_help=True
 )
 Dir = Annotated[Path, typer.Argument(help="Output folder of `skidpad monitor`.")]
 Id = Annotated[list[str] | None, typer.Option("--id", help="Only this hazard; may be repeated.")]
-
-
-class Osc(str, Enum):
-    """Values that the option --osc takes."""
-
-    v1_2 = "1.2"
-    v1_0 = "1.0"
 
 
 T = TypeVar("T")
@@ -69,8 +63,8 @@ def export(
     folder: Dir,
     id: Id = None,
     osc: Annotated[
-        Osc, typer.Option(help="1.2 for all channels; 1.0 for CARLA ScenarioRunner.")
-    ] = Osc.v1_2,
+        OscVersion, typer.Option(help="1.2 for all channels; 1.0 for CARLA ScenarioRunner.")
+    ] = OscVersion.V1_2,
     world: Annotated[
         str | None, typer.Option(help="Only this channel's world; 1.0: the driving one by default.")
     ] = None,
@@ -80,10 +74,9 @@ def export(
 
     chosen = _choose_ids({record.id: record for record in read_hazards(folder)}, id)
     from skidpad.scenarios.export.hazard_export import export_hazard
-    from skidpad.scenarios.export.writer import OscVersion
 
     for record in chosen:
-        scenario, road = export_hazard(record, folder / "scenarios", OscVersion(osc.value), world)
+        scenario, road = export_hazard(record, folder / "scenarios", osc, world)
         typer.echo(f"{scenario} with {road.name}")
 
 

@@ -10,6 +10,7 @@ import typer
 from msgspec import Meta, Struct
 
 from skidpad.cli.options.spread import spread_fields
+from skidpad.evidence.channels.choices import Form, Identify, Profile
 
 if TYPE_CHECKING:
     import polars as pl
@@ -19,30 +20,6 @@ if TYPE_CHECKING:
     from skidpad.evidence.channels.monitor import MonitorSettings
     from skidpad.evidence.channels.summary import Watched
     from skidpad.recording.channels.mcap_files import ChannelSource
-
-
-class Rules(str, Enum):
-    """Values that the option --rules takes."""
-
-    tracked = "tracked"
-    practical = "practical"
-    as_printed = "as_printed"
-
-
-class Forms(str, Enum):
-    """Values that the option --forms takes."""
-
-    corrected = "corrected"
-    completed = "completed"
-    printed = "printed"
-
-
-class Identifier(str, Enum):
-    """Values that the option --identifier takes."""
-
-    rules = "rules"
-    learned = "learned"
-    both = "both"
 
 
 class Wire(str, Enum):
@@ -55,14 +32,14 @@ class Judged(Struct, frozen=True):
     """By what rules and formulas the channels are judged."""
 
     rules: Annotated[
-        Rules,
+        Profile,
         Meta(
             description="Hazard rules: safe distances of tracked objects, the published rules corrected, "
             "or as printed."
         ),
-    ] = Rules.tracked
+    ] = Profile.TRACKED
     forms: Annotated[
-        Forms | None,
+        Form | None,
         Meta(
             description="Formulas of the indicators; default: corrected, with as_printed rules completed."
         ),
@@ -70,11 +47,11 @@ class Judged(Struct, frozen=True):
     rules_file: Annotated[Path | None, Meta(description="Own hazard rules (YAML).")] = None
     thresholds: Annotated[Path | None, Meta(description="Own thresholds (YAML).")] = None
     identifier: Annotated[
-        Identifier,
+        Identify,
         Meta(
             description="What finds the three scored hazards: the rules, the trained model, both."
         ),
-    ] = Identifier.rules
+    ] = Identify.RULES
     model: Annotated[
         Path | None,
         Meta(description="Trained model (.npz) of `skidpad channels train`; default: ours."),
@@ -88,22 +65,19 @@ class Judged(Struct, frozen=True):
 
     def to_settings(self) -> MonitorSettings:
         """Returns the monitor's settings; reads the files that are named, with their errors."""
-        from skidpad.evidence.channels.hazards import Profile, default_form, load_rules
-        from skidpad.evidence.channels.identifier.model import Identify, load_model
+        from skidpad.evidence.channels.hazards import default_form, load_rules
+        from skidpad.evidence.channels.identifier.model import load_model
         from skidpad.evidence.channels.indicators.catalogue import load_thresholds
-        from skidpad.evidence.channels.indicators.comfort import Form
         from skidpad.evidence.channels.indicators.settings import IndicatorSettings
         from skidpad.evidence.channels.monitor import MonitorSettings
 
-        profile = Profile(self.rules.value)
-        form = Form(self.forms.value) if self.forms else default_form(profile)
-        is_by_rules = self.identifier is Identifier.rules
+        profile, is_by_rules = self.rules, self.identifier is Identify.RULES
         return MonitorSettings(
-            indicators=IndicatorSettings(form=form),
+            indicators=IndicatorSettings(form=self.forms or default_form(profile)),
             profile=profile,
             rules=load_rules(profile, self.rules_file),
             thresholds=load_thresholds(self.thresholds),
-            identify=Identify(self.identifier.value),
+            identify=self.identifier,
             detectors={} if is_by_rules else load_model(self.model).identifier(),
             grip=self.grip,
         )

@@ -9,18 +9,12 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
+from skidpad.evidence.comparisons import Flaw, parse_comparison
+
 if TYPE_CHECKING:
     import polars as pl
 
     from skidpad.evidence.compare import Change, Rule, RuleJudgement
-
-
-class Flaws(str, Enum):
-    """Values that the option --allow takes."""
-
-    missing = "missing"
-    crashed = "crashed"
-    empty = "empty"
 
 
 class Undecided(str, Enum):
@@ -59,7 +53,7 @@ def compare(
     ] = Undecided.fail,
     junit: Annotated[Path | None, typer.Option(help="Write the rules as JUnit XML.")] = None,
     allow: Annotated[
-        list[Flaws] | None,
+        list[Flaw] | None,
         typer.Option(help="Data that --fail-if would not pass; may be repeated."),
     ] = None,
 ) -> None:
@@ -111,7 +105,6 @@ class Gate(NamedTuple):
 
 def _read_rules(texts: list[str]) -> list[Rule]:
     """Returns the rules of these texts; one that cannot be read is refused before the tests load."""
-    from skidpad.evidence.comparisons import parse_comparison
     from skidpad.recording.campaign.matrix import Metrics
     from skidpad.recording.campaign.results import definitions_of
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from skidpad.cli.channels.hazards import Osc
+from skidpad.scenarios.export.version import OscVersion
 
 if TYPE_CHECKING:
     from skidpad.recording.formats.osi import World
@@ -21,7 +21,9 @@ def export(
     out: Annotated[
         Path | None, typer.Option(help="Where to; default: RUN/scenario.", show_default=False)
     ] = None,
-    osc: Annotated[Osc, typer.Option(help="1.2, or 1.0 for CARLA ScenarioRunner.")] = Osc.v1_2,
+    osc: Annotated[
+        OscVersion, typer.Option(help="1.2, or 1.0 for CARLA ScenarioRunner.")
+    ] = OscVersion.V1_2,
     osi: Annotated[
         Path | None, typer.Option(help="Also a trace of OSI GroundTruth: FILE.osi (extra osi).")
     ] = None,
@@ -42,7 +44,6 @@ def export(
     from skidpad.recording.formats.osi_udp import read_address
     from skidpad.recording.run.log_files import read_log
     from skidpad.scenarios.export.run_export import export_run
-    from skidpad.scenarios.export.writer import OscVersion
 
     address = None if osi_udp is None else read_address(osi_udp)
     log = read_log(run)
@@ -53,9 +54,7 @@ def export(
         typer.echo(f"{address[0]}:{address[1]}: {sent} messages sent")
     folder = run / "scenario" if out is None else out
     name = run.resolve().name
-    scenario, road, known = export_run(
-        log, folder, name, road_files(run), OscVersion(osc.value), _environment(run)
-    )
+    scenario, road, known = export_run(log, folder, name, road_files(run), osc, _environment(run))
     typer.echo(f"{scenario} with {road.name}")
     if not known:
         typer.echo(f"the road {log.header.map!r} is not there: a straight one lies under the run")

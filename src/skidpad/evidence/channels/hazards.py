@@ -18,8 +18,8 @@ from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError
 from skidpad.core.reading import decode_yaml, read_bytes
 from skidpad.core.vocabulary import HazardType
+from skidpad.evidence.channels.choices import Form, Profile
 from skidpad.evidence.channels.indicators.catalogue import Indicator
-from skidpad.evidence.channels.indicators.comfort import Form
 from skidpad.evidence.channels.indicators.layout import IndicatorReadings, Layout
 from skidpad.evidence.channels.risk import RiskMatrix
 
@@ -31,14 +31,6 @@ SCORED_HAZARDS = (
 STEADY_TIME = 20.0  # s over which a stuck vehicle's indicators hardly move (C-129)
 STEADY_RANGE = 0.1
 DIP = 0.2  # a fall of cross-channel path similarity below its recent best that counts as a dip
-
-
-class Profile(str, Enum):
-    """Which published or corrected rules apply (decision C-6)."""
-
-    AS_PRINTED = "as_printed"
-    PRACTICAL = "practical"
-    TRACKED = "tracked"  # decision R-9
 
 
 def default_form(profile: Profile) -> Form:

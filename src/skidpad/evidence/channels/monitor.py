@@ -17,16 +17,11 @@ from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame, Cycle
 from skidpad.core.errors import ConfigError, require_range
 from skidpad.core.vocabulary import HazardType
+from skidpad.evidence.channels.choices import Identify, Profile
 from skidpad.evidence.channels.frames import Usable, usable
-from skidpad.evidence.channels.hazards import (
-    Profile,
-    Rule,
-    SignalReader,
-    SignalReadings,
-    load_rules,
-)
+from skidpad.evidence.channels.hazards import Rule, SignalReader, SignalReadings, load_rules
 from skidpad.evidence.channels.identifier.features import feature_row
-from skidpad.evidence.channels.identifier.model import Detector, Identify, LearnedIdentifier
+from skidpad.evidence.channels.identifier.model import Detector, LearnedIdentifier
 from skidpad.evidence.channels.indicators.catalogue import (
     AnyIndicator,
     Bound,

@@ -10,8 +10,9 @@ from typing import Any
 
 from skidpad.core.errors import InputError
 from skidpad.core.told import on_a_line
+from skidpad.evidence.channels.choices import Identify
 from skidpad.evidence.channels.hazards import default_form, load_only_rules
-from skidpad.evidence.channels.identifier.model import Identify, load_model
+from skidpad.evidence.channels.identifier.model import load_model
 from skidpad.evidence.channels.indicators.catalogue import load_thresholds
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.monitor import MonitorSettings

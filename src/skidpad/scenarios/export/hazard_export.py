@@ -19,7 +19,8 @@ from skidpad.core.errors import ConfigError, InputError
 from skidpad.core.names import path_part
 from skidpad.recording.hazards.records import HazardRecord
 from skidpad.scenarios.export.tracks import Track, tracks
-from skidpad.scenarios.export.writer import OscVersion, Sheet, write_element, write_scenario
+from skidpad.scenarios.export.version import OscVersion
+from skidpad.scenarios.export.writer import Sheet, write_element, write_scenario
 
 LANE_WIDTH = 3.5  # m
 ROAD_MARGIN = 20.0  # m beyond the outermost position

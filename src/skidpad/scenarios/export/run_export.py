@@ -16,7 +16,8 @@ from skidpad.recording.run.log import RunLog
 from skidpad.roads.bundled import FOLDER, load_map
 from skidpad.scenarios.export.hazard_export import road_under
 from skidpad.scenarios.export.tracks import Track
-from skidpad.scenarios.export.writer import OscVersion, Sheet, write_element, write_scenario
+from skidpad.scenarios.export.version import OscVersion
+from skidpad.scenarios.export.writer import Sheet, write_element, write_scenario
 from skidpad.scenarios.reading.environment import Environment
 
 DATE = datetime(1970, 1, 1)  # noqa: DTZ001  # the library writes naive times

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from enum import Enum
 from math import cos, radians, sin
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,7 @@ from skidpad.core.vocabulary import SemanticClass, class_of
 from skidpad.recording.files import write_bytes
 from skidpad.scenarios.export.pieces import Vertex, pieces
 from skidpad.scenarios.export.tracks import Track
+from skidpad.scenarios.export.version import OscVersion
 from skidpad.scenarios.reading.entities import GHOST
 from skidpad.scenarios.reading.environment import CELSIUS, HEAVY, Environment, Fall, Wetness
 
@@ -33,18 +33,6 @@ HEIGHTS = {SemanticClass.TRUCK: 3.5, SemanticClass.BUS: 3.2, SemanticClass.PEDES
 EARLY = 0.005  # s that triggers fire before their time, so that rounding delays none
 LINGER = 0.05  # s that who vanishes is still there
 SIDE_STEP = 0.3  # m; who waits moves by it, as near vertices would be merged
-
-
-class OscVersion(str, Enum):
-    """Which profile of OpenSCENARIO XML is written."""
-
-    V1_2 = "1.2"
-    V1_0 = "1.0"
-
-    @property
-    def minor(self) -> int:
-        """Returns the minor revision for the file header."""
-        return int(self.value.split(".")[1])
 
 
 @dataclass(frozen=True, slots=True)

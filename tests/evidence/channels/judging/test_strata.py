@@ -9,7 +9,8 @@ import pytest
 
 from skidpad.core.errors import FileError
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.channels.hazards import Profile, Signal, load_rules
+from skidpad.evidence.channels.choices import Profile
+from skidpad.evidence.channels.hazards import Signal, load_rules
 from skidpad.evidence.channels.judging.curves import (
     LEADS,
     SURES,

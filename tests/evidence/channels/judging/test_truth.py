@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from skidpad.core.channels import Cycle
 from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.channels.hazards import Profile
+from skidpad.evidence.channels.choices import Profile
 from skidpad.evidence.channels.judging.evaluation import Evaluation, read_labels
 from skidpad.evidence.channels.judging.segments import judge
 from skidpad.evidence.channels.judging.truth import simulator

@@ -6,7 +6,6 @@ import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -33,14 +32,6 @@ BLOCK = 4096  # cycles judged at once
 MODEL = "a model of the identifier"
 SIZE_LIMIT = 64 * 1024 * 1024  # bytes of a model file
 BUNDLED = "bundled"  # the model that comes with Skidpad; its card lies beside it
-
-
-class Identify(str, Enum):
-    """Who finds the three scored hazards."""
-
-    RULES = "rules"
-    LEARNED = "learned"
-    BOTH = "both"
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,10 +12,10 @@ import numpy as np
 
 from skidpad.core.arrays import Floats, Ints
 from skidpad.core.channels import ChannelFrame
+from skidpad.evidence.channels.choices import Form
 from skidpad.evidence.channels.frames import Usable
 from skidpad.evidence.channels.indicators import comfort, prediction, similarity
 from skidpad.evidence.channels.indicators.catalogue import Indicator
-from skidpad.evidence.channels.indicators.comfort import Form
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.paths import sample_plan, sample_predictions
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import Enum
 from math import exp, tanh
 
 import numpy as np
@@ -15,14 +14,6 @@ MIN_POINTS = 4  # three differences give one jerk (C-041)
 FIT_WINDOW = 1.0  # s, decision C-16
 FIT_MIN_POINTS = 8
 V_STANDING = 0.5  # m/s, slower motion does not tell a direction
-
-
-class Form(str, Enum):
-    """How far a published formula is followed (decision C-16)."""
-
-    PRINTED = "printed"  # C-042, C-043
-    COMPLETED = "completed"  # C-044
-    CORRECTED = "corrected"  # a fit over 1.0 s; motion validated over 1.0 s
 
 
 @kernel

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from skidpad.core.errors import ConfigError
+from skidpad.evidence.channels.choices import Form
 from skidpad.evidence.channels.indicators import comfort, prediction, similarity
-from skidpad.evidence.channels.indicators.comfort import Form
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,8 +16,9 @@ import numpy as np
 from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame, Cycle
 from skidpad.core.vocabulary import HazardType
+from skidpad.evidence.channels.choices import Profile
 from skidpad.evidence.channels.frames import usable
-from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Profile, Rule, Signal, load_rules
+from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Rule, Signal, load_rules
 from skidpad.evidence.channels.identifier.model import Detector, events_of, probability_of
 from skidpad.evidence.channels.matching import Span, tally
 from skidpad.evidence.channels.tracked.distance import SafeDistance

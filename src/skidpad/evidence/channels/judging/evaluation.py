@@ -15,7 +15,8 @@ from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.told import on_a_line
 from skidpad.core.vocabulary import HazardType, Stratum
-from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Profile
+from skidpad.evidence.channels.choices import Profile
+from skidpad.evidence.channels.hazards import SCORED_HAZARDS
 from skidpad.evidence.channels.judging.causes import EXPLAINED
 from skidpad.evidence.channels.judging.curves import Point
 from skidpad.evidence.channels.judging.facts import route_shares

@@ -23,7 +23,7 @@ from xml.etree import ElementTree
 from scenariogeneration import xosc
 
 from skidpad.roads.bundled import map_file
-from skidpad.scenarios.export.writer import OscVersion
+from skidpad.scenarios.export.version import OscVersion
 from skidpad.scenarios.shipped import FOLDER
 
 ROAD = "straight"

@@ -15,13 +15,8 @@ from skidpad.core.arrays import Floats
 from skidpad.core.channels import Cycle
 from skidpad.core.errors import FileError
 from skidpad.core.vocabulary import HazardType, Stratum
-from skidpad.evidence.channels.hazards import (
-    SCORED_HAZARDS,
-    Profile,
-    Signal,
-    default_form,
-    load_rules,
-)
+from skidpad.evidence.channels.choices import Profile
+from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Signal, default_form, load_rules
 from skidpad.evidence.channels.identifier.features import feature_row
 from skidpad.evidence.channels.indicators.panel import no_lap
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings

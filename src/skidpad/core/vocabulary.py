@@ -296,3 +296,4 @@ class Govern(str, Enum):
     ONLY_WATER = "only-water"
     GRIP_LOW = "grip-low"  # an estimate of grip that is 30 % too low
     GRIP_HIGH = "grip-high"  # and 30 % too high
+    FULL = "full"  # the envelope, also with lane boundaries, walkers and bridges of the map

@@ -29,6 +29,7 @@ REPEATED, NEW_FORCE = (
     0.03,
 )  # exponent where force over load is within this of the last reading's
 COLD_C = 3.0  # deg C that a thermometer with 2 K of error says where the road may be frozen
+BRIDGE_K = 3.0  # K by which a bridge may be colder than the road beside it; our assumption
 # (grip, relative spread, weight) by stage of the rain sensor: dry, wet (0.2 mm), in between, 1 mm at 90
 # km/h of the friction table of the Bosch Automotive Handbook (docs/physics.md); the weights are our
 # assumption, as is what hides a patch of something else
@@ -56,6 +57,14 @@ def prior_of(stage: int, is_cold: bool) -> Floats:
         p += weight * bell / bell.sum()
     p /= p.sum()
     return p
+
+
+def bridge_prior(stage: int, air_c: float) -> Floats:
+    """Returns what is expected on a bridge: `prior_of` in air that is BRIDGE_K colder.
+
+    stage: of the rain sensor, 0: dry; air_c: air in deg C by the thermometer.
+    """
+    return prior_of(stage, air_c - BRIDGE_K < COLD_C)
 
 
 def quantile(p: Floats, share: float) -> float:

@@ -8,8 +8,8 @@ own, and the commands that it returned: no weather, no friction.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from math import isfinite
+from dataclasses import dataclass, field, replace
+from math import isfinite, nan
 from typing import Any
 
 from skidpad.core.constants import G
@@ -26,18 +26,22 @@ from skidpad.core.specs import (
 )
 from skidpad.core.states import EgoEstimate, StackReport, VehicleCommand
 from skidpad.core.vocabulary import Supervision
-from skidpad.envelope.belief import COLD_C
+from skidpad.envelope.belief import BRIDGE_K, CAUTION, COLD_C, bridge_prior, quantile
+from skidpad.envelope.bridges import BridgesAhead
 from skidpad.envelope.grip import STIFFNESS, Grip, GripEstimator
 from skidpad.envelope.limits import (
     Binding,
     RssParameters,
     bends_speed,
+    bridge_speed,
     floating_speed,
     following_speed,
     lowest,
+    preview_speed,
     rss_speed,
     sight_speed,
 )
+from skidpad.envelope.seen import FurtherSight
 from skidpad.envelope.sight import Sight, Way, way_ahead
 from skidpad.envelope.signals import BusModel, CarBus
 from skidpad.roads.queries import RoadMap
@@ -79,6 +83,10 @@ class EnvelopeSettings:
         rss: RSS distances with constant grip and the dry row of the table, in its place: a rival.
         watches: it records what it would allow and leaves the stack alone.
         pulses: it brakes a little where nothing is known of the grip.
+        lanes: the lane's boundaries limit, by how far the cameras see them; off for published results.
+        walkers: likewise walkers.
+        bridges: likewise what is expected on the bridges of the map.
+        preview: s of driving whose lane boundaries must be seen.
         seed: of the errors of the car's signals.
         bus: errors of the car's signals.
     """
@@ -96,6 +104,10 @@ class EnvelopeSettings:
     rss: bool = False
     watches: bool = False
     pulses: bool = False
+    lanes: bool = False
+    walkers: bool = False
+    bridges: bool = False
+    preview: float = 1.8
     seed: int = 1
     bus: BusModel = BusModel()
     dt: float = DT
@@ -108,6 +120,7 @@ class EnvelopeSettings:
         require_range("most", self.most, 1.0, 120.0)
         require_range("stiffness", self.stiffness, 5.0, 60.0)
         require_range("factor", self.factor, 0.1, 3.0)
+        require_range("preview", self.preview, 0.1, 10.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,13 +132,16 @@ class Allowed:
     grip: Grip
     reach: float  # m that is seen
     v: float = 0.0  # m/s that the car drives
+    further: Mapping[str, float] = field(
+        default_factory=dict
+    )  # sight of lanes and walkers, bridges
 
     def numbers(self) -> dict[str, float]:
         """Returns what the envelope said as the columns of its recording."""
         return {
             "speed_mps": self.speed, "binding": float(self.binding), "grip": self.grip.value,
             "confidence": self.grip.confidence, "prior": self.grip.prior, "reach_m": self.reach,
-            "ego_mps": self.v,
+            "ego_mps": self.v, **self.further,
         }  # fmt: skip
 
 
@@ -140,6 +156,11 @@ class Envelope:
         self.sight = Sight(radar, settings.dt)
         self.grip = GripEstimator(settings.dt, stiffness=settings.stiffness)
         self.bus = CarBus(settings.seed, settings.bus, self.grip.car.steer_max)
+        self.further: FurtherSight | None = None
+        if settings.walkers or settings.lanes:
+            self.further = FurtherSight(specs, settings.dt, settings.walkers, settings.lanes)
+        self.bridges = BridgesAhead(map) if settings.bridges else None
+        self.bridge: float | None = None  # m to the next one that may be frozen
 
     def reset(self) -> None:
         """Forgets what was seen and felt at another place.
@@ -173,8 +194,58 @@ class Envelope:
             limits, reach = self._limit_by_rss(frame, way, v), 0.0
         else:
             limits, reach = self._limits(frame, way, grip, stage, v)
+            if way is not None:
+                limits |= self._limit_by_further_sight(frame, way, grip)
+                limits |= self._limit_by_bridge(frame, grip, stage, air_c, reach)
             limits = {name: limit for name, limit in limits.items() if name in set_to.limits}
-        return Allowed(*lowest(limits, set_to.most), grip, reach, v)
+        return Allowed(*lowest(limits, set_to.most), grip, reach, v, self._numbers())
+
+    def _limit_by_further_sight(
+        self, frame: SensorFrame, way: Way, grip: Grip
+    ) -> dict[Binding, float]:
+        """Returns the limits by walkers and lane boundaries, where they are asked for and seen.
+
+        Where walkers are expected the car can stop within the distance at which they are first seen, and
+        before one that is in the way.
+        """
+        if self.further is None:
+            return {}
+        self.further.look(frame, way)
+        set_to, limits = self.settings, {}
+        reach, lane = self.further.walker_reach, self.further.lane_reach
+        if self.further.walker is not None:
+            gap = self.further.walker - CLOSE
+            reach = gap if reach is None else min(reach, gap)
+        if reach is not None:
+            limits[Binding.WALKER] = sight_speed(reach, set_to.share * grip.value * G, set_to.delay)
+        if lane is not None:
+            limits[Binding.LANE] = preview_speed(lane, set_to.preview)
+        return limits
+
+    def _limit_by_bridge(
+        self, frame: SensorFrame, grip: Grip, stage: int, air_c: float, reach: float
+    ) -> dict[Binding, float]:
+        """Returns the limit by the next bridge where it may be frozen; stage: of the rain sensor."""
+        self.bridge = None
+        if self.bridges is None or air_c - BRIDGE_K >= COLD_C:
+            return {}
+        self.bridge = self.bridges.find_next(frame.ego.pose)
+        if self.bridge is None:
+            return {}
+        set_to = self.settings
+        expected = min(grip.value, quantile(bridge_prior(stage, air_c), CAUTION))
+        approach = min(set_to.approach, set_to.share * grip.value * G)
+        v = max(frame.ego.speed, 0.0)
+        on_bridge = set_to.share * expected * G
+        limit = bridge_speed(self.bridge, reach, on_bridge, approach, set_to.delay, v)
+        return {Binding.BRIDGE: limit}
+
+    def _numbers(self) -> dict[str, float]:
+        """Returns what is recorded of sight of lanes and walkers and of bridges; empty where none counts."""
+        told = {} if self.further is None else self.further.numbers()
+        if self.bridges is not None:
+            told["bridge_m"] = nan if self.bridge is None else self.bridge
+        return told
 
     def _limit_by_rss(self, frame: SensorFrame, way: Way | None, v: float) -> dict[Binding, float]:
         """Returns the speed limits in m/s of the rival: a fixed table speed and RSS behind the lead."""

@@ -25,6 +25,9 @@ class Binding(IntEnum):
     BEND = 3
     WATER = 4
     TABLE = 5  # of a rival of the envelope: a table of speeds, or one fixed speed
+    LANE = 6  # these three only where they are asked for
+    WALKER = 7
+    BRIDGE = 8
 
 
 def sight_speed(distance: float, deceleration: float, delay: float) -> float:
@@ -119,6 +122,27 @@ def bends_speed(
         ),
         default=inf,
     )
+
+
+def preview_speed(distance: float, preview: float) -> float:
+    """Returns the highest speed at which `distance` m of lane boundary are `preview` s of driving.
+
+    Herland, Road visibility, lateral position and speed (VTI, driving simulator, for COST 331), took sight of
+    the markings over speed for the measure: 1.8 s at least where the speed was free.
+    """
+    return max(distance, 0.0) / preview
+
+
+def bridge_speed(
+    distance: float, reach: float, deceleration: float, approach: float, delay: float, v: float
+) -> float:
+    """Returns the speed now from which a car can stop in sight on a bridge that begins `distance` m ahead.
+
+    deceleration: m/s^2 that the bridge allows; reach: m that are seen; approach: m/s^2 of slowing before it;
+    `v` drives on for the delay. Bridges freeze first: Birnie, Transportation Research Record 598 (1976).
+    """
+    on_it = sight_speed(reach, deceleration, delay)
+    return speed_before_bend(on_it, distance - v * delay, approach) if distance > 0.0 else on_it
 
 
 def floating_speed(film_mm: float) -> float:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import cos, inf, sin
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
 from skidpad.core.frames import RadarPoints
@@ -53,6 +54,14 @@ def grade_at(map: RoadMap, pose: Pose) -> float:
     """Returns the map's grade at a pose, uphill > 0; 0 off every lane."""
     way = way_ahead(map, pose)
     return 0.0 if way is None else way.grade
+
+
+def locate_on(way: Way, x: Floats, y: Floats) -> tuple[NDArray[np.intp], Floats]:
+    """Returns (n,) the nearest place of the way and the m to its left of (n,) points of the world."""
+    nearest = np.argmin(np.hypot(x[:, None] - way.x, y[:, None] - way.y), axis=1)
+    k = np.minimum(nearest, len(way.s) - 2)
+    heading = np.arctan2(way.y[k + 1] - way.y[k], way.x[k + 1] - way.x[k])
+    return nearest, (y - way.y[k]) * np.cos(heading) - (x - way.x[k]) * np.sin(heading)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,12 +148,9 @@ class Sight:
         c, s = cos(pose.yaw), sin(pose.yaw)
         x, y = pose.x + c * ahead - s * left, pose.y + s * ahead + c * left
         height = pose.z + mount.z + points.range * np.sin(points.altitude) - ahead * sin(pose.pitch)
-        nearest = np.argmin(np.hypot(x[:, None] - way.x, y[:, None] - way.y), axis=1)
-        k = np.minimum(nearest, len(way.s) - 2)
-        heading = np.arctan2(way.y[k + 1] - way.y[k], way.x[k + 1] - way.x[k])
-        across = np.abs((y - way.y[k]) * np.cos(heading) - (x - way.x[k]) * np.sin(heading))
+        nearest, across = locate_on(way, x, y)
         above = height - way.z[nearest]
-        in_lane = (across < HALF_LANE) & (above > LEAST_HEIGHT) & (above < MOST_HEIGHT)
+        in_lane = (np.abs(across) < HALF_LANE) & (above > LEAST_HEIGHT) & (above < MOST_HEIGHT)
         in_lane &= ahead > FRONT
         if not in_lane.any():
             return None

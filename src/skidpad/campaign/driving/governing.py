@@ -50,6 +50,8 @@ def choose_envelope(spec: RunSpec, setup: Setup) -> EnvelopeSettings | None:
             return replace(plain, watches=True)
         case Govern.PULSES:
             return replace(plain, pulses=True)
+        case Govern.FULL:
+            return replace(plain, lanes=True, walkers=True, bridges=True)
         case Govern.ORACLE:
             params = road_of(setup).params()
             return replace(plain, oracle=lambda v: float(mu_at(params, v)))

@@ -20,6 +20,7 @@ SLUSH_MM = (0.0, 15.0)
 # a car's place in its lane; our assumption
 PATH_OFFSET, PATH_WIDTH = 0.75, 0.6
 RADIUS = (0.1, 1000.0)  # m
+DRIED_MIN = (0.0, 1440.0)  # min
 AIR_C = RANGES["air_temperature_c"]  # of weather
 
 
@@ -40,6 +41,7 @@ class SurfacePatch(
         s: from and to along the road, m; None: the whole road.
         bridges: the area is every bridge that the map names.
         side: half of each lane, seen in its driving direction, its two wheel paths, or the rest of it.
+        dried_min: minutes without rain for which `water_mm` has dried when the run begins.
         air_below_c: the patch is there while the air is colder, degrees Celsius; None: always.
     """
 
@@ -57,6 +59,7 @@ class SurfacePatch(
     bridges: bool = False
     side: Literal["both", "left", "right", "wheel_paths", "beside_wheel_paths"] = "both"
     air_below_c: float | None = None
+    dried_min: float = 0.0
 
     def __post_init__(self) -> None:
         self._require_what()
@@ -79,6 +82,9 @@ class SurfacePatch(
             )
         if self.friction is not None:
             require_range("friction", self.friction, *FRICTION)
+        require_range("dried_min", self.dried_min, *DRIED_MIN)
+        if self.dried_min > 0.0 and self.water_mm == 0.0:
+            raise ConfigError("dried_min goes with water_mm")
 
     def _require_where(self) -> None:
         """Raises ConfigError unless the area is one valid circle, polygon, road, or the bridges."""

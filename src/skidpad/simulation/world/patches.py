@@ -15,6 +15,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.jit import hold
 from skidpad.core.states import ActorStates
 from skidpad.core.surface import SurfacePatch, place_in_file, present_patches
+from skidpad.physics.drying import dried_film
 from skidpad.physics.grip import GripParams, Road, road_surface
 from skidpad.physics.slush import slush_grip
 from skidpad.physics.types import VehicleType
@@ -187,9 +188,11 @@ def _surface_grip(patch: SurfacePatch, road: Road, tyres: str) -> GripParams:
     Always by the physical model, which alone knows films and snow.
     """
     outside = road_surface(road.weather)
+    in_paths = patch.side == "wheel_paths"
+    water_mm = dried_film(patch.water_mm, patch.dried_min, road.weather, traffic=in_paths)
     surface = replace(
         outside,
-        film_mm=max(outside.film_mm, patch.water_mm),
+        film_mm=max(outside.film_mm, water_mm),
         ice_mm=max(outside.ice_mm, patch.ice_mm),
         snow_mm=max(outside.snow_mm, patch.snow_mm),
     )

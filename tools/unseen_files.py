@@ -4,14 +4,15 @@
     python tools/unseen_files.py count FILE.csv FOLDER... [--esmini DIR]
 
 Each folder inside FOLDER is one repository, named OWNER+NAME, with its scenarios and roads. `choose`
-takes the files that are valid (see openscenario_corpus) and whose content is not in `--known`; it
-plays nothing. `count` plays the files of a list, each for 20 s, and compares them with esmini.
+takes the files that are valid (see openscenario_corpus) and whose content is not in `--known`, of
+files whose names differ in numbers alone the first eight; it plays nothing. `count` plays the files of a list, each for 20 s, and compares them with esmini.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
+import re
 import subprocess
 import sys
 import traceback
@@ -34,6 +35,7 @@ from support.oracle.reference import deviations, file_hash  # noqa: E402
 
 STEP, END = 0.05, 20.0  # s
 MOST = 60  # files of one repository
+SERIES = 8  # of them, whose names differ in numbers alone
 COLUMNS = ("repository", "path", "commit", "sha256")
 
 
@@ -73,18 +75,22 @@ def road_folders(repository: Path, maps: Sequence[Path]) -> list[Path]:
 def choose(given: argparse.Namespace) -> None:
     """Writes the list."""
     seen = {scenario_content(f) for folder in given.known for f in folder.rglob("*.xosc")}
+    listed = {r["sha256"] for table in given.listed for r in csv.DictReader(table.open())}
     rows = []
     repositories = [r for f in given.folders for r in sorted(f.iterdir())]
     for repository in repositories:
         chosen, maps = 0, road_folders(repository, given.maps)
+        series: Counter[str] = Counter()
         commit = given.commits.get(repository.name, "")
         for file in sorted(repository.rglob("*.xosc")):
             text = scenario_content(file)
-            if text is None or text in seen:
+            if text is None or text in seen or file_hash(file) in listed:
                 continue
             seen.add(text)
-            if chosen < MOST and is_valid(file, maps):
+            name = re.sub(r"\d+", "", file.stem)
+            if chosen < MOST and series[name] < SERIES and is_valid(file, maps):
                 chosen += 1
+                series[name] += 1
                 rows.append((repository.name.replace("+", "/", 1),
                              file.relative_to(repository).as_posix(), commit, file_hash(file)))  # fmt: skip
         print(repository.name, chosen, flush=True)
@@ -182,6 +188,7 @@ def main() -> None:
         "folders", nargs="+", type=Path, help="of repositories; count: the list first"
     )
     parser.add_argument("--known", type=Path, nargs="+", default=[])
+    parser.add_argument("--listed", type=Path, nargs="+", default=[], help="earlier lists")
     parser.add_argument("--maps", type=Path, action="append", default=[])
     parser.add_argument("--commits", type=Path, help="lines of: OWNER+NAME COMMIT")
     parser.add_argument("--list", type=Path, default=Path("unseen.csv"))

@@ -53,12 +53,17 @@ NOT_COMPARABLE = {  # by the file's hash: why its motion is nothing to compare
 }
 
 
-def run_esmini(programs: Path, file: Path) -> Reference:
-    """Returns what esmini makes of a file; RuntimeError where it does not play it."""
+def run_esmini(programs: Path, file: Path, roads: Path | None = None) -> Reference:
+    """Returns what esmini makes of a file; RuntimeError where it does not play it.
+
+    `roads` is a folder in which it looks for roads, too.
+    """
     with tempfile.TemporaryDirectory() as folder:
         record = Path(folder) / "run.dat"
         command = [str((programs / "esmini").resolve()), "--osc", str(file.resolve()), "--headless"]
         command += [*OPTIONS.split(), "--record", str(record), "--disable_stdout", "--disable_log"]
+        if roads is not None:
+            command += ["--path", str(roads.resolve())]
         done = subprocess.run(command, cwd=folder, timeout=60, check=False, capture_output=True)
         if not record.exists() or done.returncode not in (0, 255):
             raise RuntimeError(f"esmini does not play {file.name} (exit {done.returncode})")

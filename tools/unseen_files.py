@@ -5,7 +5,8 @@
 
 Each folder inside FOLDER is one repository, named OWNER+NAME, with its scenarios and roads. `choose`
 takes the files that are valid (see openscenario_corpus) and whose content is not in `--known`, of
-files whose names differ in numbers alone the first eight; it plays nothing. `count` plays the files of a list, each for 20 s, and compares them with esmini.
+files whose names differ in numbers alone the first eight; it plays nothing. `count` plays the files of
+a list, each for 20 s, and compares them with esmini.
 """
 
 from __future__ import annotations
@@ -154,7 +155,7 @@ def count(given: argparse.Namespace) -> None:
         if given.esmini is None:
             continue
         try:
-            reference = run_esmini(given.esmini, file)
+            reference = run_esmini(given.esmini, file, given.towns)
         except (RuntimeError, subprocess.SubprocessError, StopIteration, ValueError):
             continue
         compared += 1
@@ -193,6 +194,9 @@ def main() -> None:
     parser.add_argument("--commits", type=Path, help="lines of: OWNER+NAME COMMIT")
     parser.add_argument("--list", type=Path, default=Path("unseen.csv"))
     parser.add_argument("--esmini", type=Path)
+    parser.add_argument(
+        "--towns", type=Path, help="count: a folder of roads by bare name for esmini"
+    )
     given = parser.parse_args()
     if given.what == "choose":
         lines = given.commits.read_text().splitlines() if given.commits else []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,9 @@ from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.log_files import read_log
 
 pytest.importorskip("osi3", reason="needs the extra osi")
+
+from support.osi_rules import broken_rules, read_rules
+
 COLOURS = {2: LightState.RED, 3: LightState.YELLOW, 4: LightState.GREEN}  # Classification.Color
 HEAVY = 7  # EnvironmentalConditions.Precipitation: 34 to 149 mm/h
 
@@ -137,3 +141,36 @@ def test_another_name_or_a_folder_that_is_not_there_is_one_sentence(driven, tmp_
     assert done.exception is not None
     assert "ends in .osi" in str(done.exception) or "ends in .osi" in done.output
     assert not (tmp_path / "s").exists()
+
+
+def test_a_drive_in_town_breaks_none_of_asams_rules_for_osi(trace):
+    rules = read_rules()
+    assert sum(len(lines) for fields in rules.values() for lines in fields.values()) > 150
+    said = Counter(what for m in trace for what in broken_rules(rules, m))
+    assert not said, said.most_common(5)
+
+
+def pair_with_no_lane(m):
+    pairs = next(k.classification.lane_pairing for k in m.lane if k.classification.lane_pairing)
+    pairs[0].antecessor_lane_id.value = 10**9
+
+
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (lambda m: m.moving_object[0].ClearField("id"), "MovingObject.id: is_set"),
+        (lambda m: m.moving_object.add().CopyFrom(m.moving_object[0]), "id: is_globally_unique"),
+        (
+            lambda m: setattr(m.moving_object[0].base.dimension, "length", -1.0),
+            "Dimension3d.length",
+        ),
+        (lambda m: setattr(m.timestamp, "nanos", 10**9), "Timestamp.nanos"),
+        (pair_with_no_lane, "refers_to: Lane"),
+        (lambda m: m.moving_object[0].ClearField("vehicle_attributes"), "check_if this.type"),
+    ],
+)
+def test_what_breaks_a_rule_of_asams_is_found(trace, spoil, says):
+    message = type(trace[0])()
+    message.CopyFrom(trace[0])
+    spoil(message)
+    assert says in " ".join(broken_rules(read_rules(), message))

@@ -185,3 +185,15 @@ def test_a_crosswalk_of_two_corners_stops_no_run():
 
     line, area = np.zeros((2, 3)), np.array([[0, 0, 0], [4, 0, 0], [4, 3, 0], [0, 3, 0]], float)
     assert len(_zebras(Roadside(crosswalks=(line, area)))) == 1
+
+
+def test_a_text_with_a_dollar_that_is_no_reference_is_a_text(tmp_path):
+    """The schema's pattern of a reference is `$` and one name; a text may begin with `$` otherwise."""
+    file = write(tmp_path)
+    plain = file.read_text()
+    held = '<Properties><Property name="color" value="{}"/></Properties>'
+    for value, faults in (("$a,$b,255", 0), ("$a", 1)):
+        file.write_text(plain.replace("<Properties/>", held.format(value), 1))
+        said = [str(f) for f in check(file).findings if f.kind is Kind.ERROR]
+        assert len(said) == faults
+    assert "parameter '$a' is not declared" in said[0]

@@ -16,6 +16,7 @@ from skidpad.recording.formats.osi_udp import PART, message_parts, read_address,
 from skidpad.roads.bundled import load_map
 from skidpad.roads.lanes import LaneKind, Marking, SignalKind
 from skidpad.scenarios.export.osi_road import FIRST_LANE, STEP, Tilt, road_truth
+from support.osi_rules import broken_rules, read_rules
 
 
 @pytest.fixture(scope="module")
@@ -45,6 +46,15 @@ def test_every_reference_is_there_and_every_id_is_of_one_message(town):
     assert used == boundaries
     for sign in truth.traffic_sign:
         assert {i.value for i in sign.main_sign.classification.assigned_lane_id} <= lanes
+
+
+@pytest.mark.parametrize("name", ["town", "motorway", "figure8"])
+def test_a_road_breaks_none_of_asams_rules_for_osi(name):
+    truth = road_truth(load_map(name))
+    parts = [*truth.lane, *truth.lane_boundary, *truth.traffic_sign]
+    assert len(parts) > 10
+    said = [what for what in broken_rules(read_rules(), truth) if "GroundTruth." not in what]
+    assert not said, said[:5]
 
 
 def test_boundaries_lie_half_a_width_beside_the_middle_and_are_shared(town):

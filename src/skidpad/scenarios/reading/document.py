@@ -123,9 +123,11 @@ class Node:
                 raise self.error(f"{name}: {value}: {error}") from None
         if not value.startswith("$"):
             return value
-        if value[1:] not in self.values:
+        if value[1:] in self.values:
+            return self.values[value[1:]]
+        if value[1:].isidentifier():
             raise self.error(f"{name}: parameter {value!r} is not declared")
-        return self.values[value[1:]]
+        return value  # no reference by the pattern of the schema, such as `$a,$b,255`
 
     def number(self, name: str, default: float | None = None) -> float:
         """Returns an attribute as a finite number; raises a Fault for anything else."""

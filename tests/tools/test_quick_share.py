@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
+import sqlite3
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import pytest
+from coverage import CoverageData
 
 import quick_share
 
@@ -37,6 +40,17 @@ def test_a_package_has_the_lines_of_all_pieces():
         "all": (3, 10, "0.300"),
     }  # fmt: skip
     assert rows["core"]["commit"] == "abc"
+
+
+def test_a_file_that_a_killed_process_left_unfinished_adds_no_line(tmp_path):
+    """Its first table is there and empty: coverage.py says that it is no data file."""
+    module = quick_share.PACKAGE / "core" / "a.py"
+    data = CoverageData(str(tmp_path / "data.whole"))
+    data.add_lines({str(module): [3, 1]})
+    data.write()
+    with closing(sqlite3.connect(tmp_path / "data.killed")) as file:
+        file.execute("create table coverage_schema (version integer)")
+    assert quick_share.read_lines(tmp_path) == {"core/a.py": [1, 3]}
 
 
 def test_every_test_file_is_in_one_piece():

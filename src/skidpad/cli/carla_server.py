@@ -10,6 +10,7 @@ import typer
 
 from skidpad.cli.options.spread import spread_fields
 from skidpad.core.errors import MissingExtra, require_choice
+from skidpad.core.vocabulary import Govern
 from skidpad.simulation.carla_server.options import ServerOptions
 
 
@@ -23,6 +24,11 @@ def carla_server(options: ServerOptions) -> None:
     from skidpad.simulation.carla_server.maps.maps import MapStore
 
     require_choice("--map", options.map.rsplit("/", 1)[-1], MapStore(options.maps).names())
+    egos = None
+    if options.govern is not Govern.NONE:
+        from skidpad.campaign.driving.served_egos import GovernedEgos
+
+        egos = GovernedEgos(options.govern, options.seed)
     from skidpad.simulation.carla_server.server import CarlaServer, Ports
     from skidpad.simulation.carla_server.warming import start_compiling
 
@@ -35,6 +41,7 @@ def carla_server(options: ServerOptions) -> None:
 
     helper = start_compiling(options, say)
     server = CarlaServer(options)
+    server.served.before_tick = egos
 
     def ready(ports: Ports) -> None:
         typer.echo(

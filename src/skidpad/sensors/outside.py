@@ -36,10 +36,15 @@ def make_thermometer(spec: PointSensorSpec, host: SensorHost) -> Callable[[], fl
 
     The error, up to ERROR_C to either side, is drawn once per run.
     """
-    error = stream(host.seed, f"{spec.id}/error").uniform(-ERROR_C, ERROR_C)
+    error = thermometer_error(host.seed, spec.id)
+    return lambda: read_thermometer(host.setup.weather.air_temperature_c, error)
 
-    def read() -> float:
-        air = host.setup.weather.air_temperature_c + error
-        return STEP_C * floor(air / STEP_C + 0.5)
 
-    return read
+def thermometer_error(seed: int, id: str) -> float:
+    """Returns the error in K that a thermometer of this id has in a whole run."""
+    return stream(seed, f"{id}/error").uniform(-ERROR_C, ERROR_C)
+
+
+def read_thermometer(air_c: float, error: float) -> float:
+    """Returns what a thermometer with an error in K shows of the air, in steps of STEP_C; both in deg C."""
+    return STEP_C * floor((air_c + error) / STEP_C + 0.5)

@@ -34,7 +34,16 @@ def choose_envelope(spec: RunSpec, setup: Setup) -> EnvelopeSettings | None:
     """Returns the settings of the run's envelope; None: it has none."""
     own = isinstance(spec.driver, AdasDriver) and spec.driver.envelope
     kind = Govern.ENVELOPE if own and spec.govern is Govern.NONE else spec.govern
-    plain = EnvelopeSettings(dt=setup.dt, seed=spec.seed)
+    found = describe_envelope(kind, setup.dt, spec.seed)
+    if found is None or kind is not Govern.ORACLE:
+        return found
+    params = road_of(setup).params()
+    return replace(found, oracle=lambda v: float(mu_at(params, v)))
+
+
+def describe_envelope(kind: Govern, dt: float, seed: int) -> EnvelopeSettings | None:
+    """Returns the settings of a word of --govern, those of an oracle without its grip; None: no envelope."""
+    plain = EnvelopeSettings(dt=dt, seed=seed)
     if kind in LIMITS:
         return replace(plain, limits=frozenset({LIMITS[kind]}))
     match kind:
@@ -52,7 +61,4 @@ def choose_envelope(spec: RunSpec, setup: Setup) -> EnvelopeSettings | None:
             return replace(plain, pulses=True)
         case Govern.FULL:
             return replace(plain, lanes=True, walkers=True, bridges=True)
-        case Govern.ORACLE:
-            params = road_of(setup).params()
-            return replace(plain, oracle=lambda v: float(mu_at(params, v)))
     return replace(plain, factor=GRIP_FACTORS.get(kind, 1.0))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from skidpad.core.vocabulary import Bodywork, GripModel, Scenery
+from skidpad.core.vocabulary import Bodywork, Govern, GripModel, Scenery
 
 MU_REF = 1.5  # of a tyre with tire_friction 3.5 on a dry road, near CARLA's (decision K-3)
 
@@ -38,6 +38,13 @@ class ServerOptions(Struct, frozen=True, kw_only=True):
     mu_ref: Annotated[
         float, Meta(ge=0.05, le=3.0, description="Friction at tire_friction 3.5 on dry road.")
     ] = MU_REF
+    govern: Annotated[
+        Govern,
+        Meta(
+            description="Keep vehicles with the role_name hero, ego or ego_vehicle inside the speed "
+            "envelope, whatever program drives them; as for skidpad adas, without oracle and full."
+        ),
+    ] = Govern.NONE
     seed: Annotated[int, Meta(description="Seed of sensor noise.")] = 0
     strict: Annotated[bool, Meta(description="Report unknown calls; exit with 1.")] = False
     record_calls: Annotated[Path | None, Meta(description="Write every call here.")] = None

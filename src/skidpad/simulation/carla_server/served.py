@@ -41,6 +41,8 @@ class Served:
             False  # the request at hand came right after a batch of the same client
         )
         self.before_sensing: Callable[[], None] | None = None  # once, before the first reading
+        # called with frame and step in s before each tick: what holds vehicles back
+        self.before_tick: Callable[[Episode, int, float], None] | None = None
         self.last_snapshot: bytes | None = None
         self._map_changed = True  # until the first snapshot of the episode has been sent
         self._lights_told: dict[int, LightState] = {}
@@ -79,6 +81,8 @@ class Served:
     def tick(self) -> int:
         """Advances by one step, publishes snapshot and sensors, and returns the new frame's number."""
         clock, episode = self.clock, self.episode
+        if self.before_tick is not None:
+            self.before_tick(episode, clock.frame, clock.step)
         clock.advance()
         episode.move(clock.step)
         self.replayer.tick(clock.step)

@@ -60,6 +60,8 @@ class Vehicle:
     sticky: bool = True  # a control holds until the next one; else for one tick
     pushed: float = 0.0  # s for which a push still frees it
     lights: int = 0  # VehicleLightState flags
+    most_throttle: float = 1.0  # with which it drives, whatever its client asks for
+    least_brake: float = 0.0
     speed_limit: float = 30.0 / 3.6  # m/s; CARLA's default until the first sign
 
     def command(self, slow: bool, dt: float) -> tuple[float, float, float, bool, bool]:
@@ -69,8 +71,9 @@ class Vehicle:
         slow: below STICKY_SPEED, where it is held without throttle unless it was pushed.
         """
         c = self.control
-        throttle = 0.0 if c.manual and c.gear == 0 else c.throttle
-        brake = 1.0 if throttle == 0.0 and self._sticks(slow, dt) else c.brake
+        throttle = 0.0 if c.manual and c.gear == 0 else min(c.throttle, self.most_throttle)
+        brake = max(c.brake, self.least_brake)
+        brake = 1.0 if throttle == 0.0 and self._sticks(slow, dt) else brake
         return throttle, brake, c.steer, c.hand_brake, c.reverse or (c.manual and c.gear < 0)
 
     def gear(self, speed: float) -> int:

@@ -1,4 +1,4 @@
-"""The evaluation of the channels, whole: drive, train, validate, report, and the tables of its page.
+"""The evaluation of the channels, whole: drive, train, validate, report, and the tables of its pages.
 
     python tools/channels_campaign.py --out out/channels --hours 50        # about 1.5 h on two cores
     python tools/channels_campaign.py --out out/channels --hours 50 --publish
@@ -13,8 +13,9 @@ and `ice` are looked at once. Then the arbiter and each channel alone drive the 
 for redundancy. At last every rule and every variant that was tried is judged on hours of their own
 (`monitor_drives`), of which only rows of counts stay. What is done is not done again, so a campaign that
 was stopped goes on; `--only hazards`, `--only redundancy` or `--only rules` drives one of the three.
-`--publish` writes docs/results/channels and the tables of docs/channels-evaluation.md, and says what was
-driven at which commit; with `--only rules --stop-after 0` it publishes the rows that are there.
+`--publish` writes docs/results/channels and the tables of docs/channels-evaluation.md and
+docs/channels-tables.md, and says what was driven at which commit; with `--only rules --stop-after 0` it
+publishes the rows that are there.
 """
 
 from __future__ import annotations

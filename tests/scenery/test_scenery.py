@@ -18,7 +18,7 @@ from skidpad.roads.bundled import bundled_maps, load_map
 from skidpad.roads.lanes import LaneKind, Marking
 from skidpad.roads.opendrive.bake import bake
 from skidpad.roads.queries import RoadMap
-from skidpad.roads.roadside import Shape
+from skidpad.roads.roadside import UNPAINTED, Shape
 from skidpad.roads.walkable import walk_mesh
 from skidpad.scenery.dressing import (
     LOWER_EDGE,
@@ -105,8 +105,14 @@ def test_none_is_the_map_itself_and_full_leaves_the_roads_as_they_are() -> None:
     assert dressed.lanes is road_map.lanes
     assert dressed.signals is road_map.signals
     own = dressed.roadside.boxes[: len(road_map.roadside.boxes)]
-    bare = tuple(replace(b, shape=Shape.BOX, variant=0) for b in own)
-    assert bare == road_map.roadside.boxes  # buildings of the file have windows, where they stood
+    given = road_map.roadside.boxes
+    bare = [
+        replace(b, shape=Shape.BOX, variant=0, rgb=g.rgb) for b, g in zip(own, given, strict=True)
+    ]
+    assert bare == list(given)  # buildings of the file have windows, where they stood
+    painted = [b.rgb for b, g in zip(own, given, strict=True) if b.rgb != g.rgb]
+    assert len(set(painted)) > 3
+    assert {g.rgb for b, g in zip(own, given, strict=True) if b.rgb != g.rgb} == {UNPAINTED}
     assert {b.shape for b in own if b.label == SemanticClass.BUILDING} == {Shape.BLOCK}
     assert dressed.content_hash != road_map.content_hash
     changed = [

@@ -45,6 +45,7 @@ class Seen:
         self.rgb = images["rgb"].rgb.astype(int)
         self.labels = images["semantic"].labels.copy()
         self.depth = images["depth"].inverse_depth.copy()
+        self.instance = (suite._pass_of["rgb"].key >> 16).copy()
         self.material = (suite._pass_of["rgb"].key & 255).copy()
         self.suite = suite
 
@@ -66,11 +67,43 @@ def test_clouds_change_the_sky_only_and_drift():
     assert not both(Weather(cloudiness=0.0), Extra.CLOUDS)[2].any()
 
 
+def test_stars_shine_in_a_clear_night_sky_only():
+    plain, added, changed = both(preset("clear-night"), Extra.CLOUDS)
+    sky = plain.labels == SemanticClass.SKY
+    assert 10 < changed.sum() < 0.05 * sky.sum()
+    assert not changed[~sky].any()
+    assert (added.rgb >= plain.rgb).all()
+    assert not both(preset("rain-night"), Extra.CLOUDS)[2].any()
+
+
+def test_edges_are_softened_where_two_surfaces_meet_and_nowhere_else():
+    plain, added, changed = both(preset("clear-noon"), Extra.EDGES)
+    seen = plain.labels.astype(int) << 16 | plain.instance << 8 | plain.material
+    edge = np.zeros(seen.shape, dtype=bool)
+    for axis in (0, 1):
+        differs = np.diff(seen, axis=axis) != 0
+        before, behind = [slice(None)] * 2, [slice(None)] * 2
+        before[axis], behind[axis] = slice(None, -1), slice(1, None)
+        edge[tuple(before)] |= differs
+        edge[tuple(behind)] |= differs
+    assert not changed[~edge].any()
+    assert changed[edge].mean() > 0.8
+
+    def steepest(rgb):
+        return np.percentile(np.abs(np.diff(rgb, axis=1)).max(axis=2)[edge[:, 1:]], 90)
+
+    assert steepest(added.rgb) < 0.8 * steepest(plain.rgb)
+
+
 def test_snow_lies_on_the_road_for_people_only():
     plain, added, changed = both(preset("snow"), Extra.SNOW)
     asphalt = plain.material == Material.ASPHALT
     assert changed[asphalt].all()
-    assert not changed[~asphalt & (plain.material != Material.MARKING)].any()
+    others = ~asphalt & (plain.material != Material.MARKING)
+    vehicles = plain.instance > 0
+    assert vehicles.any()
+    assert not changed[vehicles | (plain.labels == SemanticClass.SKY)].any()
+    assert changed[others].mean() < 0.1, "elsewhere it lies on what looks up only"
     assert added.rgb[asphalt].mean() > plain.rgb[asphalt].mean() + 40.0
     assert not both(preset("clear-noon"), Extra.SNOW)[2].any()
 

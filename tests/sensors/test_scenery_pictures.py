@@ -15,11 +15,13 @@ from skidpad.roads.roadside import Box, Shape
 from skidpad.scenery.dressing import dress_map
 from skidpad.sensors.finish.extras import ALL_EXTRAS
 from skidpad.sensors.pictures.roughness import COARSE_SIZE, SIZE, make_tiles
+from skidpad.sensors.pictures.settled_snow import NOTHING_SETTLES
 from skidpad.sensors.scene.grain import NO_GRAIN
-from skidpad.sensors.scene.materials import Material
+from skidpad.sensors.scene.materials import ASPHALTS, FIELDS, Material
+from skidpad.sensors.scene.mesh import Mesh
 from skidpad.sensors.scene.road_mesh import road_pieces
 from skidpad.sensors.scene.shapes import shape_levels
-from skidpad.sensors.scene.static import build_scene
+from skidpad.sensors.scene.static import build_scene, ground_pieces
 from skidpad.sensors.scene.street_light import NO_STREET_LIGHT, street_light_of
 from skidpad.sensors.suite import PixelSettings, PixelSuite
 from support.sensors.worlds import states_at, table_of
@@ -27,10 +29,10 @@ from support.sensors.worlds import states_at, table_of
 EYE = Pose(0.5, 0.0, 1.5)
 
 
-def look(scenery: Scenery, lane: int, share: float, weather: str = "clear-noon"):
+def look(scenery: Scenery, lane: int, share: float, weather: str = "clear-noon", eye: Pose = EYE):
     """Returns colours, classes and inverse depth from a place on a lane of the town."""
     road_map = dress_map(load_map("town"), scenery)
-    cameras = [CameraSpec(m.value, m, 400, 300, 90.0, EYE) for m in list(Modality)[:3]]
+    cameras = [CameraSpec(m.value, m, 400, 300, 90.0, eye) for m in list(Modality)[:3]]
     settings = PixelSettings(extras=ALL_EXTRAS, in_cockpit=False)
     suite = PixelSuite(road_map, table_of([]), cameras, preset(weather), settings)
     row = int(road_map.lanes.first[lane] + share * (road_map.lanes.size[lane] - 1))
@@ -68,7 +70,7 @@ def test_a_street_shows_buildings_trees_and_posts_that_it_did_not_have() -> None
 
 def test_grain_changes_colours_only() -> None:
     suite, rgb, labels, depth = look(Scenery.FULL, 3, 0.5)
-    assert suite.shading._grain.shape == (256, 4)
+    assert suite.shading._grain.shape == (256, 5)
     suite.shading._grain = NO_GRAIN
     ego = suite._ego
     plain = suite.observe(1, states_at([(ego.x, ego.y, ego.z, ego.yaw)]), {}).images
@@ -81,7 +83,7 @@ def test_grain_changes_colours_only() -> None:
 def test_without_scenery_there_is_no_grain() -> None:
     road_map = load_map("town")
     scene = build_scene(road_map.samples, road_map.lanes, road_map.roadside)
-    assert scene.grain.shape == (0, 4)
+    assert scene.grain.shape == (0, 5)
 
 
 def test_every_shape_stays_in_its_box_and_farther_levels_have_no_more_triangles() -> None:
@@ -110,20 +112,65 @@ def test_colours_are_spread_more_evenly_than_without(lane: int, share: float) ->
     assert full < 0.5 * plain
 
 
-def test_new_and_worn_asphalt_differs_in_material_only() -> None:
+def test_age_and_tracks_of_asphalt_differ_in_material_only() -> None:
     road_map = load_map("town")
-    even = [m[0] for _, m in road_pieces(road_map.samples, road_map.lanes)]
-    aged = [m[0] for _, m in road_pieces(road_map.samples, road_map.lanes, ages=True)]
-    found = set()
+    even = [m for _, m in road_pieces(road_map.samples, road_map.lanes)]
+    aged = [m for _, m in road_pieces(road_map.samples, road_map.lanes, ages=True)]
+    near, far = set(), set()
     for a, b in zip(even, aged, strict=True):
-        assert np.array_equal(a.vertices, b.vertices)
-        assert np.array_equal(a.label, b.label)
-        differs = a.material != b.material
-        assert set(a.material[differs].tolist()) <= {Material.ASPHALT}
-        found |= set(b.material[differs].tolist())
-    assert found == {Material.NEW_ASPHALT, Material.WORN_ASPHALT}
+        assert np.array_equal(a[2].vertices, b[2].vertices)  # too far away for tracks
+        differs = a[2].material != b[2].material
+        assert set(a[2].material[differs].tolist()) <= {Material.ASPHALT}
+        far |= set(b[2].material[differs].tolist())
+        assert set(a[0].label.tolist()) == set(b[0].label.tolist())
+        road = [np.isin(m[0].material, ASPHALTS) for m in (a, b)]
+        area = [_area_of(m[0], rows) for m, rows in zip((a, b), road, strict=True)]
+        assert area[1] == pytest.approx(area[0], rel=1e-6), "strips fill the lane and no more"
+        near |= set(b[0].material[road[1]].tolist())
+    assert far == {Material.NEW_ASPHALT, Material.WORN_ASPHALT}
+    assert near == set(ASPHALTS)
     plain = build_scene(road_map.samples, road_map.lanes, road_map.roadside)
-    assert not found & set((plain.chunks.key & 255).tolist())
+    assert not (near - {Material.ASPHALT}) & set((plain.chunks.key & 255).tolist())
+
+
+def _area_of(mesh: Mesh, rows: np.ndarray) -> float:
+    """Returns the area in m2 of these triangles."""
+    a, b, c = (mesh.vertices[mesh.triangles[rows, n]] for n in range(3))
+    return float(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+
+
+def test_fields_lie_away_from_the_roads_and_on_dressed_maps_only() -> None:
+    road_map = load_map("figure8")
+    at = np.stack([road_map.samples.x, road_map.samples.y], axis=1)[::20]
+    found = set()
+    for sown in (False, True):
+        for _, (mesh, *_) in ground_pieces(road_map.samples, fields=sown):
+            used = set(mesh.material.tolist()) - {Material.GRASS}
+            assert sown or not used
+            if used:
+                middle = mesh.vertices[:, :2].mean(axis=0)
+                assert np.hypot(*(at - middle).T).min() > 60.0
+            found |= used
+    assert found == set(FIELDS)
+
+
+def test_snow_lies_on_roofs_and_crowns_and_not_on_walls() -> None:
+    lifted = Pose(-20.0, 0.0, 25.0, pitch=0.5)
+    suite, rgb, labels, _ = look(Scenery.FULL, 3, 0.5, "snow", lifted)
+    suite.shading._settling = NOTHING_SETTLES
+    ego = suite._ego
+    bare = suite.observe(0, states_at([(ego.x, ego.y, ego.z, ego.yaw)]), {}).images["rgb"].rgb
+    paler = rgb.astype(int).mean(axis=2) - bare.astype(int).mean(axis=2) > 40
+    for kind in (SemanticClass.VEGETATION, SemanticClass.BUILDING):
+        assert 0.05 < paler[labels == kind].mean() < 0.9, kind
+    assert not paler[labels == SemanticClass.ROAD].any()
+
+
+def test_by_day_no_pane_tells_that_it_will_be_lit() -> None:
+    for weather, alike in (("clear-noon", True), ("clear-night", False)):
+        table = look(Scenery.FULL, 3, 0.5, weather)[0].shading._table
+        same = np.array_equal(table[Material.LIT_WINDOW, :4], table[Material.GLASS, :4])
+        assert same == alike
 
 
 def test_noise_of_surfaces_repeats_without_a_seam() -> None:
@@ -150,3 +197,17 @@ def test_street_lamps_light_the_ground_at_night_only_and_fade_as_a_point_of_ligh
         road = np.isin(labels, [SemanticClass.ROAD, SemanticClass.SIDEWALK, SemanticClass.TERRAIN])
         gained = rgb[road].astype(int).mean() - dark[road].astype(int).mean()
         assert (gained > 2.0) if brighter else gained == 0.0
+
+
+def test_street_lamps_are_seen_shining_at_night_and_not_by_day() -> None:
+    for weather, shining in (("clear-noon", False), ("rain-night", True)):
+        suite, *_ = look(Scenery.FULL, 3, 0.5, weather)
+        boxes = dress_map(load_map("town"), Scenery.FULL).roadside.boxes
+        lamps = [b for b in boxes if b.shape is Shape.LAMP]
+        places = np.array([(b.x, b.y, b.z) for b in lamps])
+        sources = suite._finish._sources
+        at = np.stack([sources.x, sources.y, sources.z], axis=1)
+        on = (np.abs(places[:, None] - at[None]).max(axis=2) < 1e-6).any(axis=1)
+        near = np.hypot(places[:, 0] - suite._ego.x, places[:, 1] - suite._ego.y) < 100.0
+        assert near.any()
+        assert on[near].all() if shining else not on.any()

@@ -45,7 +45,8 @@ EXTRAS = {
     Extra.LAMPS: "bloom of lamps",
     Extra.REFLECTIONS: "lamps on a wet road",
     Extra.RETRO: "reflective signs, lines",
-    Extra.CLOUDS: "clouds",
+    Extra.CLOUDS: "clouds, stars",
+    Extra.EDGES: "soft edges",
     Extra.SNOW: "snow on the road",
     Extra.CALM: "less camera noise",
 }

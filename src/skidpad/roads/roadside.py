@@ -45,6 +45,9 @@ class Shape(IntEnum):
     SIGN = 12  # a plate whose variant is its number of corners
 
 
+UNPAINTED = (150, 140, 130)  # of buildings, whose colour no file says
+
+
 @dataclass(frozen=True, slots=True)
 class Box:
     """A building, a gantry leg or beam, a pole, a sign plate: an upright box."""

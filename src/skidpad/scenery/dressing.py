@@ -15,12 +15,12 @@ from skidpad.core.randomness import stream, stream_key
 from skidpad.core.vocabulary import Scenery, SemanticClass
 from skidpad.roads.lanes import LaneKind, LaneSamples, LaneTable, Marking, SignalKind, SignalTable
 from skidpad.roads.queries import RoadMap
-from skidpad.roads.roadside import Box, Roadside, Shape
+from skidpad.roads.roadside import UNPAINTED, Box, Roadside, Shape
 from skidpad.roads.terrain import Terrain, terrain_of
 from skidpad.scenery.free_ground import FreeGround
 from skidpad.scenery.rows import backdrop_of, rows_of
 from skidpad.scenery.sides import sides_of
-from skidpad.scenery.things import STOREY, Thing
+from skidpad.scenery.things import STOREY, WALLS, Thing
 
 PLATE = 0.7  # m, German size 2 is 0.6 m for discs and 0.9 m for others (VwV-StVO, table 2)
 LOWER_EDGE = 2.0  # m above the road, VwV-StVO to sections 39 to 43, III 13 a
@@ -94,7 +94,7 @@ def boxes_of(things: Sequence[Thing], terrain: Terrain) -> list[Box]:
 
 
 def add_facade(box: Box) -> Box:
-    """Returns a building box as a BLOCK with windows, of the same place and size.
+    """Returns a building box as a painted BLOCK with windows, of the same place and size.
 
     Returned unchanged: what is no building, has no room for a storey, or a side below LEAST_FRONT m.
     """
@@ -106,7 +106,8 @@ def add_facade(box: Box) -> Box:
     ):
         return box
     seed = stream_key(0, "facade", f"{box.x:.2f}", f"{box.y:.2f}")
-    return replace(box, shape=Shape.BLOCK, variant=seed % (1 << 16) * 16 + storeys)
+    rgb = WALLS[seed % len(WALLS)] if box.rgb == UNPAINTED else box.rgb
+    return replace(box, shape=Shape.BLOCK, rgb=rgb, variant=seed % (1 << 16) * 16 + storeys)
 
 
 def count_things(things: Sequence[Thing]) -> dict[str, int]:

@@ -15,7 +15,7 @@ from skidpad.roads.opendrive.bridges import bridges_of
 from skidpad.roads.opendrive.document import Document, Node, Reader, RoadRecord
 from skidpad.roads.opendrive.lane_shapes import LaneShape
 from skidpad.roads.opendrive.signals import road_place, signal_heads
-from skidpad.roads.roadside import Barrier, BarrierKind, Box, ParkingSpace, Roadside
+from skidpad.roads.roadside import UNPAINTED, Barrier, BarrierKind, Box, ParkingSpace, Roadside
 
 BARRIER_STEP = 2.0  # m between the points of a barrier; 7 mm of chord at R 70
 REPEATS_MAX = 1_000_000  # of one object
@@ -42,7 +42,7 @@ BARRIER_HEIGHTS = {
     BarrierKind.FENCE: 1.2,
 }
 LABELS = {
-    "building": (SemanticClass.BUILDING, (150, 140, 130)),
+    "building": (SemanticClass.BUILDING, UNPAINTED),
     "pole": (SemanticClass.POLE, (120, 120, 125)),
     "streetLamp": (SemanticClass.POLE, (120, 120, 125)),
     "gantry": (SemanticClass.STATIC, (110, 112, 118)),

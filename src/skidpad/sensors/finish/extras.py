@@ -12,7 +12,8 @@ class Extra(str, Enum):
     LAMPS = "lamps"  # bloom of head, tail and brake lamps and of traffic lights
     REFLECTIONS = "reflections"  # of those lamps on a wet road
     RETRO = "retro"  # markings, signs and plates send the headlights back
-    CLOUDS = "clouds"
+    CLOUDS = "clouds"  # and stars, where there are few of them at night
+    EDGES = "edges"  # softened where one surface meets another
     SNOW = "snow"  # on the road, not only beside it
     CALM = "calm"  # less of the published camera effect, so that a night can be read
 

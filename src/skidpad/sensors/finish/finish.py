@@ -13,6 +13,7 @@ from skidpad.core.vocabulary import Bodywork, LightState
 from skidpad.core.weather import Weather
 from skidpad.roads.roadside import Roadside
 from skidpad.sensors.finish.clouds import DRIFT, SIZE, draw_clouds, layer_of
+from skidpad.sensors.finish.edges import soften_edges
 from skidpad.sensors.finish.extras import Extra
 from skidpad.sensors.finish.glow import shine
 from skidpad.sensors.finish.lamps import Lamps
@@ -26,6 +27,7 @@ from skidpad.sensors.finish.shadows import (
     shade_of,
     standing,
 )
+from skidpad.sensors.finish.stars import STARS, draw_stars, starlight_of
 from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.pictures.shading import ROADLIKE
 from skidpad.sensors.raster.passes import Pass
@@ -50,7 +52,7 @@ class Finish:
     ) -> None:
         self._table, self._dt = table, dt
         self._furniture = standing(roadside.boxes)
-        self._lamps = Lamps(table, roadside.heads, bodywork)
+        self._lamps = Lamps(table, roadside.heads, bodywork, roadside.boxes)
 
     def look_out(self, weather: Weather, light: Lighting) -> None:
         """Sets what the pictures take from the weather and its light."""
@@ -58,6 +60,7 @@ class Finish:
         self._shade = shade_of(light)
         self._gains = gains(light)
         self._layer = layer_of(weather, light)
+        self._stars = starlight_of(weather, light)
         self._wet = light.wet * (1.0 - light.snow) if light.wet > LEAST_WET else 0.0
         self._drift = DRIFT * self._dt * (0.2 + 0.8 * weather.wind_intensity / 100.0)
 
@@ -83,12 +86,16 @@ class Finish:
         if Extra.CLOUDS in extras and self._layer.strength > 0.0:
             shift = (self._drift * self._tick) % SIZE
             draw_clouds(view, self._layer, shift, inverse, out)
+        if Extra.CLOUDS in extras and self._stars > 0.0:
+            draw_stars(view, STARS, self._stars, inverse, out)
         if Extra.SHADOWS in extras:
             self._bodies.present[0] = own
             for bodies, reach in ((self._near, STANDING_REACH), (self._bodies, REACH)):
                 cast_shadows(view, bodies, self._shade, reach, GROUND_MASK, inverse, key, out)
         if Extra.RETRO in extras and light.headlights > 0.0 and light.lamps > 0.0:
             send_back(view, self._ego, light, self._gains, inverse, key, out)
+        if Extra.EDGES in extras:
+            soften_edges(view, key, out)
         bloom, wet = Extra.LAMPS in extras, self._wet if Extra.REFLECTIONS in extras else 0.0
         if bloom or wet > 0.0:
             shine(view, self._sources, bloom, wet, light.air, WETTABLE, inverse, key, out)

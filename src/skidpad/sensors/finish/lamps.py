@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from skidpad.core.arrays import Floats
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind, Bodywork, LightState
-from skidpad.roads.roadside import SignalHead
+from skidpad.roads.roadside import Box, Shape, SignalHead
 from skidpad.sensors.pictures.lighting import Lighting
+from skidpad.sensors.scene.street_light import HEIGHT as HEIGHT_OF_STREET_LAMPS
 
 HEAD, TAIL, BRAKE = (1.0, 0.93, 0.78), (0.55, 0.02, 0.02), (1.0, 0.05, 0.03)
 SIGNAL = {
@@ -25,6 +26,8 @@ SIGNAL = {
 }
 INDICATOR, INDICATOR_POWER = (1.0, 0.42, 0.02), 2.4
 HEAD_POWER, TAIL_POWER, BRAKE_POWER, SIGNAL_POWER = 5.0, 1.6, 3.2, 1.2
+STREET, STREET_POWER, STREET_SIZE = (1.0, 0.86, 0.60), 1.5, 0.15
+STREET_REACH = 160.0  # m from the ego, of street lamps that are drawn shining
 BY_DAY = 0.25  # share of the bloom that is left in daylight
 HEIGHT = {ActorKind.CAR: 0.40, ActorKind.VAN: 0.31, ActorKind.TRUCK: 0.23, ActorKind.BUS: 0.22}
 SHAPED_HEIGHT = {ActorKind.CAR: 0.49, ActorKind.VAN: 0.37, ActorKind.MOTORCYCLE: 0.56}
@@ -60,7 +63,12 @@ class Lamps:
         table: ActorTable,
         heads: Sequence[SignalHead],
         bodywork: Bodywork = Bodywork.PLAIN,
+        boxes: Sequence[Box] = (),
     ) -> None:
+        """boxes: of what stands beside the road; street lamps among them shine at night."""
+        self._street = np.array(
+            [(b.x, b.y, b.z) for b in boxes if b.shape is Shape.LAMP], dtype=np.float64
+        ).reshape(-1, 3)
         kinds = [ActorKind(int(k)) for k in table.kind]
         shaped = bodywork is Bodywork.SHAPED
         heights, side = (HEIGHT | SHAPED_HEIGHT, 0.37) if shaped else (HEIGHT, 0.32)
@@ -96,7 +104,23 @@ class Lamps:
                 parts += [
                     self._of_vehicles(states, end, on_side, turn, side) for end in (1.0, -1.0)
                 ]
+        if light.lamps > 0.0 and len(self._street):
+            parts.append(self._of_the_street(states, STREET_POWER * float(light.lamps)))
         return _stack(parts)
+
+    def _of_the_street(self, states: ActorStates, power: float) -> Sources:
+        """Returns the street lamps around the ego; each shines to all sides, so it faces the ego."""
+        away = self._street - (states.x[0], states.y[0], states.z[0])
+        far = np.hypot(away[:, 0], away[:, 1])
+        near = far < STREET_REACH
+        x, y, z = self._street[near].T
+        n = len(x)
+        toward = -away[near, :2] / np.maximum(far[near], 1e-6)[:, None]
+        colour = np.broadcast_to(np.multiply(STREET, power), (n, 3))
+        return Sources(
+            x, y, z, z - HEIGHT_OF_STREET_LAMPS, toward[:, 0], toward[:, 1],
+            np.full(n, STREET_SIZE), colour,
+        )  # fmt: skip
 
     def _of_vehicles(
         self,

@@ -22,7 +22,7 @@ from skidpad.sensors.finish.outline import MOST, spans
 from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.pictures.packing import pack, unpack
 from skidpad.sensors.raster.view import View
-from skidpad.sensors.scene.materials import ASPHALTS, MATERIALS, Material
+from skidpad.sensors.scene.materials import ASPHALTS, FIELDS, MATERIALS, Material
 
 GROUND = (
     *ASPHALTS,
@@ -32,6 +32,7 @@ GROUND = (
     Material.GRASS,
     Material.EMBANKMENT,
     Material.MEDIAN,
+    *FIELDS,
 )
 REACH = 90.0  # m; farther shadows are a pixel or two
 CONTACT, CONTACT_DARK = 0.5, 0.62  # m around the outline, share of light lost below the body

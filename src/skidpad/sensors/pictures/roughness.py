@@ -93,6 +93,7 @@ _AROUND, _CLOSE, _DEEP = np.float32(0.26), np.float32(0.26), np.float32(0.32)
 _VEILED, _TINTED, _WARM = np.float32(0.28), np.float32(0.11), np.float32(0.08)
 _HALF = np.float32(0.5)
 _GREEN = np.float32(0.35)
+_SHEEN = np.float32(0.5)  # of rough ground towards the sun's image, by eye
 
 
 @inner_kernel
@@ -109,11 +110,12 @@ def _texel(a: np.float32, b: np.float32, size: np.float32) -> np.float32:
 @inner_kernel
 def roughen(
     view: View, v: np.float32, count: int, keys: NDArray[np.int32], grain: Floats32, tiles: NDArray[np.int8],
-    work: Floats32,
+    clear: np.float32, mirrored: Floats32, work: Floats32,
 ) -> None:  # fmt: skip
-    """Changes the colours of a block's surfaces in `work` by where in the world they lie.
+    """Changes the colours of a block's surfaces in `work` by where they lie and how they lie to the sun.
 
-    v: m down per m ahead of the block's row; grain: (256, 4) strengths by material; tiles: `make_tiles`.
+    v: m down per m ahead of the block's row; clear: of 1, light of the sun's disc; mirrored: (3,) towards the
+    sun's image below the ground, camera axes; grain: (256, 5) strengths by material; tiles: `make_tiles`.
     """
     r = view.rotation
     x_u, x_1 = np.float32(r[0, 0]), np.float32(r[1, 0]) * v + np.float32(r[2, 0])
@@ -121,13 +123,15 @@ def roughen(
     z_u, z_1 = np.float32(r[0, 2]), np.float32(r[1, 2]) * v + np.float32(r[2, 2])
     a_u, a_1 = x_u + _LEAN_X * z_u, x_1 + _LEAN_X * z_1
     b_u, b_1 = y_u + _LEAN_Y * z_u, y_1 + _LEAN_Y * z_1
-    height = np.float32(view.centre[2])
+    sun0, sun1, sun2 = mirrored[0], mirrored[1], mirrored[2]
+    sheen, height = clear * _SHEEN, np.float32(view.centre[2])
     a_0 = np.float32(view.centre[0]) + _LEAN_X * height
     b_0 = np.float32(view.centre[1]) + _LEAN_Y * height
     x = 0
     while x < count:
         m, end = keys[x] & 255, end_of_run(keys, x)
         grains, patches, tints, repairs = grain[m, 0], grain[m, 1], grain[m, 2], grain[m, 3]
+        graze = grain[m, 4]
         per_patch, per_repair = patches * _PER_BYTE, repairs * _PER_BYTE
         run, size = work[x:], end - x
         x = end
@@ -154,7 +158,13 @@ def roughen(
             fade = fade if fade < ONE else ONE
             near = _FORE * run[W + n]
             near = _EVEN - near / (ONE + near)
-            share = ONE + grains * fade * run[F + n] + run[A + n] + patches * near
+            u = run[U + n]
+            toward = (u * sun0 + v * sun1 + sun2) / np.sqrt(u * u + v * v + ONE)
+            toward = toward if toward > ZERO else ZERO
+            toward *= toward
+            toward *= toward
+            near += sheen * toward * toward
+            share = ONE + grains * fade * run[F + n] + run[A + n] + graze * near
             share = share if share > _LEAST else _LEAST
             hue = tints * run[C + n] * share
             run[R + n] *= share + hue

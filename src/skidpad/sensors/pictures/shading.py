@@ -40,11 +40,20 @@ from skidpad.sensors.pictures.blocks import (
 )
 from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.pictures.roughness import MORE_LANES, NO_TILES, make_tiles, roughen, vary_sky
+from skidpad.sensors.pictures.settled_snow import NOTHING_SETTLES, settle_snow
 from skidpad.sensors.pictures.sky import disc, sky
 from skidpad.sensors.pictures.street_lamps import add_street_light
 from skidpad.sensors.raster.view import View
 from skidpad.sensors.scene.grain import NO_GRAIN
-from skidpad.sensors.scene.materials import ACTOR_PAINTED, ASPHALTS, EMISSIVE, MATERIALS, Material
+from skidpad.sensors.scene.materials import (
+    ACTOR_PAINTED,
+    ASPHALTS,
+    EMISSIVE,
+    FIELDS,
+    MATERIALS,
+    POLISHED,
+    Material,
+)
 from skidpad.sensors.scene.street_light import NO_STREET_LIGHT, StreetLight
 
 ROADLIKE = (*ASPHALTS, Material.SHOULDER, Material.MARKING, Material.SIDEWALK)
@@ -55,9 +64,13 @@ SNOWY = (
     Material.SIDEWALK,
     Material.MEDIAN,
     Material.ROOF,
+    *FIELDS,
 )
 SNOWED = (*ASPHALTS, Material.MARKING)
 SNOW_LEFT = 0.72  # share of a driven road that packed snow covers; by eye
+SNOW_IN_TRACKS = 0.56  # and of it where wheels roll
+SETTLED = 0.92  # share of what looks up, off the road, that snow covers
+STAINED = 0.06  # share of the tints of surfaces that is left on snow
 GLOSSY = (Material.PAINT, Material.GLASS, Material.LAMP_GLASS)
 WET_DARKENING = 0.52  # of asphalt's albedo; Lekner and Dorf (1988) give 0.4 to 0.7
 SNOW = np.array([0.80, 0.83, 0.88], dtype=np.float32)
@@ -84,7 +97,8 @@ class Shading:
         grain, street_light: of the scene (`StaticScene`).
         """
         self._street_light = street_light
-        self._grain = grain * np.float32(1.0 - 0.6 * light.snow)
+        self._grain = _grain_in(light, grain, snow_on_road)
+        self._settling = _settling(light) if snow_on_road else NOTHING_SETTLES
         self._tiles = make_tiles() if grain.size else NO_TILES
         self.light = light
         self._table = _look_up(palette, table, light, snow_on_road)
@@ -151,6 +165,7 @@ class Shading:
             self._grain,
             self._tiles,
             self._street_light,
+            self._settling,
             self._work,
             inverse,
             key,
@@ -173,14 +188,38 @@ def _look_up(palette: Floats32, table: ActorTable, light: Lighting, snow_on_road
         out[:, material, :3] += light.snow * (SNOW - out[:, material, :3])
     if snow_on_road:
         for material in SNOWED:
-            out[:, material, :3] += SNOW_LEFT * light.snow * (SNOW - out[:, material, :3])
+            left = SNOW_IN_TRACKS if material in POLISHED else SNOW_LEFT
+            out[:, material, :3] += left * light.snow * (SNOW - out[:, material, :3])
     out[:, Material.HEADLAMP, GLOW] = 0.9 * light.lamps
     shining = out[:, Material.HEADLAMP, :3] - out[:, Material.LAMP_GLASS, :3]
     out[:, Material.LAMP_GLASS, :3] += min(light.lamps, 1.0) * shining
     out[:, Material.LAMP_GLASS, GLOW] = 0.9 * light.lamps
     out[:, Material.TAIL_LAMP, GLOW] = 0.8 * light.lamps
+    pane = out[:, Material.GLASS, :3]  # by day nothing tells which windows will be lit
+    out[:, Material.LIT_WINDOW, :3] = pane + min(light.lamps, 1.0) * (
+        out[:, Material.LIT_WINDOW, :3] - pane
+    )
     out[:, Material.LIT_WINDOW, GLOW] = 1.6 * light.lamps  # of a dull pane, so about a third
     return out.reshape(-1, COLUMNS)
+
+
+def _grain_in(light: Lighting, grain: Floats32, snow_on_road: bool) -> Floats32:
+    """Returns the unevenness of surfaces in a weather: snow evens it out and hides their tints."""
+    left = grain * np.float32(1.0 - 0.6 * light.snow)
+    if grain.size:
+        white = [*SNOWY, *(SNOWED if snow_on_road else ())]
+        left[white, 2] *= np.float32(1.0 - (1.0 - STAINED) * light.snow)
+    result: Floats32 = left
+    return result
+
+
+def _settling(light: Lighting) -> Floats32:
+    """Returns (256,) shares of each material of the map that snow covers on top; empty without snow."""
+    if light.snow <= 0.0:
+        return NOTHING_SETTLES
+    shares = np.full(MATERIALS, SETTLED * light.snow, dtype=np.float32)
+    shares[[*SNOWY, *SNOWED, *EMISSIVE, Material.LAMP_HOUSING, Material.LAMP_DARK]] = 0.0
+    return shares
 
 
 _HALF = np.float32(0.5)
@@ -333,6 +372,7 @@ def shade(
     grain: Floats32,
     tiles: NDArray[np.int8],
     lamps: StreetLight,
+    settling: Floats32,
     work: Floats32,
     inverse: Floats32,
     key: NDArray[np.int32],
@@ -344,6 +384,8 @@ def shade(
     """
     width = inverse.shape[1]
     work[H : H + BLOCK] = ZERO
+    clear = np.float32(light.disc)
+    mirrored = sun - np.float32(2.0) * (sun[0] * up[0] + sun[1] * up[1] + sun[2] * up[2]) * up
     for y in range(view.top, view.height):
         v = np.float32((y + 0.5 - view.cy) / view.focal)
         for first in range(0, width, BLOCK):
@@ -352,7 +394,19 @@ def shade(
             if solid:
                 gather(key, y, first, count, table, work)
                 if grain.shape[0] > 0:
-                    roughen(view, v, count, key[y, first : first + count], grain, tiles, work)
+                    roughen(
+                        view,
+                        v,
+                        count,
+                        key[y, first : first + count],
+                        grain,
+                        tiles,
+                        clear,
+                        mirrored,
+                        work,
+                    )
+                if settling.size > 0:
+                    settle_snow(v, count, key[y, first : first + count], settling, up, work)
                 if light.headlights > 0.0:
                     if behind_lamps(view, v, first, count, to_body, offset[0] - _LAMP_X):
                         work[H : H + BLOCK] = ZERO

@@ -50,7 +50,16 @@ class Material(IntEnum):
     ROOF = 30
     FRAME = 31  # of doors and windows
     FIRST_FREE = 32
-    # from the end of the byte: of roads of dressed maps only
+    # from the end of the byte, of dressed maps only: fields; per asphalt, what wheels polish and oil darkens
+    HAY = 241
+    CROP = 242
+    PLOUGHED = 243
+    ASPHALT_TRACK = 244
+    ASPHALT_OIL = 245
+    NEW_TRACK = 246
+    NEW_OIL = 247
+    WORN_TRACK = 248
+    WORN_OIL = 249
     NEW_ASPHALT = 250  # darker than what lies about it
     WORN_ASPHALT = 251  # paler
     # and of shaped bodies only
@@ -95,15 +104,31 @@ BASE_COLOUR: dict[Material, tuple[int, int, int]] = {
     Material.FRAME: (196, 194, 188),
     Material.NEW_ASPHALT: (66, 66, 71),
     Material.WORN_ASPHALT: (114, 112, 109),
+    Material.HAY: (138, 132, 78),
+    Material.CROP: (84, 118, 50),
+    Material.PLOUGHED: (106, 92, 70),
+    Material.ASPHALT_TRACK: (101, 99, 96),
+    Material.ASPHALT_OIL: (84, 85, 90),
+    Material.NEW_TRACK: (74, 73, 73),
+    Material.NEW_OIL: (61, 62, 68),
+    Material.WORN_TRACK: (124, 120, 112),
+    Material.WORN_OIL: (103, 104, 106),
     Material.LAMP_GLASS: (132, 140, 150),
     Material.BRAKE_LAMP: (96, 14, 16),
     Material.INDICATOR_LEFT: (170, 92, 24),
     Material.INDICATOR_RIGHT: (170, 92, 24),
 }
 
-END_FREE = int(Material.NEW_ASPHALT)  # box colours have the numbers before it
+END_FREE = int(Material.HAY)  # box colours have the numbers before it
 
-ASPHALTS = (Material.ASPHALT, Material.NEW_ASPHALT, Material.WORN_ASPHALT)
+FIELDS = (Material.HAY, Material.CROP, Material.PLOUGHED)
+TRACKS = {  # what wheels polish, and what drips between them, on each asphalt
+    Material.ASPHALT: (Material.ASPHALT_TRACK, Material.ASPHALT_OIL),
+    Material.NEW_ASPHALT: (Material.NEW_TRACK, Material.NEW_OIL),
+    Material.WORN_ASPHALT: (Material.WORN_TRACK, Material.WORN_OIL),
+}
+POLISHED = tuple(track for track, _ in TRACKS.values())
+ASPHALTS = tuple(m for asphalt, others in TRACKS.items() for m in (asphalt, *others))
 # Lamps shine of themselves: neither sun nor headlights change them.
 EMISSIVE = (Material.LAMP_RED, Material.LAMP_YELLOW, Material.LAMP_GREEN)
 # Painted in the colour of the actor's table row.

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from skidpad.core.randomness import stream_key
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.lanes import LaneKind, LaneSamples, LaneTable, Marking
-from skidpad.sensors.scene.materials import Material
+from skidpad.sensors.scene.materials import TRACKS, Material
 from skidpad.sensors.scene.mesh import Mesh, Points, merge, patches, ribbon
 
 CHUNK = 48.0  # m
@@ -47,6 +47,9 @@ AGES = (  # drawn from: what lies on a stretch of road or lane
 OWN_AGES = 2  # so many of AGES, from the first, let a lane's stretch differ from its road's
 STRETCH = 2  # chunks, the shortest that is laid anew
 RAISED = (LaneKind.SIDEWALK, LaneKind.MEDIAN, LaneKind.BORDER, LaneKind.OTHER)  # beyond a kerb
+TRACK_LEVELS = 2  # a wheel's track beyond them is a pixel wide
+# m from the middle of a lane: where what drips ends, and from where to where wheels roll
+OIL, TRACK = 0.28, (0.50, 1.00)
 KERB_HEIGHT, KERB_WIDTH = 0.12, 0.15  # m, of a kerb that the file names and gives no size
 DRIVABLE = (LaneKind.DRIVING, LaneKind.RAMP)
 MIN_WIDTH = 0.02  # m; a lane narrower than this over a whole piece is not drawn
@@ -86,7 +89,8 @@ def road_pieces(
                 look = SURFACE[LaneKind(int(lanes.kind[lane]))]
                 if ages and look[1] is Material.ASPHALT and lanes.junction[lane] < 0:
                     look = (look[0], _age_of(lanes, lane, int(index[a])))
-                yield key, _levels(piece, lanes, lane, outer[lane], look)
+                worn = ages and lanes.junction[lane] < 0
+                yield key, _levels(piece, lanes, lane, outer[lane], look, worn)
 
 
 def _age_of(lanes: LaneTable, lane: int, chunk: int) -> Material:
@@ -153,8 +157,12 @@ def _levels(
     lane: int,
     outer: NDArray[np.bool_],
     look: tuple[SemanticClass, Material],
+    worn: bool,
 ) -> list[Mesh]:
-    """Returns the meshes of a piece of lane by level of detail, with kerbs, skirts and edge lines."""
+    """Returns the meshes of a piece of lane by level of detail, with kerbs, skirts and edge lines.
+
+    worn: lanes that are driven on show where wheels roll.
+    """
     kind = LaneKind(int(lanes.kind[lane]))
     label, material = look
     ground = piece
@@ -162,7 +170,10 @@ def _levels(
     meshes = []
     for level, chord in enumerate(CHORDS):
         at = _stations(piece.s, chord)
-        parts = [ribbon(piece.left[at], piece.right[at], label, material)]
+        if worn and level < TRACK_LEVELS and kind in DRIVABLE and material in TRACKS:
+            parts = _worn_strips(piece, at, label, material)
+        else:
+            parts = [ribbon(piece.left[at], piece.right[at], label, material)]
         for side, is_outer in enumerate(outer):
             if is_outer:
                 parts.append(_skirt(piece, at, side))
@@ -174,6 +185,29 @@ def _levels(
                 parts.append(_paint_edge(piece, at, level, 0))
         meshes.append(merge(parts))
     return meshes
+
+
+def _worn_strips(
+    piece: Edges, at: NDArray[np.intp], label: SemanticClass, material: Material
+) -> list[Mesh]:
+    """Returns a piece of lane as strips side by side: two that wheels polish, oil between them.
+
+    A lane narrower than its tracks keeps those that fit.
+    """
+    left, right = piece.left[at], piece.right[at]
+    width = np.linalg.norm(left - right, axis=1)
+    half = 0.5 * np.maximum(width, MIN_WIDTH)
+    track, oil = TRACKS[material]
+    borders = (-np.inf, -TRACK[1], -TRACK[0], -OIL, OIL, TRACK[0], TRACK[1], np.inf)
+    fills = (material, track, material, oil, material, track, material)
+    lines = []
+    for border in borders:
+        share = 0.5 + 0.5 * np.clip(border / half, -1.0, 1.0)
+        lines.append(left + share[:, None] * (right - left))
+    return [
+        ribbon(a, b, label, fill)
+        for (a, b), fill in zip(itertools.pairwise(lines), fills, strict=True)
+    ]
 
 
 def _raise_beyond_kerbs(piece: Edges, kind: LaneKind) -> tuple[Edges, bool]:

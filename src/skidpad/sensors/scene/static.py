@@ -9,8 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from skidpad.core.arrays import Floats, Ints32
+from skidpad.core.randomness import stream_key
 from skidpad.core.vocabulary import LightState, SemanticClass
 from skidpad.roads.lanes import LaneSamples, LaneTable
 from skidpad.roads.roadside import Roadside, Shape
@@ -24,6 +26,10 @@ from skidpad.sensors.scene.street_light import StreetLight, street_light_of
 
 BULGE = (0.002, 0.002, 0.005, 0.03)  # m, what counts as flat at each level
 APRON = 4000.0  # m, flat land beyond it, out to the horizon
+FARMED_FROM = 75.0  # m from the nearest lane to the middle of a tile
+FIELD = (3, 2)  # tiles of 48 m, along and across
+GROWN = (Material.GRASS, Material.HAY, Material.GRASS, Material.CROP, Material.PLOUGHED)
+ROAD_STEP = 8  # samples of a lane, of which one is looked at
 SIZE = 16  # triangles: 16 m of one lane at full detail
 MARGIN = 1e-6  # m, more than rounding can put a vertex outside its sphere
 # A lamp lights up in its own colour; everything else is dark.
@@ -83,7 +89,7 @@ def build_scene(samples: LaneSamples, lanes: LaneTable, roadside: Roadside) -> S
     box_material = _box_materials({b.rgb for b in roadside.boxes}, palette)
     pieces = chain(
         road_pieces(samples, lanes, ages=_is_dressed(roadside)),
-        ground_pieces(samples),
+        ground_pieces(samples, fields=_is_dressed(roadside)),
         furniture_pieces(roadside, box_material),
     )
     grouped: dict[ChunkKey, list[list[Mesh]]] = {}
@@ -257,8 +263,14 @@ def cluster(vertices: Floats, triangles: Ints32, block_size: Ints32) -> tuple[Cl
 # Triangles of the terrain under and around the roads. Decoration only: nothing drives on it.
 
 
-def ground_pieces(samples: LaneSamples) -> Iterator[tuple[ChunkKey, list[Mesh]]]:
-    """Yields terrain chunks on a grid of `CHUNK` m, and the apron around them: key and a mesh per level."""
+def ground_pieces(
+    samples: LaneSamples, fields: bool = False
+) -> Iterator[tuple[ChunkKey, list[Mesh]]]:
+    """Yields terrain chunks on a grid of `CHUNK` m, and the apron around them: key and a mesh per level.
+
+    fields: land away from the roads is farmed, on some of it.
+    """
+    roads = cKDTree(np.stack([samples.x, samples.y], axis=1)[::ROAD_STEP]) if fields else None
     x0, y0, height = terrain_of(samples)
     nx, ny = height.shape
     for i in range(0, nx - 1, COARSE):
@@ -266,10 +278,26 @@ def ground_pieces(samples: LaneSamples) -> Iterator[tuple[ChunkKey, list[Mesh]]]
             bulge = _bulge(height[i : i + COARSE + 1, j : j + COARSE + 1])
             strides = [COARSE if bulge < limit else FINE for limit in BULGE]
             tiles = {stride: _tile(height, x0, y0, i, j, stride) for stride in set(strides)}
+            middle = (x0 + (i + COARSE / 2) * CELL, y0 + (j + COARSE / 2) * CELL)
+            if roads is not None and roads.query(middle)[0] > FARMED_FROM:
+                grown = _field_at(i // COARSE, j // COARSE)
+                tiles = {stride: _sow(mesh, grown) for stride, mesh in tiles.items()}
             yield ("ground", i, j, 0), [tiles[stride] for stride in strides]
     x1, y1 = x0 + (nx - 1) * CELL, y0 + (ny - 1) * CELL
     apron = _apron(x0, y0, x1, y1, float(height.min()))
     yield ("apron", 0, 0, 0), [apron] * LEVELS
+
+
+def _field_at(i: int, j: int) -> Material:
+    """Returns what grows on the tile in row i and column j: fields are some tiles long and wide."""
+    long, wide = FIELD
+    drawn = stream_key(0, "field", i // long, (j + (i // long) % 2) // wide)
+    return GROWN[drawn % len(GROWN)]
+
+
+def _sow(mesh: Mesh, material: Material) -> Mesh:
+    """Returns the mesh with another material."""
+    return mesh._replace(material=np.full(len(mesh.triangles), material, dtype=np.uint8))
 
 
 def _bulge(tile: Heights) -> float:

@@ -196,3 +196,14 @@ def test_precision_stands_over_recall_at_each_limit_with_the_reference_as_a_star
     assert len(stars) == 3
     for _, at in stars:
         assert at == pytest.approx(np.array([[0.9, 0.8]]), abs=5e-3)
+
+
+@pytest.mark.req("C-210")
+def test_metres_are_those_of_the_evaluated_time(folder):
+    evaluation = json.loads((folder / "evaluation.json").read_text())
+    for segment in evaluation["segment_table"]:
+        assert segment["metres"] == pytest.approx(15.0 * 3600.0 * segment["hours"], rel=0.02)
+        assert segment["sun_altitude_deg"] == -5.0
+    driven = tables(evaluation_page(evaluation, folder))["Routes driven, ours and published"]
+    assert [row[0].text for row in driven.rows[:3]] == ["route-0", "route-1", "all routes"]
+    assert driven.rows[0][1].text == "night, sun -5°"

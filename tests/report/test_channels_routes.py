@@ -2,7 +2,9 @@
 
 import pytest
 
+from skidpad.report.channels.evaluation.driven import driven_blocks
 from skidpad.report.channels.evaluation.routes import route_blocks
+from skidpad.report.channels.evaluation.scores import route_ratios
 
 LOCATION, COUNT = "ego_location_similarity", "object_count_similarity"
 
@@ -174,3 +176,46 @@ def test_every_module_has_mean_deviation_greatest_and_breaches_in_every_route():
 
 def test_an_evaluation_without_segments_has_no_such_tables():
     assert route_blocks({"segment_table": []}) == []
+
+
+DRIVEN = {
+    "segment_table": [
+        segment("coast", 0.5, 0, 0, 1.0, 1.0)
+        | {"metres": 600.0, "weather": None, "sun_altitude_deg": 15.0, "precipitation": 60.0},
+        segment("coast", 0.5, 0, 0, 1.0, 1.0)
+        | {"metres": 400.0, "weather": None, "sun_altitude_deg": 15.0, "precipitation": 60.0},
+        segment("town", 0.25, 0, 0, 1.0, 1.0)
+        | {"metres": 500.0, "weather": "ice", "sun_altitude_deg": -30.0, "precipitation": 0.0},
+    ]
+}
+
+
+@pytest.mark.req("C-210")
+def test_routes_are_listed_with_weather_hours_metres_and_the_published_towns():
+    (driven,) = driven_blocks(DRIVEN)
+    rows = rows_of(driven)
+    assert rows[:3] == [
+        ["coast", "rain 60 %, sun 15°", "2", "1.00", "1,000", "1.00"],
+        ["town", "ice, no rain, night, sun -30°", "1", "0.25", "500", "2.00"],
+        ["all routes", "", "3", "1.25", "1,500", "1.20"],
+    ]
+    assert rows[3] == ["town 1", "hard rain, noon", "-", "0.60", "732", "1.22"]  # table 6.1
+    assert rows[-1] == ["all towns", "", "-", "7.95", "8,245", "1.04"]
+    assert {c.kind for row in driven.rows[3:] for c in row} == {"published"}
+
+
+def test_an_evaluation_of_before_has_no_metres_and_says_so():
+    (driven,) = driven_blocks(EVALUATION)
+    assert rows_of(driven)[0] == ["coast", "not recorded", "2", "4.00", "-", "-"]
+
+
+@pytest.mark.req("C-216", "C-217")
+def test_precision_and_recall_per_route_are_made_of_the_counts_and_published_ones_stand_below():
+    counts = {"coast": {"ego_tailgating": [3, 1, 2], "ego_tailgated": [0, 0, 0]}}
+    evaluation = {
+        "results": [{"rules": "tracked", "truth": "world", "tolerance_s": 1.0}],
+        "by_route": {"tracked/world": counts},
+    }
+    found = rows_of(route_ratios(evaluation, "world"))
+    assert found[0] == ["coast", "tracked", "-", "75.00 / 60.00", "- / -"]
+    assert found[1] == ["town 1", "published", "100.00 / 50.00", "60.00 / 75.00", "100.00 / 100.00"]

@@ -95,6 +95,10 @@ def study(
     ] = os.cpu_count() or 1,
     first_seed: FirstSeed = 1,
     out: Annotated[Path | None, typer.Option(help="Write the rows to this .csv file.")] = None,
+    figure: Annotated[
+        Path | None,
+        typer.Option(help="Draw both arms of A-278 beside the published ones into this .svg file."),
+    ] = None,
 ) -> None:
     """Drive the experiment that a finding of the sources needs, and judge it."""
     from rich.console import Console
@@ -102,9 +106,11 @@ def study(
 
     from skidpad.campaign.cells import matrix as cells
     from skidpad.campaign.studies.arms import STUDIES
-    from skidpad.core.errors import require_choice
+    from skidpad.core.errors import ConfigError, require_choice
 
     require_choice("study", id, tuple(STUDIES))
+    if figure is not None and id != "A-278":
+        raise ConfigError(f"--figure draws the arms of study A-278, not of {id}")
     from skidpad.campaign.studies.study import run_study
     from skidpad.recording.files import write_csv
 
@@ -119,3 +125,9 @@ def study(
     if out is not None:
         write_csv(out, table)
         typer.echo(str(out))
+    if figure is not None:
+        from skidpad.recording.files import write_bytes
+        from skidpad.report.matrix.comparisons.preliminary import preliminary_svg
+
+        write_bytes(figure, preliminary_svg(table).encode())
+        typer.echo(str(figure))

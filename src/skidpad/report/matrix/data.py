@@ -353,16 +353,16 @@ def published_value(column: str, config: str, weather: str) -> float | None:
 
 
 PRELIMINARY = (
-    ("interventions", "prelim_total_collisions", "final_collisions"),
-    ("solid markings crossed", "prelim_lane_invasions", "final_lane_invasions"),
-    ("radar false positives, %", "prelim_fpr_pct", "final_fpr_pct"),
-    ("radar false negatives, %", "prelim_fnr_pct", "final_fnr_pct"),
-    ("dropout, %", "prelim_dropout_pct", "final_dropout_pct"),
+    (INTERVENTIONS, "prelim_total_collisions", "final_collisions"),
+    ("lane_invasions", "prelim_lane_invasions", "final_lane_invasions"),
+    ("radar_fpr_pct", "prelim_fpr_pct", "final_fpr_pct"),
+    ("radar_fnr_pct", "prelim_fnr_pct", "final_fnr_pct"),
+    ("dropout_pct", "prelim_dropout_pct", "final_dropout_pct"),
 )
 
 
 def published_preliminary() -> list[tuple[str, float, float]]:
-    """Returns (quantity, preliminary, final): means over the runs that both published scripts share."""
+    """Returns (column, preliminary, final): means over the runs that both published scripts share."""
     means = (
         read_published(Source.PRELIMINARY).select(pl.selectors.numeric().mean()).row(0, named=True)
     )

@@ -32,6 +32,7 @@ class Source(str, Enum):
     VIOLATIONS = "channels_spi_violations_summary"
     VIOLATIONS_BY_TOWN = "channels_spi_violations_by_town"
     TIMING = "channels_timing_statistics"
+    ROUTES = "channels_routes"  # table 6.1
 
 
 KINDS = {"Clear Sky": "clear", "Heavy Rain": "rain"}

@@ -20,7 +20,7 @@ from skidpad.evidence.channels.hazards import SCORED_HAZARDS
 from skidpad.evidence.channels.judging.causes import EXPLAINED
 from skidpad.evidence.channels.judging.curves import Point
 from skidpad.evidence.channels.judging.facts import route_shares
-from skidpad.evidence.channels.judging.segments import Segment
+from skidpad.evidence.channels.judging.segments import Segment, evaluated_from
 from skidpad.evidence.channels.matching import (
     TOLERANCES,
     Score,
@@ -204,12 +204,17 @@ class Evaluation:
 def _facts(s: Segment) -> dict[str, Any]:
     """Returns a row of facts on a segment: route, seed, hours, night, counts by hazard and truth."""
     practical, sun = Profile.PRACTICAL.value, s.context.get("sun_altitude_deg")
+    rain = s.context.get("precipitation")
     row: dict[str, Any] = {
         "name": s.name,
         "route": s.route,
         "seed": s.context.get("seed", s.name),
         "hours": s.hours,
         "night": None if sun is None else float(sun) < 0.0,
+        "metres": _metres(s),
+        "weather": s.context.get("weather"),
+        "sun_altitude_deg": None if sun is None else float(sun),
+        "precipitation": None if rain is None else float(rain),
     }
     if "world" in s.truths:
         for hazard, t in tally(s.detected[practical], s.truths["world"], s.hours).items():
@@ -225,6 +230,16 @@ def _facts(s: Segment) -> dict[str, Any]:
     ]
     row["false_tailgating_explained"] = sum(c in {e.value for e in EXPLAINED} for c in false)
     return row | dict(s.facts)
+
+
+def _metres(s: Segment) -> float | None:
+    """Returns the distance in m that the ego drove in the evaluated time; None where no speed is known."""
+    judged = s.t >= evaluated_from(s.t)
+    known = judged & np.isfinite(s.motion[:, 0]) if len(s.motion) == len(s.t) else judged & False
+    if np.count_nonzero(known) < 2:
+        return None
+    v, t = s.motion[known, 0], s.t[known]
+    return float(0.5 * np.sum((v[1:] + v[:-1]) * np.diff(t)))
 
 
 def _row(s: Score) -> dict[str, Any]:

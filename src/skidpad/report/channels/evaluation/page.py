@@ -26,6 +26,7 @@ from skidpad.evidence.statistics import interval_text, p_text, rate_text
 from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.recording.channels.drives import read_outcomes
 from skidpad.report.channels.evaluation import scores
+from skidpad.report.channels.evaluation.driven import driven_blocks
 from skidpad.report.channels.evaluation.routes import route_blocks
 from skidpad.report.channels.evaluation.scores import (
     FEW,
@@ -130,7 +131,14 @@ def evaluation_page(evaluation: Row, folder: Path) -> Page:
             *[Section(f"Against the {short(t)}", [scores.results(evaluation, t)]) for t in truths],
             Section("Natural and risky drivers", strata(evaluation)),
             Section("Precision against recall", precision_recall(evaluation)),
-            Section("By route", [scores.routes(evaluation, t) for t in truths]),
+            Section(
+                "By route",
+                [
+                    *driven_blocks(evaluation),
+                    *(scores.routes(evaluation, t) for t in truths),
+                    *(scores.route_ratios(evaluation, t) for t in truths),
+                ],
+            ),
             Section("Indicators and times by route", route_blocks(evaluation)),
             Section("Findings of the source, judged", verdicts(judged)),
             Section("Why it errs", [scores.causes(evaluation)]),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -149,6 +150,32 @@ def _published_hazards() -> dict[str, str]:
 
 def routes(evaluation: Row, truth: str) -> Table:
     """Returns the table of found / false / missed per route; for "world" the published towns, too."""
+
+    def counts(hazard: str, row: Row) -> str:
+        return " / ".join(map(str, row["counts"].get(hazard, ["-"])))
+
+    return _by_route(evaluation, truth, counts, "Found / false / missed per route")
+
+
+def route_ratios(evaluation: Row, truth: str) -> Table:
+    """Returns the table of precision and recall per route, made from the counts; published towns, too."""
+
+    def ratios(hazard: str, row: Row) -> str:
+        if len(row["counts"].get(hazard, ())) < 3:
+            return "-"
+        tp, fp, fn = row["counts"][hazard]
+        shares = (tp / all_ if all_ else None for all_ in (tp + fp, tp + fn))
+        return " / ".join(ratio_text(share) for share in shares)
+
+    found = _by_route(evaluation, truth, ratios, "Precision / recall per route, %")
+    note = "From the counts above. A dash: nothing was found, or nothing was there to find."
+    return replace(found, note=note)
+
+
+def _by_route(
+    evaluation: Row, truth: str, of_hazard: Callable[[str, Row], str], caption: str
+) -> Table:
+    """Returns a table with a row per route and identifier, and a column per hazard."""
     judged = [r["rules"] for r in headline(evaluation) if r["truth"] == truth]
     by_route = {i: evaluation["by_route"][f"{i}/{truth}"] for i in judged}
     rows: list[Row] = [
@@ -162,15 +189,12 @@ def routes(evaluation: Row, truth: str) -> Table:
     def cell(of: Any, row: Row) -> Cell:
         return Cell(of(row), kind=row.get("kind", ""))
 
-    def counts(hazard: str, row: Row) -> str:
-        return " / ".join(map(str, row["counts"].get(hazard, ["-"])))
-
     columns: list[Column[Row]] = [
         Column("route", partial(cell, lambda r: r["route"])),
         Column("identifier", partial(cell, lambda r: r["identifier"])),
-        *(Column(words(h), partial(cell, partial(counts, h))) for h in HAZARDS),
+        *(Column(words(h), partial(cell, partial(of_hazard, h))) for h in HAZARDS),
     ]
-    return table(columns, rows, f"Found / false / missed per route, {short(truth)}")
+    return table(columns, rows, f"{caption}, {short(truth)}")
 
 
 def _published_towns() -> list[Row]:

@@ -18,6 +18,7 @@ from skidpad.report.matrix.data import (
     published_value,
     weather_title,
 )
+from skidpad.report.matrix.tables import METRICS
 
 QUANTITIES = (
     (INTERVENTIONS, "Interventions per run", "published as total collisions"),
@@ -119,11 +120,12 @@ def _figures(matrix: Matrix, configs: Sequence[str]) -> list[Block]:
         ]
         figures.append(Figure(grouped_bars(groups, series, label), caption))
     charts = [
-        (label, Series(label, [before, after])) for label, before, after in published_preliminary()
+        (METRICS[column].heading, Series(column, [before, after]))
+        for column, before, after in published_preliminary()
     ]
     caption = (
         "Published alone: preliminary against final script, means over the eleven clear runs that "
-        "both have. `skidpad study A-278` drives both here."
+        "both have. `skidpad study A-278 --figure FILE.svg` drives both here and draws ours beside these."
     )
     return [*figures, Figure(panel(["preliminary", "final"], charts), caption)]
 

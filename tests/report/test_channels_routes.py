@@ -2,7 +2,7 @@
 
 import pytest
 
-from skidpad.report.channels.evaluation.driven import driven_blocks
+from skidpad.report.channels.evaluation.driven import route_list_blocks
 from skidpad.report.channels.evaluation.routes import route_blocks
 from skidpad.report.channels.evaluation.scores import route_ratios
 
@@ -192,7 +192,7 @@ DRIVEN = {
 
 @pytest.mark.req("C-210")
 def test_routes_are_listed_with_weather_hours_metres_and_the_published_towns():
-    (driven,) = driven_blocks(DRIVEN)
+    (driven,) = route_list_blocks(DRIVEN)
     rows = rows_of(driven)
     assert rows[:3] == [
         ["coast", "rain 60 %, sun 15°", "2", "1.00", "1,000", "1.00"],
@@ -205,7 +205,7 @@ def test_routes_are_listed_with_weather_hours_metres_and_the_published_towns():
 
 
 def test_an_evaluation_of_before_has_no_metres_and_says_so():
-    (driven,) = driven_blocks(EVALUATION)
+    (driven,) = route_list_blocks(EVALUATION)
     assert rows_of(driven)[0] == ["coast", "not recorded", "2", "4.00", "-", "-"]
 
 

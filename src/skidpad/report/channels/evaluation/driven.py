@@ -22,7 +22,7 @@ KNOWN = (
 ALL = "all routes"
 
 
-def driven_blocks(evaluation: Row) -> list[Block]:
+def route_list_blocks(evaluation: Row) -> list[Block]:
     """Returns the table of routes with what was driven on each; empty without routes."""
     segments = pl.DataFrame(evaluation["segment_table"], infer_schema_length=None)
     if "route" not in segments.columns or not len(segments):

@@ -26,7 +26,7 @@ from skidpad.evidence.statistics import interval_text, p_text, rate_text
 from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.recording.channels.drives import read_outcomes
 from skidpad.report.channels.evaluation import scores
-from skidpad.report.channels.evaluation.driven import driven_blocks
+from skidpad.report.channels.evaluation.driven import route_list_blocks
 from skidpad.report.channels.evaluation.routes import route_blocks
 from skidpad.report.channels.evaluation.scores import (
     FEW,
@@ -134,7 +134,7 @@ def evaluation_page(evaluation: Row, folder: Path) -> Page:
             Section(
                 "By route",
                 [
-                    *driven_blocks(evaluation),
+                    *route_list_blocks(evaluation),
                     *(scores.routes(evaluation, t) for t in truths),
                     *(scores.route_ratios(evaluation, t) for t in truths),
                 ],

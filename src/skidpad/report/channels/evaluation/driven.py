@@ -32,7 +32,7 @@ def route_list_blocks(evaluation: Row) -> list[Block]:
     )
     groups = segments.group_by("route", maintain_order=True)
     rows = sorted((_row(str(route), part) for (route,), part in groups), key=lambda r: r["route"])
-    rows = [*rows, _row(ALL, segments) | {"weather": ""}, *_published()]
+    rows = [*rows, _row(ALL, segments) | {"weather": ""}, *_town_rows()]
     columns: list[Column[Row]] = [
         Column("route", partial(_cell, "route")),
         Column(
@@ -74,7 +74,7 @@ def weather_text(row: Row) -> str:
     return ", ".join(part for part in parts if part)
 
 
-def _published() -> list[dict[str, Any]]:
+def _town_rows() -> list[dict[str, Any]]:
     """Returns the published towns as rows, and their sum."""
     towns = read_published(Source.ROUTES)
     rows = [

@@ -21,6 +21,7 @@ from skidpad.core.settings import NAMES, Settings
 from skidpad.core.setup import DT
 from skidpad.core.specs import LidarSpec
 from skidpad.core.states import ContactEvent, VehicleCommand
+from skidpad.core.surface import SurfacePatch
 from skidpad.core.vocabulary import Control, SemanticClass, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.evidence.drive.prepared import prepare
@@ -151,6 +152,13 @@ def cell(settings: Settings, weather: str = "clear-noon", **changes: Any) -> Run
 
 def short_drive(weather: str | Weather) -> Outcome:
     return lambda settings: log_hash(run(cell(settings, weather)).log)
+
+
+def flooded_drive(settings: Settings) -> str:
+    """A short drive with deep water on every road."""
+    roads = sorted(set(load_map("figure8").lanes.road.tolist()))
+    water = tuple(SurfacePatch(water_mm=2.0, road=road) for road in roads)
+    return log_hash(run(cell(settings, surface=water)).log)
 
 
 def full_brake(settings: Settings) -> float:
@@ -376,6 +384,7 @@ OTHERS: dict[str, Scenario] = {
     "night_rain": Scenario("rain_only", lambda s: pictures(s, "rain-night", "rgb_front")),
     "headways": Scenario("field", short_drive("clear-noon")),
     "drivers": Scenario(False, short_drive("rain-noon")),
+    "drivers_patches": Scenario(True, flooded_drive),
     "initial_limit_kmh": Scenario(30.0, short_drive("clear-noon")),
     "traffic_positions": Scenario("table", short_drive("clear-noon")),
     "relocation": Scenario("standing", recovery),

@@ -200,6 +200,9 @@ class TrafficSettings(SettingsPart):
     drivers: bool = setting_field(
         True, "M-1, R-5", "background drivers differ and mind grip and sight"
     )
+    drivers_patches: bool = setting_field(
+        False, "M-1, T-11", "background drivers slow for patches of the surface, with `drivers`"
+    )
     headways: Headways = setting_field(
         Headways.COMFORT, "M-1, R-5", "how closely background drivers follow, with `drivers`"
     )

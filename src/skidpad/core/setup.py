@@ -73,6 +73,7 @@ class TrafficSetup:
     variant: str = "listing"  # or "table": which published positions (D-085, D-086)
     initial_limit_kmh: float | None = None  # None: the map's limit at the place (decision M-6)
     slow_in_weather: bool = False  # the switch `drivers` (decisions M-1, R-5)
+    sees_patches: bool = False  # with slow_in_weather: drivers slow for what lies on the road
     put_wrecks_back: bool = True  # decision M-7
     variety: bool = False  # drivers differ in speed, headway and acceleration (decision C-11)
     headways: Headways = Headways.COMFORT  # with variety

@@ -188,6 +188,7 @@ def _roads(spec: RunSpec, course: Roads) -> Stage:
         variant=s.traffic_positions.value,
         initial_limit_kmh=s.initial_limit_kmh,
         slow_in_weather=s.drivers,
+        sees_patches=s.drivers_patches,
         variety=s.drivers,
         headways=s.headways,
     )

@@ -14,7 +14,7 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import hold
 from skidpad.core.states import ActorStates
-from skidpad.core.surface import SurfacePatch, place_in_file, present_patches
+from skidpad.core.surface import PATH_OFFSET, SurfacePatch, place_in_file, present_patches
 from skidpad.physics.drying import dried_film
 from skidpad.physics.grip import GripParams, Road, road_surface
 from skidpad.physics.slush import slush_grip
@@ -43,6 +43,7 @@ LaneFrictions = dict[tuple[int, int], list[tuple[float, float, float]]]
 
 REACH = 12.0  # m from a vehicle's origin to its farthest wheel, and half a lane
 SPACING = 1.0  # m, the largest distance of two lane samples
+USUAL_SPEED = 14.0  # m/s, where the map gives no limit
 LISTED = 20  # roads that a message names
 SIDES = {
     "both": BOTH,
@@ -121,6 +122,25 @@ class Patches:
         fill_patches(
             self.map.held, self._held, self._wheels, states, placed, share, stiffness, film
         )
+
+    def lane_shares(self) -> Floats:
+        """Returns the friction at the middle of each lane over that without patches, (N,) at its samples.
+
+        At the speed limit there, by the more slippery of the two wheel paths; the tyres are those of the run.
+        """
+        samples, n = self.map.samples, len(self.map.samples.x)
+        states = ActorStates.empty(n)
+        states.x[:], states.y[:], states.z[:] = samples.x, samples.y, samples.z
+        states.yaw[:], states.present[:] = samples.heading, True
+        states.vx[:] = np.where(np.isnan(samples.limit), USUAL_SPEED, samples.limit)
+        sides = np.array([(0.0, left) for left in (PATH_OFFSET, -PATH_OFFSET) * 2])
+        kind = self.kinds.index(self.road.tyres)
+        wheels = WheelPlaces(np.tile(sides, (n, 1, 1)), np.full(n, kind))
+        placed = places_for(np.zeros(n), np.zeros(n))
+        placed["lane"], placed["sample"] = samples.lane, np.arange(n)
+        share, stiffness, film = (np.zeros((n, 4)) for _ in range(3))
+        fill_patches(self.map.held, self._held, wheels, states, placed, share, stiffness, film)
+        return np.asarray(share.min(axis=1))
 
     def ratio_at(self, x: float, y: float, z: float, v: float = 0.0) -> float:
         """Return the friction at a point of the road at a speed in m/s over that without patches.

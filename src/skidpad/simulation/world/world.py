@@ -249,8 +249,11 @@ class World:
         """Sets what the weather does to the road from now on, in patches too."""
         self._grip, self._road = road.params(), road
         self._fill_grips()
-        if self.patches is not None:
-            self.patches.lay(road)
+        if self.patches is None:
+            return
+        self.patches.lay(road)
+        if self.traffic is not None and self.traffic.sees_patches:
+            self.traffic.see_patches(self.patches.lane_shares())
 
     def blow(self, speed: float, towards: float) -> None:
         """Sets the mean wind, in m/s and rad, from now on; nothing changes where wind pushes no vehicles."""

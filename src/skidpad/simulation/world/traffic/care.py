@@ -123,12 +123,13 @@ def firm_braking(care: Care, v: float, dry: float) -> float:
 
 
 @kernel
-def speed_choice(care: Care, v: float) -> float:
+def speed_choice(care: Care, v: float, patch: float = 1.0) -> float:
     """Returns the desired speed over that on a dry road, at the grip of v in m/s.
 
-    Source: SUMO's friction device, documentation "Simulation/Friction".
+    patch: share of it that a patch leaves. Source: SUMO's friction device, documentation
+    "Simulation/Friction".
     """
-    grip = left_at(care.grip, v) if care.on else 1.0
+    grip = left_at(care.grip, v) * patch if care.on else 1.0
     if grip >= 1.0:
         return 1.0
     return -0.3491 * grip * grip + 0.8922 * grip + 0.4493

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.constants import G
 from skidpad.core.geometry import Pose, mps_from_kmh
 from skidpad.core.randomness import stream, stream_key
@@ -30,7 +31,7 @@ from skidpad.simulation.world.traffic.idm import A_CURVE, A_MAX, T_HEADWAY
 from skidpad.simulation.world.traffic.mobil import B_SAFE, GAP_CLEAR
 from skidpad.simulation.world.traffic.network import LANE, POINT, STOP, Network, network
 from skidpad.simulation.world.traffic.occupancy import occupancy
-from skidpad.simulation.world.traffic.outlook import desired_speed
+from skidpad.simulation.world.traffic.outlook import PREVIEW_STEP, desired_speed
 from skidpad.simulation.world.traffic.pack import RADIUS, UNSEEN, Pack
 from skidpad.simulation.world.traffic.path import PATH, begin, straight_path
 from skidpad.simulation.world.traffic.places import FreePlaces, find_candidates
@@ -125,8 +126,12 @@ class Traffic:
 
     def __init__(self, map: RoadMap, setup: TrafficSetup, seed: int, care: Care) -> None:
         self.net, self.setup, self.seed, self.care = network_of(map), setup, seed, care
+        self.sees_patches = setup.sees_patches and care.on
         self.drivers, self.occupancy = drivers(0), occupancy(0, 0)
         self.streets = streets_of(map)
+        if self.sees_patches:  # an own copy: other runs of this process share the map's
+            self.net = self.net._replace(point=self.net.point.copy())
+            self.streets = self.streets._replace(net=self.net)
         self.places = FreePlaces(
             map, self.net, candidates_of(map), stream(seed, "traffic", "places")
         )
@@ -140,6 +145,23 @@ class Traffic:
         self.seed, self.places.rng = seed, stream(seed, "traffic", "places")
         for id, row in self.row.items():
             self.drivers.state["key"][row] = stream_key(seed, "traffic", "driver", id)
+
+    def see_patches(self, shares: Floats) -> None:
+        """Lets drivers know what patches leave of the friction, (N,) at the map's samples.
+
+        They look at limits and bends every PREVIEW_STEP m: a share counts that far to both sides.
+        """
+        lane = np.repeat(np.arange(len(self.net.lane)), self.net.lane["size"])
+        found = shares.copy()
+        for shift in range(1, int(PREVIEW_STEP) + 1):
+            same = lane[shift:] == lane[:-shift]
+            found[shift:] = np.where(
+                same, np.minimum(found[shift:], shares[:-shift]), found[shift:]
+            )
+            found[:-shift] = np.where(
+                same, np.minimum(found[:-shift], shares[shift:]), found[:-shift]
+            )
+        self.net.point["patch"] = np.minimum(found, 1.0)
 
     def arrange(self, members: Sequence[Member], source: Mapping[int, int]) -> None:
         """Carries the drivers over to other rows; source: old row by new row of those that were there.

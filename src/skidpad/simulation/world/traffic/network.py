@@ -32,6 +32,7 @@ POINT = np.dtype(
         ("grade", "f8"),
         ("half_width", "f8"),
         ("limit", "f8"),  # m/s, no gaps
+        ("patch", "f8"),  # share of the friction that drivers see a patch leave, 1: none
         ("marking_left", "u1"),
         ("marking_right", "u1"),
         ("sign", "?"),  # a speed-limit sign takes effect here
@@ -77,6 +78,7 @@ def network(samples: LaneSamples, lanes: LaneTable, signals: SignalTable) -> Net
         point[name] = getattr(samples, name)
     point["half_width"] = samples.width / 2.0
     point["limit"] = np.where(np.isnan(samples.limit), UNSIGNED_LIMIT, samples.limit)
+    point["patch"] = 1.0
     point["sign"] = _signs(samples, lanes, signals)
     lane = np.zeros(len(lanes.first), dtype=LANE)
     for name in ("length", "first", "size", "kind", "left", "right"):

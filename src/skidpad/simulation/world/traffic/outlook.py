@@ -40,14 +40,16 @@ V_PREVIEW = 10.0  # m/s, look at least this far beyond the comfortable braking d
 def desired_speed(
     net: Network, me: Any, trait: Any, path: NDArray[np.int32], v: float, care: Care
 ) -> float:
-    """Returns the m/s that limits and bends ahead along `path` allow, and from which one stops within sight.
+    """Returns the m/s that limits, bends, patches and sight ahead along `path` allow.
 
     Each is reached by comfortable braking from the present speed v. me, trait: rows of DRIVER and TRAIT.
     """
     b = braking(care, v)
     known = v * v / (2.0 * b) + V_PREVIEW
     factor = trait.factor * speed_choice(care, v)
-    best_sq = min(min(net.point[me.at].limit, me.cap) * factor, sight_speed(care, v)) ** 2
+    here = net.point[me.at]
+    own = factor if here.patch >= 1.0 else trait.factor * speed_choice(care, v, here.patch)
+    best_sq = min(min(here.limit, me.cap) * own, sight_speed(care, v)) ** 2
     start = -me.s
     for k in range(PATH):
         if path[k] < 0 or start > known:
@@ -60,9 +62,14 @@ def desired_speed(
             if distance > known:
                 break
             point = net.point[lane.first + j]
-            cap_sq = (min(point.limit, me.cap) * factor) ** 2
+            if point.patch < 1.0:
+                own = trait.factor * speed_choice(care, v, point.patch)
+            else:
+                own = factor
+            cap_sq = (min(point.limit, me.cap) * own) ** 2
             if abs(point.curvature) > STRAIGHT:
-                cap_sq = min(cap_sq, bend_speed_sq(care, point.curvature, trait.a_curve))
+                bend_sq = bend_speed_sq(care, point.curvature, trait.a_curve)
+                cap_sq = min(cap_sq, bend_sq * point.patch)
             best_sq = min(best_sq, cap_sq + 2.0 * b * max(distance, 0.0))
         start += lane.length
     return sqrt(best_sq)

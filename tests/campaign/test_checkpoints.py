@@ -9,40 +9,15 @@ import pytest
 from lxml import etree
 
 import skidpad
-from skidpad.campaign.cells.matrix import describe_run
-from skidpad.campaign.driving.drivers import describe_driver
 from skidpad.campaign.runs.checkpoints import FIXED
 from skidpad.campaign.runs.run import OpenRun
 from skidpad.campaign.runs.run import run as drive
 from skidpad.core.checkpoint import Checkpoint
 from skidpad.core.errors import CheckpointError
-from skidpad.core.run import Roads, RunSpec
-from skidpad.core.settings import load_profile
 from skidpad.core.states import VehicleCommand
-from skidpad.core.vocabulary import SensorLevel, TrafficStart
-from skidpad.physics.presets import find_weather
+from skidpad.core.vocabulary import SensorLevel
 from skidpad.recording.run.log_files import log_hash
-
-SCRIPTS = ("ghost_cut_in", "lead_slowdown", "front_accident")
-
-
-def spec_of(map, configuration, *, level=SensorLevel.OBJECTS, duration=40.0, weather="rain-night"):
-    course = Roads(map=map, vehicles=20, allow_fewer=True, traffic=TrafficStart.FIXED)
-    template = RunSpec(
-        course=course,
-        duration=duration,
-        sensors=level,
-        settings=load_profile("recommended", {}),
-    )
-    return describe_run(describe_driver(configuration, {}), find_weather(weather), 3, template)
-
-
-def go_on(run, ticks=None):
-    """Drives so many ticks, or to the end."""
-    while ticks is None or ticks > 0:
-        if run.step() is None:
-            return
-        ticks = None if ticks is None else ticks - 1
+from support.cut_runs import SCRIPTS, STACKS, go_on, spec_of
 
 
 @pytest.mark.parametrize(
@@ -122,39 +97,6 @@ def test_a_checkpoint_of_another_run_or_of_none_is_refused():
         runs[1].restore(runs[0].save())
 
 
-STACKS = '''
-from skidpad.core.states import VehicleCommand
-
-class Counting:
-    """Says more throttle with every tick."""
-
-    def __init__(self, specs, map, settings):
-        self.ticks = [0]
-
-    def tick(self, frame):
-        self.ticks[0] += 1
-        return VehicleCommand(throttle=min(self.ticks[0] / 400.0, 1.0))
-
-
-class Reading(Counting):
-    """Holds an open file."""
-
-    def __init__(self, specs, map, settings):
-        super().__init__(specs, map, settings)
-        self.file = open(__file__)
-
-
-class Giving(Reading):
-    """Says what of it is to be saved."""
-
-    def __getstate__(self):
-        return self.ticks
-
-    def __setstate__(self, ticks):
-        self.ticks = ticks
-'''
-
-
 @pytest.mark.parametrize("name", ["Counting", "Giving"])
 def test_a_stack_of_the_user_goes_on_too(tmp_path, name):
     spec = spec_of("figure8", _stacks(tmp_path, name), duration=4.0)
@@ -203,7 +145,7 @@ def test_every_kind_of_state_counts(monkeypatch):
 
     spec = spec_of("figure8", 4, duration=15.0)
     whole = log_hash(drive(spec).log)
-    kinds = ("_put_array", "_put_object", "_put_by_itself")
+    kinds = ("put_array", "put_object", "put_by_itself")
     for kind in kinds:
         run = OpenRun(spec)
         go_on(run, 100)

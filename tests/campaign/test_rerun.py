@@ -1,4 +1,7 @@
 import re
+import shutil
+from dataclasses import replace
+from functools import partial
 
 import polars as pl
 import pytest
@@ -7,7 +10,7 @@ from typer.testing import CliRunner
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.driving.loop import Sink
 from skidpad.campaign.driving.pace import Pace
-from skidpad.campaign.recipes.matrix import RECIPE
+from skidpad.campaign.recipes.matrix import RECIPE, drive_one
 from skidpad.campaign.runs.run import run
 from skidpad.campaign.runs.stored import read_run
 from skidpad.campaign.runs.views import SIZE, twelve_views
@@ -42,9 +45,34 @@ def test_a_run_can_be_driven_again_from_what_it_left_behind(campaign):
     assert len(list((run / "rerun").glob("*.png"))) == 40
 
 
-def test_a_changed_log_is_noticed(campaign, tmp_path):
-    import shutil
+def test_a_stretch_is_driven_from_the_nearest_checkpoint(campaign, tmp_path):
+    run, pictures = tmp_path / "run", []
+    shutil.copytree(campaign / "runs" / "2_rain-noon-003", run)
+    call = ["rerun", str(run), "--from", "3", "--to", "4"]
+    for more in ([], ["--checkpoints", "1.5"], []):
+        shutil.rmtree(run / "rerun", ignore_errors=True)
+        done = CliRunner().invoke(app, [*call, *more])
+        assert done.exit_code == 0, done.output
+        assert "the same drive" in done.output
+        pictures.append({p.name: p.read_bytes() for p in (run / "rerun").glob("*.png")})
+    assert "driven from the checkpoint at 1.50 s on" in done.output
+    assert len(pictures[0]) == 20
+    assert pictures[0] == pictures[2]
+    (run / "checkpoints" / "0000030.state").write_bytes(b"what is this")
+    done = CliRunner().invoke(app, call)
+    assert "driven from the beginning" in done.stderr
+    assert "is no checkpoint of Skidpad" in done.stderr
+    assert done.exit_code == 0
 
+
+def test_a_campaign_keeps_checkpoints(tmp_path):
+    recipe = replace(RECIPE, drive=partial(drive_one, checkpoints_s=0.5))
+    Campaign(recipe, [cell(duration=1.2)]).run(tmp_path, local(1))
+    found = sorted(p.name for p in tmp_path.glob("runs/*/checkpoints/*"))
+    assert found == ["0000010.state", "0000020.state"]
+
+
+def test_a_changed_log_is_noticed(campaign, tmp_path):
     run = tmp_path / "run"
     shutil.copytree(campaign / "runs" / "2_rain-noon-003", run)
     text = (run / "config.yaml").read_text()

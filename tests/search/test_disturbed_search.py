@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from msgspec import structs
 from typer.testing import CliRunner
 
 import skidpad
@@ -13,7 +14,7 @@ from skidpad.campaign.workers.pool import keep_workers
 from skidpad.campaign.workers.worker import Finished
 from skidpad.cli.main import app
 from skidpad.core.disturbance import SOURCE, actor_of_draw
-from skidpad.core.errors import ConfigError
+from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.run import run_from_plain
 from skidpad.core.space import Space
 from skidpad.recording.campaign.risks import SPLITTING, Risk, read_risk_found
@@ -26,8 +27,9 @@ from skidpad.recording.campaign.searches import (
 )
 from skidpad.recording.run.log_files import log_hash, read_log
 from skidpad.roads.bundled import load_map
-from skidpad.search.branching import Drives
-from skidpad.search.margin import approach, closeness
+from skidpad.search import branching
+from skidpad.search.branching import Drives, SplitTask, split_drives
+from skidpad.search.margin import NO_CONFLICT, approach, closeness
 from skidpad.search.risk import split_all
 from skidpad.search.space import disturbance_variables
 from skidpad.search.splitting import split_paths, splitting_estimate
@@ -141,6 +143,27 @@ def test_a_branch_is_the_drive_that_it_left_until_its_level_and_another_one_then
     assert np.abs(one.places[-1] - other.places[-1]).max() > 0.01
     assert len(drives.apart) == 3
     assert all(apart[0] == 0.0 for apart in drives.apart)
+
+
+def test_a_drive_without_a_tick_is_a_fault_far_from_any_failure(tmp_path, monkeypatch):
+    (tmp_path / "failing.py").write_text(
+        "class Failing:\n"
+        "    def __init__(self, specs, map, settings):\n        pass\n"
+        "    def tick(self, frame):\n        raise ValueError('not today')\n"
+    )
+    plain = ask(112, 4)
+    driver = {**plain.run, "driver": {"type": "stack", "where": f"{tmp_path}/failing.py:Failing"}}
+    drives = Drives(structs.replace(plain, run=driver), 0)
+    path = drives.begin(0)
+    assert (path.score, path.kind, len(path.levels)) == (NO_CONFLICT, "", 0)
+    found = split_drives(SplitTask(structs.replace(plain, run=driver), 0))
+    assert (found.p, found.faults, found.runs) == (0.0, 4, 4)
+
+    def refuse(template, values):
+        raise FileError("LeadS leaves the road")
+
+    monkeypatch.setattr(branching, "apply_values", refuse)
+    assert split_drives(SplitTask(plain, 0)).faults == 4
 
 
 def test_workers_change_nothing_and_what_was_cut_off_goes_on(tmp_path):

@@ -70,7 +70,7 @@ class Checkpoint:
     def __init__(self, root: object, fixed: tuple[type, ...] = ()) -> None:
         self._restoring: list[tuple[Callable[..., None], Any, Any]] = []
         self.nbytes = 0  # of arrays
-        copiers = _COPIERS_OF.setdefault(fixed, {tuple: _copy_tuple})
+        copiers = copiers_of(fixed)
         seen: dict[int, object] = {}
         waiting: list[object] = [(root,)]
         while waiting:
@@ -78,13 +78,10 @@ class Checkpoint:
             put_back, state, parts = copiers[type(found)](found)  # type: ignore[misc]
             if put_back is not None:
                 self._restoring.append((put_back, found, state))
-                if put_back is _put_array:
+                if put_back is put_array:
                     self.nbytes += state.nbytes
             for part in parts:
-                kind: Any = type(part)
-                if kind not in copiers:
-                    copiers[kind] = _copier(kind, fixed)
-                if copiers[kind] is not None and id(part) not in seen:
+                if copiers[type(part)] is not None and id(part) not in seen:
                     seen[id(part)] = part
                     waiting.append(part)
 
@@ -98,9 +95,28 @@ class Checkpoint:
 
 
 Copied = tuple[Callable[..., None] | None, Any, Iterable[object]]
+Copier = Callable[[Any], Copied]
 
 
-def _copier(kind: Any, fixed: tuple[type, ...]) -> Callable[[Any], Copied] | None:
+class Copiers(dict[type, "Copier | None"]):
+    """What copies objects of each type, found as types are met; None: its objects do not change."""
+
+    def __init__(self, fixed: tuple[type, ...]) -> None:
+        super().__init__({tuple: _copy_tuple})
+        self.fixed = fixed
+
+    def __missing__(self, kind: type) -> Copier | None:
+        self[kind] = found = _copier(kind, self.fixed)
+        return found
+
+
+@cache
+def copiers_of(fixed: tuple[type, ...]) -> Copiers:
+    """Returns what copies objects of each type where these types are fixed."""
+    return Copiers(fixed)
+
+
+def _copier(kind: Any, fixed: tuple[type, ...]) -> Copier | None:
     """Returns what copies objects of a type; None for a type whose objects do not change."""
     if issubclass(kind, (*UNCHANGING, *fixed)) or _is_kernel(kind):
         return None
@@ -115,7 +131,7 @@ def _copier(kind: Any, fixed: tuple[type, ...]) -> Callable[[Any], Copied] | Non
         return _copy_by_itself
     frozen = getattr(kind, "__dataclass_params__", None)
     if frozen is not None and frozen.frozen:
-        return partial(_copy_frozen, _slots(kind))
+        return partial(_copy_frozen, slots_of(kind))
     if "__setstate__" in vars(kind):
         return _copy_by_protocol
     for base in kind.__mro__:
@@ -124,7 +140,7 @@ def _copier(kind: Any, fixed: tuple[type, ...]) -> Callable[[Any], Copied] | Non
                 f"a {kind.__module__}.{kind.__qualname__} cannot be saved, as Python does not show "
                 "its state; a class of yours may have __getstate__ and __setstate__"
             )
-    return partial(_copy_object, _slots(kind))
+    return partial(_copy_object, slots_of(kind))
 
 
 def _is_kernel(kind: type) -> bool:
@@ -133,7 +149,7 @@ def _is_kernel(kind: type) -> bool:
 
 
 @cache
-def _slots(kind: Any) -> tuple[str, ...]:
+def slots_of(kind: Any) -> tuple[str, ...]:
     """Returns the names of all slots of a class."""
     found: list[str] = []
     for base in kind.__mro__:
@@ -144,37 +160,41 @@ def _slots(kind: Any) -> tuple[str, ...]:
 
 def _copy_array(array: np.ndarray) -> Copied:
     if array.dtype.hasobject:
-        return _put_array, array.copy(), array.tolist()
-    return (_put_array, array.copy(), ()) if array.flags.writeable else (None, None, ())
+        return put_array, array.copy(), array.tolist()
+    return (put_array, array.copy(), ()) if array.flags.writeable else (None, None, ())
 
 
-def _put_array(array: np.ndarray, state: np.ndarray) -> None:
+def put_array(array: np.ndarray, state: np.ndarray) -> None:
+    """Writes the numbers of an array back."""
     array[...] = state
 
 
 def _copy_list(items: list[Any]) -> Copied:
-    return _put_list, items.copy(), items
+    return put_list, items.copy(), items
 
 
-def _put_list(items: list[Any], state: list[Any]) -> None:
+def put_list(items: list[Any], state: list[Any]) -> None:
+    """Puts the items of a list back."""
     items[:] = state
 
 
 def _copy_items(items: Any) -> Copied:
     parts = (*items, *items.values()) if isinstance(items, dict) else tuple(items)
-    return _put_items, items.copy(), parts
+    return put_items, items.copy(), parts
 
 
-def _put_items(items: Any, state: Any) -> None:
+def put_items(items: Any, state: Any) -> None:
+    """Puts the items of a dict, set, deque or bytearray back."""
     items.clear()
     items.extend(state) if isinstance(items, (deque, bytearray)) else items.update(state)
 
 
 def _copy_generator(generator: np.random.Generator) -> Copied:
-    return _put_generator, generator.bit_generator.state, ()
+    return put_generator, generator.bit_generator.state, ()
 
 
-def _put_generator(generator: np.random.Generator, state: Any) -> None:
+def put_generator(generator: np.random.Generator, state: Any) -> None:
+    """Puts a random generator back to its state."""
     generator.bit_generator.state = state
 
 
@@ -200,28 +220,31 @@ def _copy_function(function: FunctionType) -> Copied:
 
 def _copy_cell(cell: CellType) -> Copied:
     try:
-        return _put_cell, cell.cell_contents, (cell.cell_contents,)
+        return put_cell, cell.cell_contents, (cell.cell_contents,)
     except ValueError:  # it is empty so far
         return None, None, ()
 
 
-def _put_cell(cell: CellType, state: object) -> None:
+def put_cell(cell: CellType, state: object) -> None:
+    """Puts the content of a closure's cell back."""
     cell.cell_contents = state
 
 
 def _copy_by_itself(found: KeepsHistory) -> Copied:
-    return _put_by_itself, found.copy_state(), ()
+    return put_by_itself, found.copy_state(), ()
 
 
-def _put_by_itself(found: KeepsHistory, state: object) -> None:
+def put_by_itself(found: KeepsHistory, state: object) -> None:
+    """Lets an object take back the state that it gave."""
     found.restore_state(state)
 
 
 def _copy_by_protocol(found: Any) -> Copied:
-    return _put_by_protocol, deepcopy(found.__getstate__()), ()
+    return put_by_protocol, deepcopy(found.__getstate__()), ()
 
 
-def _put_by_protocol(found: Any, state: object) -> None:
+def put_by_protocol(found: Any, state: object) -> None:
+    """Lets an object take back the state that its __getstate__ gave."""
     found.__setstate__(deepcopy(state))
 
 
@@ -235,10 +258,11 @@ def _copy_object(slots: tuple[str, ...], found: Any) -> Copied:
     own = getattr(found, "__dict__", {}).copy()
     unsaved = getattr(found, "UNSAVED", ())
     parts = [part for name, part in (held | own).items() if name not in unsaved]
-    return _put_object, (slots, held, own), parts
+    return put_object, (slots, held, own), parts
 
 
-def _put_object(found: Any, state: tuple[tuple[str, ...], dict[str, Any], dict[str, Any]]) -> None:
+def put_object(found: Any, state: tuple[tuple[str, ...], dict[str, Any], dict[str, Any]]) -> None:
+    """Puts the attributes of an object back."""
     slots, held, own = state
     for name in slots:
         if name in held:
@@ -250,7 +274,7 @@ def _put_object(found: Any, state: tuple[tuple[str, ...], dict[str, Any], dict[s
         found.__dict__.update(own)
 
 
-COPIERS: dict[type, Callable[[Any], Copied]] = {
+COPIERS: dict[type, Copier] = {
     np.ndarray: _copy_array,
     list: _copy_list,
     dict: _copy_items,
@@ -266,5 +290,3 @@ COPIERS: dict[type, Callable[[Any], Copied]] = {
     FunctionType: _copy_function,
     CellType: _copy_cell,
 }
-# by the fixed types of a checkpoint: what copies objects of each type; None: they do not change
-_COPIERS_OF: dict[tuple[type, ...], dict[type, Callable[[Any], Copied] | None]] = {}

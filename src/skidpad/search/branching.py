@@ -17,6 +17,7 @@ from skidpad.campaign.runs.checkpoints import RunCheckpoint
 from skidpad.campaign.runs.run import OpenRun
 from skidpad.core.arrays import Floats
 from skidpad.core.disturbance import actor_of_draw
+from skidpad.core.errors import InputError
 from skidpad.core.randomness import stream
 from skidpad.core.setup import DT
 from skidpad.core.space import Space, Value
@@ -40,8 +41,7 @@ class DrivenPath:
     """One drive to its end.
 
     Attributes:
-        run: that can go back to `origin`.
-        origin: where its own draws begin.
+        begun: the run, and where its own draws begin; None: it logged no tick, and nothing can leave it.
         name: of the streams of its draws.
         levels: (T,) margin so far, by tick.
         places: (T, n, 2) m of the disturbed vehicles.
@@ -50,8 +50,7 @@ class DrivenPath:
         cut: the level under which it was followed last, and the state there.
     """
 
-    run: OpenRun
-    origin: RunCheckpoint
+    begun: tuple[OpenRun, RunCheckpoint] | None
     name: str
     levels: Floats
     places: Floats
@@ -80,22 +79,38 @@ class Drives:
             rng = stream(self.asked.seed, "splitting", self.repetition, number)
             values = self.space.values(unit_tuple(rng.random(len(self.space.variables))))
         key = tuple(values.values())
+        name = f"{self.repetition}.{number}"
         if key not in self.begun:
-            run = OpenRun(apply_values(self.template, values))
-            run.step()  # nothing is drawn in it
+            run = self._first_tick(values)
+            if run is None:
+                self.faults += 1
+                return DrivenPath(None, name, np.empty(0), np.empty((0, 0, 2)), NO_CONFLICT, "")
             self.begun[key] = run, run.save()
-        return self._drive(*self.begun[key], f"{self.repetition}.{number}")
+        return self._drive(*self.begun[key], name)
+
+    def _first_tick(self, values: dict[str, Value]) -> OpenRun | None:
+        """Returns a run that has driven its first tick, in which nothing is drawn; None where it cannot."""
+        try:
+            run = OpenRun(apply_values(self.template, values))
+        except InputError:  # the file refuses the values
+            return None
+        if run.step() is None:
+            run.close()
+            return None
+        return run
 
     def branch(self, path: DrivenPath, below: float, name: str) -> DrivenPath:
         """Returns the drive that leaves `path` where its margin first is under `below`."""
         row = int(np.argmax(path.levels < below))
+        assert path.begun is not None, "what logged no tick has no level below any other"
+        run, origin = path.begun
         if path.cut is None or path.cut[0] != below:
-            self._go_back(path.run, path.origin, path.name)
-            while len(path.run.log.log) <= row:
-                path.run.step()
+            self._go_back(run, origin, path.name)
+            while len(run.log.log) <= row:
+                run.step()
                 self.ticks += 1
-            path.cut = below, path.run.save()
-        found = self._drive(path.run, path.cut[1], name)
+            path.cut = below, run.save()
+        found = self._drive(run, path.cut[1], name)
         both = min(len(path.places), len(found.places))
         apart = np.linalg.norm(path.places[row:both] - found.places[row:both], axis=2).mean(axis=1)
         self.apart.append(apart[:: round(APART_S / DT)])
@@ -132,7 +147,7 @@ class Drives:
             blank = Trial(number=0, unit=(), values={}, margin=NO_CONFLICT)
             score = near.margin
             kind = structs.replace(blank, **list_columns(log, near)).kind
-        return DrivenPath(run, origin, name, levels, places.astype(float), score, kind)
+        return DrivenPath((run, origin), name, levels, places.astype(float), score, kind)
 
 
 @dataclass(frozen=True, slots=True)

@@ -53,8 +53,13 @@ def see_all() -> None:
     LampCamera(specs).look(suite.observe(0, states, {}).images)
 
 
-def drive_one(out: Path, cell: RunSpec) -> Driven[RunKey, Metrics]:
-    """Drives a run, writes its folder (one that is there is replaced) and returns its row."""
+def drive_one(
+    out: Path, cell: RunSpec, checkpoints_s: float | None = None
+) -> Driven[RunKey, Metrics]:
+    """Drives a run, writes its folder (one that is there is replaced) and returns its row.
+
+    checkpoints_s: s between checkpoints in the folder; None: none.
+    """
     # numba and friends are imported only where they are needed, not in the parent.
     from skidpad.campaign.driving.backends import WATCHDOG, keep_server, make_backend
     from skidpad.campaign.driving.run_setup import journey_of
@@ -72,7 +77,7 @@ def drive_one(out: Path, cell: RunSpec) -> Driven[RunKey, Metrics]:
     keep_server(cell.backend)
     backend = make_backend(cell.backend, WATCHDOG)
     here = with_kept_map(cell, out)
-    driven = run(here, backend=backend, folder=folder, sinks=(pace,))
+    driven = run(here, backend=backend, folder=folder, sinks=(pace,), checkpoints_s=checkpoints_s)
     timing = watch.timing(len(driven.log) * DT, pace.slow_pct)
     digest = write_run(folder, driven)
     metrics = Metrics()

@@ -24,15 +24,16 @@ class Task:
 
     run: RunSpec
     out: Path
+    checkpoints_s: float | None = None  # s between checkpoints in the folder
 
 
-def run_to(spec: RunSpec, out: Path) -> Run:
+def run_to(spec: RunSpec, out: Path, checkpoints_s: float | None = None) -> Run:
     """Drives a run and writes its whole folder; returns the run. OutputError when the folder is taken.
 
     On a CARLA server a process of its own drives: the wheel's threads can end theirs. BackendError
     when that process fails.
     """
-    task = Task(spec, require_free(out))
+    task = Task(spec, require_free(out), checkpoints_s)
     if spec.backend.backend != BackendKind.CARLA:
         return run_task(task)
     if isinstance(spec.course, Scenario):
@@ -48,7 +49,7 @@ def run_task(task: Task) -> Run:
     """Drives a task in this process, writes its folder and returns the run."""
     keep_server(task.run.backend)
     backend = make_backend(task.run.backend, WATCHDOG)
-    driven = run(task.run, backend=backend, folder=task.out)
+    driven = run(task.run, backend=backend, folder=task.out, checkpoints_s=task.checkpoints_s)
     write_config(task.out, task.run.to_plain())
     write_run(task.out, driven)
     write_played(task.out, driven)

@@ -20,14 +20,14 @@ from PIL import Image
 
 from skidpad.campaign.channels.drive import drive_segment
 from skidpad.campaign.driving.backends import keep_server
-from skidpad.campaign.driving.loop import Moment, Sink, Timer
-from skidpad.campaign.driving.run_setup import stage_of
-from skidpad.campaign.runs.run import run as drive_again
+from skidpad.campaign.driving.loop import Moment, Sink
+from skidpad.campaign.runs.run import OpenRun
+from skidpad.campaign.runs.state_files import CheckpointWriter, StateFiles, find_nearest
 from skidpad.campaign.runs.stored import read_run, read_segment
 from skidpad.campaign.runs.views import SIZE, twelve_views
 from skidpad.campaign.takeover.desk import Desk, Recorded
 from skidpad.campaign.user_files import with_kept_map
-from skidpad.core.errors import ConfigError, FileError, OutputError
+from skidpad.core.errors import CheckpointError, ConfigError, FileError, OutputError
 from skidpad.core.run import RunSpec
 from skidpad.core.setup import DT
 from skidpad.core.states import StackReport
@@ -48,13 +48,23 @@ class Rerun:
     pictures: tuple[Path, ...]
     film: Path | None
     trace: tuple[str, ...]  # one line per change of tier or status
+    begun_s: float = 0.0  # of the checkpoint from which it was driven; 0: from the beginning
+    refused: str = ""  # why no checkpoint was used, where that needs a word
 
 
-def rerun(run: Path, begin_s: float, end_s: float, out: Path, film: Path | None = None) -> Rerun:
+def rerun(
+    run: Path,
+    begin_s: float,
+    end_s: float,
+    out: Path,
+    film: Path | None = None,
+    checkpoints_s: float | None = None,
+) -> Rerun:
     """Drives the run in folder `run` again up to `end_s`, keeping what happens from `begin_s` on.
 
-    Pictures go to `out`, or a film to `film`. FileError for an empty run, ConfigError for a stretch
-    outside of it.
+    It begins at the nearest checkpoint before, where the folder has any. Pictures go to `out`, or a film to
+    `film`; with `checkpoints_s` the whole way is driven, and a checkpoint written each so many s. FileError
+    for an empty run, ConfigError for a stretch outside of it.
     """
     stored = read_log(run)
     spec = with_kept_map(read_run(run), run.resolve().parents[1])
@@ -68,16 +78,44 @@ def rerun(run: Path, begin_s: float, end_s: float, out: Path, film: Path | None 
     end_s = min(end_s, last + DT)
     closely = Closely(begin_s, end_s, out, film)
     keep_server(spec.backend)
+    opened = OpenRun(spec, sinks=(closely,), desk=desk_of(run, spec))
+    writer = None
+    if checkpoints_s is not None:
+        writer = CheckpointWriter(opened, run, max(round(checkpoints_s / DT), 1))
+    refused, begun = "", 0
     try:
-        stage = stage_of(spec)
-        stage = replace(stage, script=Timer(round(end_s / DT), stage.script))
-        again = drive_again(spec, stage=stage, sinks=(closely,), desk=desk_of(run, spec)).log
+        if writer is None:
+            refused, begun = _go_to_nearest(opened, run, round(begin_s / DT))
+        while (moment := opened.step()) is not None:
+            if writer is not None:
+                writer.note_tick()
+            if moment.frame.tick + 1 >= round(end_s / DT):
+                break
         closely.finish()
     finally:
         closely.close()
+        opened.close()
+    again = opened.log.log.finish()
+    if begun:
+        stored = last_ticks(stored, begun + 1)
     n = len(again)
     same = log_hash(first_ticks(again, n)) == log_hash(first_ticks(stored, n))
-    return Rerun(same, tuple(closely.pictures), film, tuple(closely.trace))
+    return Rerun(same, tuple(closely.pictures), film, tuple(closely.trace), begun * DT, refused)
+
+
+def _go_to_nearest(opened: OpenRun, run: Path, tick: int) -> tuple[str, int]:
+    """Puts a run to the nearest checkpoint in its folder before a tick.
+
+    Returns why none was used, where that needs a word, and its tick; 0: none was.
+    """
+    try:
+        path = find_nearest(run, opened.spec, tick)
+        if path is None or opened.step() is None:
+            return "", 0
+        StateFiles(opened).restore(path)
+    except CheckpointError as error:
+        return str(error), 0
+    return "", opened.tick
 
 
 def desk_of(run: Path, spec: RunSpec) -> Desk | None:
@@ -117,6 +155,29 @@ def first_ticks(log: RunLog, n: int) -> RunLog:
         weather=log.weather[:n],
         weathers=log.weathers[: int(log.weather[:n].max()) + 1],
         events=tuple(e for e in log.events if e.tick <= last),
+    )
+
+
+def last_ticks(log: RunLog, n: int) -> RunLog:
+    """Returns the log without its first n ticks and their events; 0 <= n < length of the log."""
+
+    def cut_series(series: Any) -> Any:
+        return type(series)._make(a[n:] for a in series)
+
+    first = int(log.tick[n])
+    return replace(
+        log,
+        tick=log.tick[n:],
+        actors=cut_series(log.actors),
+        present=log.present[n:],
+        mu=log.mu[n:],
+        ego=cut_series(log.ego),
+        applied=cut_series(log.applied),
+        requested=cut_series(log.requested),
+        report=cut_series(log.report),
+        supervision=log.supervision[n:],
+        weather=log.weather[n:],
+        events=tuple(e for e in log.events if e.tick >= first),
     )
 
 

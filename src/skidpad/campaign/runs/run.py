@@ -27,6 +27,7 @@ from skidpad.campaign.driving.run_setup import (
 )
 from skidpad.campaign.driving.snapshots import Snapshots
 from skidpad.campaign.runs.checkpoints import RunCheckpoint
+from skidpad.campaign.runs.state_files import CheckpointWriter
 from skidpad.campaign.takeover.desk import Desk, DeskBackend, DeskDriver, DeskScript, DeskSupervisor
 from skidpad.core.errors import CheckpointError, StackError, require_choice
 from skidpad.core.run import (
@@ -216,19 +217,25 @@ def run(
     folder: Path | None = None,
     sinks: Sequence[Sink] = (),
     desk: Desk | None = None,
+    checkpoints_s: float | None = None,
 ) -> Run:
     """Drives a run on roads or in a scenario and returns what it leaves; a failing stack is an outcome.
 
     kind: the stack's class, if it is loaded. stage: the run's own by default. backend: by default a
     fresh one of the run's choice. folder: where snapshots of collisions go. sinks: further observers.
-    desk: where a person sits, or sat.
+    desk: where a person sits, or sat. checkpoints_s: s between checkpoints in the folder.
     """
     opened = OpenRun(
         spec, kind, stage=stage, backend=backend, folder=folder, sinks=sinks, desk=desk
     )
+    writer: CheckpointWriter | None = None
+    if checkpoints_s is not None and folder is not None:
+        every = max(round(checkpoints_s / opened.stage.setup.dt), 1)
+        writer = CheckpointWriter(opened, folder, every)
     try:
         while opened.step() is not None:
-            pass
+            if writer is not None:
+                writer.note_tick()
     finally:
         opened.close()
     return opened.finish()
@@ -314,12 +321,34 @@ class OpenRun:
         """
         checkpoint.restore(self)
         if branch:
-            branch_backend(self.backend, branch)
-            if self.stage.player is not None:
-                self.stage.player.disturbances.branch(branch)
+            self.branch(branch)
+
+    def branch(self, name: str) -> None:
+        """Draws from random streams of this name from now on, in place of the run's own."""
+        branch_backend(self.backend, name)
+        if self.stage.player is not None:
+            self.stage.player.disturbances.branch(name)
+
+    @property
+    def tick(self) -> int:
+        """Returns the tick that was driven last."""
+        return self.backend.truth().tick
+
+    def parts(self) -> list[Any]:
+        """Returns what decides how the run goes on, without what looks on; the last says what acts next."""
+        assert self.stepper is not None, "step() comes first"
+        s = self.stepper
+        return [s.backend, s.driver, s.supervisor, s.script, self.log, [s.action, s.words]]
+
+    def take_parts(self, parts: list[Any]) -> None:
+        """Takes back what acts next, which `parts` gave last."""
+        assert self.stepper is not None, "step() comes first"
+        self.stepper.action, self.stepper.words = parts
 
     def close(self) -> None:
-        """Releases the backend and what it holds."""
+        """Releases the backend and what it holds; a run that was left before its end is over then."""
+        if not self.over:
+            self._end()
         self.backend.close()
 
     def finish(self) -> Run:

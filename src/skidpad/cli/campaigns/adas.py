@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +12,7 @@ import typer
 from msgspec import structs
 
 from skidpad.cli.options.asked import Climate, Drivers, Tuned
-from skidpad.cli.options.campaigns import FirstSeed, How, Seeds
+from skidpad.cli.options.campaigns import Checkpoints, FirstSeed, How, Seeds
 from skidpad.cli.options.spread import spread_fields
 from skidpad.core.run import Roads, RunSpec
 from skidpad.core.simulator import BackendChoice, BackendKind
@@ -50,6 +52,7 @@ def adas(
             "they differ.",
         ),
     ] = 0,
+    checkpoints: Checkpoints = None,
 ) -> None:
     """Drive configurations x weathers x seeds; prints the answer and the path of the report."""
     from skidpad.cli.options.carla_backend import check_backend, drives_alone
@@ -62,7 +65,7 @@ def adas(
         require_map(roads.map)
         tuned.require_surface_on(roads, run.surface)
     from skidpad.campaign.campaign import Campaign
-    from skidpad.campaign.recipes.matrix import RECIPE
+    from skidpad.campaign.recipes.matrix import RECIPE, drive_one
     from skidpad.campaign.user_files import found_again, keep_maps
     from skidpad.cli.campaigns.adas_plan import on_pixels, plan
     from skidpad.recording.campaign.matrix import PIXELS
@@ -71,7 +74,8 @@ def adas(
     run = found_again(run, how.folder)
     alone = drives_alone(run.backend)
     cells, files = keep_maps(plan(run, chosen, weathers, seeds))
-    campaign = Campaign(RECIPE, cells, alone=alone, files=files, distinct=distinct)
+    recipe = replace(RECIPE, drive=partial(drive_one, checkpoints_s=checkpoints))
+    campaign = Campaign(recipe, cells, alone=alone, files=files, distinct=distinct)
     twins = on_pixels(cells, parity_seeds)
     parts = {PIXELS: Campaign(RECIPE, twins, alone=alone, files=files)} if twins else {}
     how(campaign, answer, parts)

@@ -18,6 +18,15 @@ if TYPE_CHECKING:
 
 Seeds = Annotated[int, typer.Option("--seeds", "--repeats", min=1, help="Runs per cell.")]
 FirstSeed = Annotated[int, typer.Option("--first-seed", min=1, help="Seeds count up from it.")]
+Checkpoints = Annotated[
+    float | None,
+    typer.Option(
+        min=0.05,
+        help="Also write the state to the run's folder each so many s; `rerun --from` begins at the "
+        "nearest.",
+        show_default=False,
+    ),
+]
 Workers = Annotated[int, Meta(ge=1, description="Processes; default: one per core.")]
 CORES = os.cpu_count() or 1
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from skidpad.cli.options.campaigns import FirstSeed
+from skidpad.cli.options.campaigns import Checkpoints, FirstSeed
 
 if TYPE_CHECKING:
     from skidpad.campaign.runs.rerun import Rerun
@@ -24,11 +24,14 @@ def rerun(
     begin: Annotated[float, typer.Option("--from", help="s of simulated time.")] = 0.0,
     end: Annotated[float, typer.Option("--to", help="s of simulated time.")] = 10.0,
     video: Annotated[Path | None, typer.Option(help="Write a film to this .mp4 file.")] = None,
+    checkpoints: Checkpoints = None,
     yes: Annotated[
         bool, typer.Option("--yes", help="Run the code that the folder names without asking.")
     ] = False,
 ) -> None:
     """Drive a stored run again: all twelve views and the tier trace of a stretch, hash-checked.
+
+    It begins at the nearest checkpoint before the stretch, where the run has any.
 
     Channels are driven again as a whole, without views.
     """
@@ -47,7 +50,7 @@ def rerun(
     if is_segment:
         same = again.same_segment(run)
     else:
-        result = again.rerun(run, begin, end, run / "rerun", video)
+        result = again.rerun(run, begin, end, run / "rerun", video, checkpoints)
         _show(result)
         same = result.same
     if not same:
@@ -72,7 +75,11 @@ def require_backend(run: Path, name: str) -> None:
 
 
 def _show(result: Rerun) -> None:
-    """Prints the trace, and where the film or the pictures are."""
+    """Prints where the drive began, the trace, and where the film or the pictures are."""
+    if result.refused:
+        typer.echo(f"driven from the beginning: {result.refused}", err=True)
+    elif result.begun_s:
+        typer.echo(f"driven from the checkpoint at {result.begun_s:.2f} s on")
     for line in result.trace:
         typer.echo(line)
     if result.film is not None:

@@ -10,7 +10,7 @@ import typer
 from msgspec import structs
 
 from skidpad.cli.options.asked import OF_FILE, EgoStack, PlayCross, Tuned
-from skidpad.cli.options.campaigns import CampaignOptions, Driving, How, Seeds
+from skidpad.cli.options.campaigns import CampaignOptions, Checkpoints, Driving, How, Seeds
 from skidpad.cli.options.spread import spread_fields
 from skidpad.cli.scenarios.expected import Expected, exit_by_verdicts, played_report
 from skidpad.core.run import RunSpec, Scenario
@@ -66,6 +66,7 @@ def play(
     expected: Expected,
     seeds: Seeds = 1,
     out: Annotated[Path | None, typer.Option(help="Folder for the run, or for the runs.")] = None,
+    checkpoints: Checkpoints = None,
     check: Annotated[
         bool, typer.Option("--check", help="List all that is wrong or unknown; run nothing.")
     ] = False,
@@ -86,13 +87,15 @@ def play(
     from skidpad.scenarios.reading.distributions import is_distribution
 
     if file.is_dir() or is_distribution(file):
+        if checkpoints is not None:
+            raise ConfigError("--checkpoints is for a single file: of a folder, rerun one run")
         how = CampaignOptions(out=out, **structs.asdict(driving))
         _drive_all(how, template, cross, file, seeds, expected)
         return
     runs = play_runs(template, cross, [file], seeds)
     if len(runs) > 1:
         raise ConfigError("one file is one run: several weathers, grips or seeds take a folder")
-    driven = run_to(runs[0], out)
+    driven = run_to(runs[0], out, checkpoints)
     if driven.error:
         typer.echo(driven.error.strip().split("\n")[-1], err=True)
     played, text = expected.conclude(out)

@@ -81,6 +81,12 @@ class TickLog:
         events = self._events.copy(), dict(self._lights), self._weathers.copy(), self._weather
         return (*ticks, *more, *events)
 
+    def copy_place(self) -> tuple[Any, ...]:
+        """Returns a state that goes on from here in a log of the later ticks alone."""
+        ticks = (a[:0] for a in (self._tick, self._row))
+        columns = self._actors[:, :0], self._present[:0], self._mu[:0]
+        return (*ticks, *columns, [], dict(self._lights), self._weathers.copy(), self._weather)
+
     def restore_state(self, state: tuple[Any, ...]) -> None:
         """Takes back what `copy_state` gave."""
         tick, row, actors, present, mu, events, lights, weathers, weather = state

@@ -66,7 +66,10 @@ def replayed_readings(folder: Path, out: str) -> str:
 
 # what the cockpit says of the run that a recipe drives
 PARTS = {
-    "A driving function": ("out/assisted", "isa: Intelligent speed assistance [package isa]"),
+    "A driving function": (
+        "out/assisted",
+        "isa: Intelligent speed assistance [package speed-assistance]",
+    ),
     "A weather preset": ("out/fog", "freezing-fog: Freezing fog [package freezing-fog]"),
     "A backend": ("out/late", "Pedals and steering act 0.15 s late [package late-actuators]"),
     "A map": ("out/circle", "[package circle"),

@@ -6,6 +6,7 @@ import pytest
 from skidpad.core.errors import FileError
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels import identifier
+from skidpad.evidence.channels.choices import Identify
 from skidpad.evidence.channels.hazards import SCORED_HAZARDS
 from skidpad.evidence.channels.identifier.features import (
     FEATURE_NAMES,
@@ -17,7 +18,6 @@ from skidpad.evidence.channels.identifier.forest import Forest, check_forest, pr
 from skidpad.evidence.channels.identifier.model import (
     ALL_ROUTES,
     Detector,
-    Identify,
     LearnedIdentifier,
     events_of,
     load_model,

@@ -6,30 +6,18 @@ from pathlib import Path
 
 import pytest
 
+from support.ids import (
+    DECISION,
+    FINDING,
+    REQUIREMENT,
+    listed_decisions,
+    listed_findings,
+    listed_requirements,
+)
+
 ROOT = Path(__file__).resolve().parents[1]
-DECISIONS = (ROOT / "docs" / "decisions.md").read_text(encoding="utf-8")
 TEXTS = ("*.py", "*.md", "*.yaml", "*.toml", "*.js", "*.css")
-DECISION = re.compile(r"\b[XLMGCKRT]-[1-9]\d?\b|\bB?D-\d{2,3}\b|\bDC-\d{2}\b")
-REQUIREMENT = re.compile(r"\b[ABC]-\d{3}\b")
-FINDING = re.compile(r"\b[BC]?F-\d{2}[a-z]{0,2}\b")
 NOT_IDS = {"F-99", "D-552"}  # the unknown finding of a test; a technical note of NASA
-
-
-def listed_decisions() -> set[str]:
-    headings = re.findall(r"^### (\S+) ", DECISIONS, re.MULTILINE)
-    rows = re.findall(r"^\| (B?D-\d+|DC-\d+) \|", DECISIONS, re.MULTILINE)
-    assert len(headings + rows) == len(set(headings + rows)), "an id is listed twice"
-    return {*headings, *rows}
-
-
-def listed_requirements() -> set[str]:
-    with (ROOT / "docs" / "traceability" / "requirements.csv").open(encoding="utf-8") as file:
-        return {row["id"] for row in csv.DictReader(file)}
-
-
-def listed_findings() -> set[str]:
-    claims = (ROOT / "docs" / "results" / "claims.md").read_text(encoding="utf-8")
-    return set(re.findall(r"^\| ([BC]?F-\d{2}\w*) \|", claims + DECISIONS, re.MULTILINE))
 
 
 def cited(pattern: re.Pattern[str]) -> dict[str, str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,34 +13,10 @@ from docs_hooks import ROOT, _leaves
 from skidpad.cli.main import app
 from skidpad.core.setting import describe_settings
 from skidpad.core.settings import PARTS
+from support.ids import ID, bare_ids
 
 SOURCE = ROOT / "src" / "skidpad"
-ID = re.compile(r"\b(?:[A-DFGKLMRTX]|BD|DC|BF|CF)-\d{1,3}[a-z]{0,2}\b")
-CODE = re.compile(r"`[^`]*`")  # commands, where an id is an argument
-PAGES = ("docs/results/claims.md", "docs/decisions.md", "docs/requirements.md")
 REPORTS = ("report", "cockpit", "pages", "fleet", "search", "cli/output", "live")
-WORD = re.compile(r"[A-Za-z]{2,}")
-
-
-def bare_ids(text: str) -> list[str]:
-    """Returns the ids in a text that neither stand in brackets behind words nor before them.
-
-    A text that names the page where its ids are explained has none.
-    """
-    text = CODE.sub("", text)
-    if any(page in text for page in PAGES):
-        return []
-    return [m[0] for m in ID.finditer(text) if not is_told(text, m)]
-
-
-def is_told(text: str, found: re.Match[str]) -> bool:
-    """Tells whether an id stands in brackets behind three words, or right before three of them."""
-    before, after = text[: found.start()], text[found.end() :]
-    opened = before.rfind("(")
-    if opened > before.rfind(")") and ")" in after:
-        return len(WORD.findall(ID.sub("", before[:opened]))) >= 3
-    said = re.match(r"[:,] (.*)", after, re.DOTALL)
-    return said is not None and len(WORD.findall(ID.sub("", said[1]))) >= 3
 
 
 @pytest.mark.parametrize(

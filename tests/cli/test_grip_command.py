@@ -19,6 +19,7 @@ from skidpad.core.run import RunSpec
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.report.grip.page import write_grip_report
 from skidpad.scenarios.shipped import FOLDER
+from support.ids import check_ids, texts_of
 
 SMALL = (
     "--scenarios", "lead_slowdown", "--weather", "icy_0,icy_30", "--repeats", "2", "--workers", "1",
@@ -94,6 +95,7 @@ def test_a_small_campaign_from_command_to_page(tmp_path):
     ):  # fmt: skip
         assert part in page, part
     assert 'src="http' not in page
+    check_ids(texts_of(page))
     write_grip_report(out)
     assert (out / "report.html").read_text(encoding="utf-8") == page
 

@@ -15,7 +15,16 @@ from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.recording.campaign.quantities import name_of
 from skidpad.report.crashes.cards import Found
 from skidpad.report.elements.figures import Chart, Curve, curves
-from skidpad.report.elements.page import Block, Figure, Page, Section, Text, write_report_page
+from skidpad.report.elements.page import Block, Figure, Page, Section, Table, Text, write_report_page
+from skidpad.report.elements.page import Cell as ShownCell
+    Block,
+    Definitions,
+    Figure,
+    Page,
+    Section,
+    Text,
+    write_report_page,
+)
 from skidpad.report.elements.tables import Column, Format, Quantity, table
 from skidpad.report.elements.verdicts import unjudged_text, verdict_blocks
 from skidpad.report.matrix import figures as matrix_figures
@@ -153,9 +162,10 @@ def _verdicts(matrix: Matrix, judged: Sequence[Judgement]) -> list[Block]:
         "vehicles alone. "
         "The sources call an intervention a collision, and so do their claims."
     )
-    own = ", ".join(f.id for f in CLAIMS if f.study)
-    rest = Text(f"Claims that need runs of their own are judged by `skidpad study`: {own}.")
-    return [intro, *verdict_blocks(judged), rest]
+    rows = [[ShownCell(f.id), ShownCell(f.claim)] for f in CLAIMS if f.study]
+    caption = "claims that need runs of their own, judged by skidpad study ID"
+    own = Table((("claim", ""), ("what it says", "")), rows, caption=caption, folded=True)
+    return [intro, *verdict_blocks(judged), own]
 
 
 # What was varied beside the published configurations: functions and cruise target, as factors.

@@ -15,16 +15,16 @@ from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.recording.campaign.quantities import name_of
 from skidpad.report.crashes.cards import Found
 from skidpad.report.elements.figures import Chart, Curve, curves
-from skidpad.report.elements.page import Block, Figure, Page, Section, Table, Text, write_report_page
-from skidpad.report.elements.page import Cell as ShownCell
+from skidpad.report.elements.page import (
     Block,
-    Definitions,
     Figure,
     Page,
     Section,
+    Table,
     Text,
     write_report_page,
 )
+from skidpad.report.elements.page import Cell as ShownCell
 from skidpad.report.elements.tables import Column, Format, Quantity, table
 from skidpad.report.elements.verdicts import unjudged_text, verdict_blocks
 from skidpad.report.matrix import figures as matrix_figures

@@ -3,7 +3,7 @@ from math import pi
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis.strategies import floats
 from shapely.affinity import rotate, translate
 
@@ -143,6 +143,46 @@ def test_a_fast_car_does_not_tunnel_through_the_rail():
         states.y[:] += states.vy * DT
         resolve(states, b, RAIL)
     assert states.y[0] > 0.0
+
+
+@settings(max_examples=examples(200))
+@given(floats(0.02, 0.6), floats(5, 45), floats(0, 2), floats(0, 0.02))
+def test_a_rail_in_pieces_throws_a_car_back_as_one_piece_does(angle, v, shift, bend):
+    """Where two pieces meet nothing sticks out: no joint is an end that stops the nose.
+
+    bend: turn in rad from piece to piece; the whole turn of the few pieces in reach is less than 5 degrees.
+    """
+    turn = bend * (np.arange(-30, 31))
+    x = np.cumsum(2.0 * np.cos(turn)) + shift
+    y = np.cumsum(2.0 * np.sin(turn))
+    x, y = x - x[30], y - y[30]
+    ends = np.column_stack([x[:-1], y[:-1], x[1:], y[1:]])
+    pieces = static_segments(ends, np.zeros(60), np.full(60, 0.8))
+    car = (-3.0, 1.05 + 2 * abs(np.sin(angle)) - v * DT * np.sin(angle), -angle)
+    speeds = (v * np.cos(angle), -v * np.sin(angle))
+    (whole, b), (parted, _) = cars((*car, *speeds)), cars((*car, *speeds))
+    resolve(whole, b, RAIL)
+    found, out = resolve(parted, b, pieces)
+    assume(found)
+    square = np.abs(out.nx[:found])
+    assert (square < 0.15).all()  # no normal along the rail
+    if bend == 0.0:
+        assert found == 1
+        for column in ("x", "y", "vx", "vy", "yaw_rate"):
+            assert getattr(parted, column) == pytest.approx(getattr(whole, column), abs=1e-9)
+
+
+def test_a_corner_of_a_building_stops_the_nose():
+    """Its walls meet, but at a right angle: the corner sticks into the front."""
+    wall = np.array(
+        [[3.0, 0.0, 5.0, 2.0], [5.0, 2.0, 7.0, 0.0], [7.0, 0.0, 5.0, -2.0], [5.0, -2.0, 3.0, 0.0]]
+    )
+    corner = static_segments(wall - [1.05, 0.0, 1.05, 0.0], np.zeros(4), np.ones(4))
+    states, b = cars((0, 0, 0, 10, 0))
+    count, out = resolve(states, b, corner)
+    assert count
+    assert out.nx[:count] == pytest.approx(-1.0)
+    assert states.vx[0] < 0.0
 
 
 def test_end_of_a_rail_stops_the_nose():

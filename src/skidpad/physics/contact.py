@@ -16,8 +16,8 @@ import numpy as np
 from skidpad.core.arrays import Floats, Ints
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.states import ActorStates
-from skidpad.physics.overlap import Boxes, box_box, box_segment, corners_room
-from skidpad.physics.segments import Segments, candidates
+from skidpad.physics.overlap import Boxes, box_box, box_segment, clipped_length, corners_room
+from skidpad.physics.segments import STRAIGHT, Segments, candidates
 
 NEAR = 64  # segments in reach of one actor at most
 PASSES = 2  # over all contacts, so that a car squeezed between two feels both
@@ -65,6 +65,7 @@ class Contacts(NamedTuple):
     nx: Floats  # unit normal, pushes actor i
     ny: Floats
     depth: Floats  # m of overlap found
+    length: Floats  # m of a static segment inside the body
     impulse: Floats  # N s along the normal, >= 0
     v_closing: Floats  # m/s before the impulse, positive when closing
     near: Ints  # (NEAR,) scratch: segments in reach of one actor
@@ -75,7 +76,7 @@ class Contacts(NamedTuple):
         """Returns empty arrays for up to `capacity` contacts."""
         ints = [np.full(capacity, -1, dtype=np.int64) for _ in range(3)]
         near = np.empty(NEAR, dtype=np.int64)
-        return cls._make([*ints, *np.zeros((7, capacity)), near, corners_room()])
+        return cls._make([*ints, *np.zeros((8, capacity)), near, corners_room()])
 
 
 def bodies(
@@ -201,8 +202,39 @@ def _record(
     c.i[count], c.j[count], c.segment[count] = i, j, segment
     c.x[count], c.y[count] = found[1], found[2]
     c.nx[count], c.ny[count], c.depth[count] = found[3], found[4], found[5]
-    c.impulse[count] = 0.0
+    c.impulse[count], c.length[count] = 0.0, 0.0
     return count + 1
+
+
+@inner_kernel
+def _record_piece(
+    c: Contacts, count: int, i: int, m: int, segments: Segments,
+    found: tuple[bool, float, float, float, float, float], length: float,
+) -> int:  # fmt: skip
+    """Writes the contact of actor i with segment m as `_record` does; pieces of one wall are one contact.
+
+    Its point is the middle of what lies inside the body, its depth and normal those of the deepest piece.
+    """
+    goes_on = segments.joined[m, 0] or segments.joined[m, 1]
+    for q in range(count - 1, -1, -1) if found[0] and goes_on else range(0):
+        other = c.segment[q]
+        if c.i[q] != i or other < 0:
+            break
+        if not (segments.joined[other, 0] or segments.joined[other, 1]):
+            continue
+        if c.nx[q] * found[3] + c.ny[q] * found[4] < STRAIGHT:
+            continue
+        share = length / max(c.length[q] + length, 1e-9)
+        c.x[q] += share * (found[1] - c.x[q])
+        c.y[q] += share * (found[2] - c.y[q])
+        c.length[q] += length
+        if found[5] > c.depth[q]:
+            c.segment[q], c.nx[q], c.ny[q], c.depth[q] = m, found[3], found[4], found[5]
+        return count
+    new = _record(c, count, i, -1, m, found)
+    if new > count:
+        c.length[count] = length
+    return new
 
 
 @inner_kernel
@@ -240,7 +272,10 @@ def find_contacts(
                 continue
             back = (states.x[i] - states.vx[i] * dt, states.y[i] - states.vy[i] * dt)
             line = (segments.x0[m], segments.y0[m], segments.x1[m], segments.y1[m])
-            count = _record(out, count, i, -1, m, box_segment(boxes, i, line, back))
+            joined = (segments.joined[m, 0], segments.joined[m, 1])
+            found = box_segment(boxes, i, line, joined, back)
+            length = clipped_length(boxes, i, line) if found[0] else 0.0
+            count = _record_piece(out, count, i, m, segments, found, length)
     return count
 
 

@@ -133,11 +133,23 @@ def _clipped_line(
 
 
 @inner_kernel
+def clipped_length(boxes: Boxes, i: int, line: tuple[float, float, float, float]) -> float:
+    """Returns the length in m of the part of a line (x0, y0, x1, y1) inside box i."""
+    enter, leave = _clipped_line(boxes, i, line)
+    return sqrt((line[2] - line[0]) ** 2 + (line[3] - line[1]) ** 2) * max(leave - enter, 0.0)
+
+
+@inner_kernel
 def box_segment(
-    boxes: Boxes, i: int, line: tuple[float, float, float, float], back: tuple[float, float]
+    boxes: Boxes,
+    i: int,
+    line: tuple[float, float, float, float],
+    joined: tuple[bool, bool],
+    back: tuple[float, float],
 ) -> Overlap:
     """Returns the overlap of box i with a line from (x0, y0) to (x1, y1); the normal pushes the box away.
 
+    joined: whether a wall goes on beyond the line's begin and end; such an end does not stick out.
     back: where the box's centre was before the step. It tells the side of the line that the box
     came from, so that a fast car is thrown back and not drawn through a guardrail. All zeros and False
     where they do not touch. A line of no length divides by 0.
@@ -163,9 +175,10 @@ def box_segment(
         half = boxes.half_length[i] if axis == 0 else boxes.half_width[i]
         p0 = (line[0] - boxes.x[i]) * ux + (line[1] - boxes.y[i]) * uy
         p1 = (line[2] - boxes.x[i]) * ux + (line[3] - boxes.y[i]) * uy
+        first_is_low = p0 < p1
         ahead, behind = half - min(p0, p1), half + max(p0, p1)
-        if ahead < depth:
+        if ahead < depth and not joined[0 if first_is_low else 1]:
             depth, nx, ny = ahead, -ux, -uy
-        if behind < depth:
+        if behind < depth and not joined[1 if first_is_low else 0]:
             depth, nx, ny = behind, ux, uy
     return True, x, y, nx, ny, depth

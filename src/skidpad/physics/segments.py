@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from math import floor
+from math import cos, floor, radians
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from skidpad.core.arrays import Floats, Ints
 from skidpad.core.jit import inner_kernel
 
 CELL = 20.0  # m, a few car lengths
 CELLS_MAX = 250_000  # larger maps get larger cells
+SHORTEST = 1e-3  # m, a shorter one has no direction
+JOINT = 0.05  # m between the ends of two segments below which one goes on as the other
+STRAIGHT = cos(radians(30.0))  # of the turn at a joint: beyond it, it is a corner that sticks out
 
 
 class Segments(NamedTuple):
@@ -23,6 +28,7 @@ class Segments(NamedTuple):
     y1: Floats
     z_low: Floats
     z_high: Floats
+    joined: NDArray[np.bool_]  # (m, 2) whether the wall goes on beyond (x0, y0), beyond (x1, y1)
     origin: Floats  # (2,) corner of the grid
     shape: Ints  # (2,) cells along x and y
     cell: float  # m
@@ -46,10 +52,24 @@ def _cells_of(i: Floats, origin: Floats, cell: float, shape: Ints) -> list[int]:
     ]
 
 
+def _find_joints(lines: Floats, lengths: Floats) -> NDArray[np.bool_]:
+    """Returns for each line (m, 4), shape (m, 2), whether another one goes on where it begins and ends."""
+    joined = np.zeros((len(lines), 2), dtype=np.bool_)
+    known = np.flatnonzero(lengths > SHORTEST)
+    along = (lines[known, 2:] - lines[known, :2]) / lengths[known, None]
+    ends = np.concatenate([lines[known, :2], lines[known, 2:]])
+    outward = np.concatenate([-along, along])
+    for p, q in cKDTree(ends).query_pairs(JOINT) if len(known) else ():
+        if p % len(known) != q % len(known) and outward[p] @ outward[q] < -STRAIGHT:
+            for end in (p, q):
+                joined[known[end % len(known)], end // len(known)] = True
+    return joined
+
+
 def static_segments(lines: Floats, z_low: Floats, z_high: Floats) -> Segments:
     """Returns segments from lines (m, 4) as x0 y0 x1 y1, each between two heights (m,), with their grid.
 
-    Segments shorter than a millimetre have no direction and keep their index, but are never found.
+    Segments shorter than SHORTEST have no direction and keep their index, but are never found.
     """
     lines = np.asarray(lines, dtype=np.float64).reshape(-1, 4)
     ends = lines.reshape(-1, 2)
@@ -59,14 +79,15 @@ def static_segments(lines: Floats, z_low: Floats, z_high: Floats) -> Segments:
     shape = np.floor((high - low) / cell).astype(np.int64) + 1
     lists: list[list[int]] = [[] for _ in range(int(shape[0] * shape[1]))]
     lengths = np.hypot(lines[:, 2] - lines[:, 0], lines[:, 3] - lines[:, 1])
-    for m in np.flatnonzero(lengths > 1e-3):
+    for m in np.flatnonzero(lengths > SHORTEST):
         for place in _cells_of(lines[m], low, cell, shape):
             lists[place].append(int(m))
     first = np.concatenate([[0], np.cumsum([len(entry) for entry in lists])]).astype(np.int64)
     member = np.array([m for entry in lists for m in entry], dtype=np.int64)
     x0, y0, x1, y1 = np.ascontiguousarray(lines.T)
     heights = np.array(z_low, dtype=np.float64), np.array(z_high, dtype=np.float64)
-    return Segments(x0, y0, x1, y1, *heights, low, shape, cell, first, member)
+    joined = _find_joints(lines, lengths)
+    return Segments(x0, y0, x1, y1, *heights, joined, low, shape, cell, first, member)
 
 
 @inner_kernel

@@ -252,12 +252,12 @@ def test_speeds_at_a_guardrail_say_what_they_are_and_agree() -> None:
     end = off_lane(v_ego=149.0 / KMH, v_closing=106.0 / KMH, contact=contact(163.0, None, 106.0))
     assert facts(end)[:3] == [
         ("ego", "149 km/h"),
-        ("of it square to the guardrail", "106 km/h"),
+        ("perpendicular to the guardrail", "106 km/h"),
         ("delta-v, thrown back", "163 km/h"),
     ]
     assert facts(off_lane())[:3] == [
         ("ego", "65 km/h"),
-        ("of it square to the guardrail", "1 km/h"),
+        ("perpendicular to the guardrail", "1 km/h"),
         ("delta-v", "1 km/h"),
     ]
 

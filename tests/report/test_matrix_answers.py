@@ -119,7 +119,7 @@ def test_the_second_answer_says_what_rain_changes_for_each_configuration(tmp_pat
         "mean speed 35.0 → 35.0 km/h; dropout 5.0 → 5.0 %."
     )
     assert second.lines[0] == (
-        "Arrows lead from clear sky to heavy rain. "
+        "Read each arrow as clear sky → heavy rain. "
         "Dropout is the share of time without a current measurement of the car ahead."
     )
     assert second.lines[5] == (
@@ -132,9 +132,10 @@ def test_the_third_answer_names_the_commonest_kind_of_the_worst_configuration(tm
     third = told(campaign(tmp_path, clear_cut))[2]
     assert third.sentence == (
         "190 of 250 crashes were of the kind “into a barrier”: 110 in heavy rain, 80 in clear sky. "
-        "Configuration 3 had most (140 in 20 drives; next configuration 4 with 70 in 20)."
+        "Configuration 3 had most crashes of all kinds (140 in 20 drives; next configuration 4 with 70 "
+        "in 20)."
     )
-    assert third.lines[0].startswith(f"Of the sources' {len(CLAIMS)} claims: ")
+    assert third.lines[0].startswith(f"Of {len(CLAIMS)} claims of the published study: ")
     decided = judge(CLAIMS, [campaign(tmp_path, clear_cut).results] * len(CLAIMS))
     named = [j for j in decided if j.verdict is Verdict.CONTRADICTED][:3]
     assert named
@@ -153,7 +154,7 @@ def test_one_seed_gets_one_line_and_no_test_anywhere_on_the_page(tmp_path):
     )
     assert second.sentence.startswith("1 seed per cell cannot tell two weathers apart")
     assert third.lines[-1].startswith(
-        f"One seed per cell judges none of the sources' {len(CLAIMS)} claims"
+        f"One seed per cell judges none of the published study's {len(CLAIMS)} claims"
     )
     page = write_report(tmp_path).read_text(encoding="utf-8")
     text = re.sub(r"<(script|style|svg).*?</\1>|<[^>]+>", " ", page, flags=re.DOTALL)
@@ -202,7 +203,7 @@ def test_the_subtitle_says_how_many_weathers_differ_and_what_the_sensors_are(tmp
         "Weathers that gave the same drives count once (Clear Sky: sunrise, noon and night; "
         "Heavy Rain: sunrise, noon and night)."
     )
-    assert re.search(r"sensors (on|from) ", matrix.subtitle)
+    assert re.search(r"sensors (on|simulated from) ", matrix.subtitle)
 
 
 def test_a_cell_that_drives_as_another_has_its_seeds(tmp_path):

@@ -41,10 +41,10 @@ def test_the_tally_counts_every_claim_once():
     empty = judge(FINDINGS, [None] * len(FINDINGS))
     assert (
         tally_text(empty)
-        == f"Of the sources' {len(FINDINGS)} claims: {len(FINDINGS)} not testable."
+        == f"Of {len(FINDINGS)} claims of the published study: {len(FINDINGS)} not testable."
     )
     mixed = [judged(Verdict.SUPPORTED), judged(Verdict.UNDECIDED), judged(Verdict.SUPPORTED)]
-    assert tally_text(mixed) == "Of the sources' 3 claims: 2 supported, 1 undecided."
+    assert tally_text(mixed) == "Of 3 claims of the published study: 2 supported, 1 undecided."
 
 
 @pytest.mark.req("R-6")

@@ -19,9 +19,10 @@ for (const figure of document.querySelectorAll(".replay")) {
   const c = canvas.getContext("2d"), u = data.unit, span = data.span ?? 70;
   let k = data.mark ?? 0, timer = null, played = false;
   const images = (data.pictures ?? []).map((source, i) => Object.assign(new Image(), { src: source, onload: () => i === k && draw() }));
-  const speed = i => {  // km/h, over half a second
+  const speed = i => {  // km/h, over half a second; before a contact, over what led to it
     if (!data.frames) return "";
-    const e = 3 * data.ego, n = Math.max(Math.round(.25 / data.dt), 1), a = Math.max(i - n, 0), b = Math.min(i + n, last);
+    const e = 3 * data.ego, n = Math.max(Math.round(.25 / data.dt), 1), a = Math.max(i - n, 0), b = i === data.mark ? i : Math.min(i + n, last);
+    if (a === b) return "";
     const v = 3.6 * u * Math.hypot(data.frames[b][e] - data.frames[a][e], data.frames[b][e + 1] - data.frames[a][e + 1]) / ((b - a) * data.dt);
     return v < 400 ? ` · ${Math.round(v)} km/h` : "";
   };

@@ -142,10 +142,10 @@ def facts(crash: Crash) -> list[tuple[str, str]]:
 
 
 def _closing_name(contact: Contact | None) -> str:
-    """Returns the name of the closing speed; of what stands, it is the part square to the piece hit."""
+    """Returns the name of the closing speed; of what stands, the part perpendicular to the piece hit."""
     if contact is None or contact.actor >= 0:
         return "closing"
-    return f"of it square to the {contact.other}"
+    return f"perpendicular to the {contact.other}"
 
 
 def _delta_v_name(crash: Crash) -> str:

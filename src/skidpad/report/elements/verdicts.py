@@ -64,15 +64,15 @@ def tally_text(judged: Sequence[Judgement]) -> str:
     counts = Counter(j.verdict for j in judged)
     told = ", ".join(f"{counts[v]} {TALLIED.get(v, v.value)}" for v in Outcome if counts[v])
     if len(judged) == 1:
-        return f"The source's one claim is {told.removeprefix('1 ')}."
-    return f"Of the sources' {len(judged)} claims: {told}."
+        return f"The published study's one claim is {told.removeprefix('1 ')}."
+    return f"Of {len(judged)} claims of the published study: {told}."
 
 
 def unjudged_text(judged: Sequence[Judgement]) -> str:
     """Returns the sentence that stands in place of verdicts where there is one seed per cell."""
     least = seeds_for_verdict(len(judged))
     return (
-        f"One seed per cell judges none of the sources' {count_text(len(judged), 'claim')}: what "
+        f"One seed per cell judges none of the published study's {count_text(len(judged), 'claim')}: what "
         f"differs may be chance. With {least} seeds (`--seeds {least}`) they can be judged."
     )
 

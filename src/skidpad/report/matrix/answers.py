@@ -311,7 +311,7 @@ def _meaning(matrix: Matrix) -> list[str]:
     told = []
     if len(matrix.climates) == 2:
         first, second = matrix.climates
-        told.append(f"Arrows lead from {first.name} to {second.name}.")
+        told.append(f"Read each arrow as {first.name} → {second.name}.")
     if matrix.finished["dropout_pct"].count():
         told.append("Dropout is the share of time without a current measurement of the car ahead.")
     return [" ".join(told)] if told else []

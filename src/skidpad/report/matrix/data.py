@@ -50,7 +50,7 @@ WEATHERS = {
 
 
 SENSOR_LEVELS = {
-    "objects": "sensors from boxes of objects, without images",
+    "objects": "sensors simulated from the boxes around objects, without images",
     "pixels": "sensors on camera images",
 }
 

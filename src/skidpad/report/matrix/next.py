@@ -34,7 +34,7 @@ def look_next(
         return Answer(QUESTION, sentence, _claims(matrix, judged))
     sentence = (
         f"{_commonest(matrix, sum(totals.values()))} {capitalize_first(config_list([worst]))} had most "
-        f"({totals[worst]} in {count_text(len(runs[worst]), 'drive')}"
+        f"{EVENTS} of all kinds ({totals[worst]} in {count_text(len(runs[worst]), 'drive')}"
         f"{_next_most(totals, runs, worst)})."
     )
     lines = [*_hardest(matrix, crashes), *_claims(matrix, judged)]
@@ -124,7 +124,8 @@ def _hardest(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[str]:
     (config, weather), (crash, _, _, run) = max(found, key=lambda f: severity(f[1][0]))
     group = next(g for g in matrix.weather_groups if weather in g.weathers)
     where = f"{config_list([config])} in {group.name}, run {run.name} at {crash.t:.0f} s"
-    return [f"The hardest crash: {_as_fragment(headline(crash))}, {where}. Its card stands below."]
+    what = _as_fragment(headline(crash))
+    return [f"The hardest crash with a driving function: {what}, {where}. Its card stands below."]
 
 
 def _as_fragment(headline_text: str) -> str:

@@ -48,11 +48,12 @@ COUNTS = (
     (EVENTS, f"{EVENTS} per run"),
 )
 CLAIMS = (*FINDINGS, *ACCEPTANCE)
-GRADED = """A crash is a serious contact or a departure. A contact is serious when it changes the speed of \
-either side by 5 km/h or more; with a pedestrian or a two-wheeler every contact is. In a departure \
-the car hits a barrier, has all wheels off every lane for 1 s, is more than 3 m beyond the edge, or faces \
-the wrong way. In an intervention the car is put back on its lane, also after a light contact; the published \
-study counts interventions as collisions."""
+GRADED = """A crash is a serious contact, a departure or a roll-over. A contact is serious when it \
+changes the speed of either side by 5 km/h or more; with a pedestrian or a two-wheeler every contact is. \
+In a departure the car hits a barrier, has all wheels off every lane for 1 s, is more than 3 m beyond the \
+edge, or faces the wrong way. In an intervention the car is put back on its lane, also after a light \
+contact; the published study counts interventions as collisions. A seed sets where traffic begins and the \
+noise of sensors."""
 UNGRADED = """These results are older than the grading of contacts. A crash is every intervention: what puts \
 the car back on its lane after a contact, a departure, or because it faces the wrong way."""
 LEAD = f"""\

@@ -70,7 +70,8 @@ def test_differences_are_of_equal_seeds_with_intervals_from_eight():
         ("2", "lidar", NOT_READ), ("2", "radar", NO_CHANGE), ("2", "wind", NO_CHANGE),
         ("camera", "radar", NOT_READ), ("camera", "pictures", NO_CHANGE),
         ("mine:Stack", "lidar", NOT_READ), ("2", "spray", NOT_READ),
-        ("camera", "ghosts", NOT_READ), ("2", "roll_over", NO_CHANGE),
+        ("camera", "ghosts", NOT_READ), ("2", "window", NOT_READ), ("camera", "rivals", NOT_READ),
+        ("2", "lens", NOT_READ), ("2", "roll_over", NO_CHANGE),
     ],
 )  # fmt: skip
 def test_what_is_not_read_says_so_and_never_0(stack, arm, note):

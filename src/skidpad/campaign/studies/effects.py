@@ -57,6 +57,13 @@ EFFECTS: dict[str, Effect] = {
         GRIP | {"water_drag": True},
         puddles=True,
     ),
+    "seen_puddles": Effect(
+        "the same, and background drivers that slow for it",
+        GRIP | {"water_drag": True, "drivers": True, "drivers_patches": True},
+        puddles=True,
+    ),
+    "drivers": Effect("background drivers that mind grip and sight", {"drivers": True}),
+    "wakes": Effect("air that lorries push aside", {"wakes": True}),
     "wind": Effect("wind with gusts of 0.2", {"wind": True, "wind_gusts": 0.2}),
     "sight": Effect("sight of depth, labels, radar", RANGE, "depth"),
     "radar": Effect("sight and physical radar", RANGE | {"radar_model": "physical"}, "radar"),
@@ -65,11 +72,27 @@ EFFECTS: dict[str, Effect] = {
         RANGE | {"radar_model": "physical", "radar_multipath": True},
         "radar",
     ),
+    "rivals": Effect(
+        "sight and physical radar, half of the others with radars",
+        RANGE | {"radar_model": "physical", "radar_interference": 0.5},
+        "radar",
+    ),
     "lidar": Effect("lidar: lost and false returns", RANGE | {"lidar": "physical"}, "lidar"),
     "spray": Effect(
         "lidar: the same and spray", RANGE | {"lidar": "physical", "spray": True}, "lidar"
     ),
+    "window": Effect(
+        "lidar: the same, wet ground, drops and dirt on the window",
+        RANGE
+        | {"lidar": "physical", "lidar_wet_ground": True, "lidar_drops_s": 5.0, "lidar_dirt": 0.3},
+        "lidar",
+    ),
     "pictures": Effect("colour pictures", {"camera": True}, "pictures"),
+    "lens": Effect(
+        "colour pictures with haze, exposure and drops on the glass",
+        {"camera": True, "camera_haze": True, "camera_exposure": True, "camera_drops": True},
+        "pictures",
+    ),
 }
 # sensors that our drivers read; of another stack it shows only in its drives
 READS = {"camera": ("pictures",), "reference": ()} | dict.fromkeys("0123456", ("depth", "radar"))

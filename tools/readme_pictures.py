@@ -21,18 +21,24 @@ WIDTH, HEIGHT = 1280, 940  # pixels
 COCKPIT_HEIGHT = 793  # of them, down to the end of the pictures
 QUALITY = 82  # of the pictures
 WAIT_MS = 300_000.0  # kernels may have to be compiled
-DRIVEN_S = 28.0  # simulated: the stack brakes behind a lead among houses
+DRIVEN_S = 32.0  # simulated: the stack comes along a street of the town, lamps mirrored in it
 DRIVE = [
     "drive",
     "--no-browser",
     "--weather",
-    "rain-sunrise",
+    "examples/dusk_rain.yaml",
+    "--map",
+    "town",
+    "--traffic",
+    "random",
+    "--vehicles",
+    "24",
     "--sensors",
     "objects",
     "--configs",
-    "3",
+    "4",
     "--seed",
-    "3",
+    "4",
 ]
 TIME = """s => parseFloat([...document.querySelectorAll('.cockpit dt')]
     .find(dt => dt.textContent === 'time')?.nextElementSibling.textContent) > s"""
@@ -57,7 +63,7 @@ def photograph(
 
 
 def cockpit(file: Path) -> None:
-    """The cockpit in heavy rain at sunrise, our stack at the wheel."""
+    """The cockpit in rain at dusk, our stack at the wheel."""
 
     def driven(page: Any) -> None:
         page.wait_for_function(TIME, arg=DRIVEN_S, timeout=WAIT_MS)

@@ -5,7 +5,7 @@
 
 For views from lanes of each map: the share of pixels in the 8 commonest colours after a 5 x 5 median
 at 5 bits per channel, processor time of a picture of 800 x 600 with everything, and classes seen.
-With --picture, one view of each map instead: without, and with scenery in three weathers.
+With --picture, one view of each map instead: without, and with scenery in four weathers.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ CAMERAS = tuple(
 )
 PLACES = (0.1, 0.6)  # shares of the way along the lanes that are long enough
 REPEATS = 5
-SHOWN = ("clear-noon", "rain-sunrise", "clear-night")
-SIZE = (320, 240)  # px of one picture in the sheet
+SHOWN = ("clear-noon", "rain-sunrise", "snow", "clear-night")
+SIZE = (300, 225)  # px of one picture in the sheet
 LONG = 40.0  # m
 
 
@@ -103,7 +103,7 @@ def look(road_map: RoadMap, place: Pose, weather: str) -> Seen:
 
 
 def draw_sheet(names: Sequence[str], path: Path) -> None:
-    """Write one view per map: a row of it without scenery, then with it by day, in rain, at night."""
+    """Write one view per map: a row of it without scenery, then with it in SHOWN weathers."""
     rows = []
     for name in names:
         plain = load_map(name)

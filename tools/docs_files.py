@@ -25,7 +25,7 @@ from skidpad.recording.campaign.results import FINGERPRINT, Columns, Timing, sch
 from skidpad.recording.campaign.threshold import THRESHOLD
 from skidpad.recording.channels import drives, indicators, mcap_files
 from skidpad.recording.hazards import records
-from skidpad.recording.run import lamps, log, readings, staging
+from skidpad.recording.run import lamps, log, readings, staging, tilts
 from skidpad.recording.run.events import KINDS
 from skidpad.recording.run.log_files import GROUPS, tick_table
 from skidpad.recording.run.ticks import TickLog
@@ -142,6 +142,11 @@ def run_entries() -> list[FileEntry]:
             f"RUN/{lamps.FILE}",
             "Lamps that a scenario switches; no file where it switches none.",
             said_fields(lamps.COLUMNS, "String"),
+        ),
+        FileEntry(
+            f"RUN/{tilts.FILE}",
+            "Pitch and roll that trajectories of a scenario give; no file where the road alone tilts.",
+            said_fields(tilts.COLUMNS, "String"),
         ),
         FileEntry(
             f"RUN/{staging.STAGING}", "What a scenario file stages.", class_fields(staging.Staging)

@@ -46,7 +46,8 @@ FOLLOW = "under `follow` walkers and objects are placed"
 PARTIAL: Mapping[str, str] = MappingProxyType(
     {
         **dict.fromkeys(
-            (*POSITIONS, *FURTHER_POSITIONS), "pitch and roll of its orientation are not read"
+            (*POSITIONS, *FURTHER_POSITIONS),
+            "pitch and roll of its orientation are read in vertices of polylines alone",
         ),
         "FollowTrajectoryAction": FOLLOW,
         "LaneChangeAction": FOLLOW,
@@ -73,8 +74,8 @@ PARTIAL: Mapping[str, str] = MappingProxyType(
             ("TrailerAction", "ConnectTrailerAction", "DisconnectTrailerAction"), TOWED
         ),
         "InfrastructureAction": STATES,
-        "AngleCondition": "pitch and roll are those of the road",
-        "RelativeAngleCondition": "pitch and roll are those of the road",
+        "AngleCondition": "pitch and roll are those of a trajectory, else of the road",
+        "RelativeAngleCondition": "pitch and roll are those of a trajectory, else of the road",
         "AssignControllerAction": CONTROLLED,
         "ActivateControllerAction": CONTROLLED,
         "AcquirePositionAction": "chooses the way at forks; does not change lanes by itself",

@@ -7,13 +7,18 @@ import re
 from math import cos, hypot, pi, sin, sqrt
 
 import pytest
+from typer.testing import CliRunner
 
+from skidpad.cli.main import app
 from skidpad.core.errors import InputError
 from skidpad.core.geometry import wrap_angle
+from skidpad.recording.run.tilts import read_tilts
 from support.oracle.actions import timing
 from support.scenarios.files import (
     at,
+    by_entity,
     compiled,
+    condition,
     event,
     init,
     on_lane,
@@ -24,6 +29,7 @@ from support.scenarios.files import (
     time,
     to,
     told,
+    write,
 )
 
 ABSOLUTE = '<Timing domainAbsoluteRelative="absolute" scale="1" offset="0"/>'
@@ -227,3 +233,55 @@ def test_positions_are_where_the_standard_says(tmp_path, position, x, y, yaw):
     pose = place(tmp_path, position)
     assert (pose.x, pose.y) == pytest.approx((x, y), abs=0.01)
     assert wrap_angle(pose.yaw - yaw) == pytest.approx(0.0, abs=1e-4)
+
+
+def tilted_line():
+    """Nose down by 0.2 rad and left side up by 0.1 rad after 2 s, in proportion to the way."""
+    return polyline(
+        (1.0, '<WorldPosition x="200" y="-1.75" h="0"/>'),
+        (3.0, '<WorldPosition x="230" y="-1.75" h="0" p="0.2" r="0.1"/>'),
+    )
+
+
+@pytest.mark.parametrize(
+    ("turn", "axes", "angle"),
+    [
+        ("pitch", "world", 0.1),
+        ("roll", "world", 0.05),
+        ("pitch", "road", 0.1),
+        ("roll", "lane", 0.05),
+    ],
+)
+def test_a_trajectory_tilts_what_follows_it(tmp_path, turn, axes, angle):
+    half = f"""<AngleCondition angleType="{turn}" angle="{angle}" angleTolerance="0.001"
+coordinateSystem="{axes}"/>"""
+    follows = story(event("e", follow(tilted_line(), ABSOLUTE), time(1.0)))
+    result = told(tmp_path, stories=follows, stop=condition(by_entity(half, "other")), minor=3)
+    assert result.rows[-1].time == pytest.approx(2.0, abs=1e-6)
+
+
+def test_the_folder_and_osi_have_the_tilts(tmp_path):
+    pytest.importorskip("osi3", reason="needs the extra osi")
+    from osi3trace.osi_trace import OSITrace
+
+    file = write(
+        tmp_path, stories=story(event("e", follow(tilted_line(), ABSOLUTE), time(1.0))), end=4.5
+    )
+    run, trace = tmp_path / "run", tmp_path / "run.osi"
+    for words in (
+        ["play", file, "--out", run, "--stack", "ideal", "--actors", "ideal"],
+        ["export", run, "--osi", trace],
+    ):
+        done = CliRunner().invoke(app, [str(w) for w in words])
+        assert done.exit_code == 0, done.output
+    tilts = read_tilts(run)
+    assert tilts[2000, "other"] == pytest.approx((0.05, 0.1), abs=1e-5)
+    assert {name for _, name in tilts} == {"other"}
+    assert min(t for t, _ in tilts) > 1000
+    assert max(t for t, _ in tilts) < 3200
+    for message in OSITrace(str(trace), "GroundTruth"):
+        ms = round(1000 * (message.timestamp.seconds + 1e-9 * message.timestamp.nanos))
+        turned = message.moving_object[1].base.orientation
+        assert (turned.roll, turned.pitch) == pytest.approx(
+            tilts.get((ms, "other"), (0.0, 0.0)), abs=1e-6
+        )

@@ -211,6 +211,15 @@ freespace="false" rule="lessThan" coordinateSystem="{axes}"/>"""
     assert fired(tmp_path, by_entity(body), init=begin) is None
 
 
+def test_there_is_a_headway_to_one_beside_where_bodies_count(tmp_path):
+    """Its front draws level with the ego's back after (40 m - a length of 4.2 m) / 10 m/s."""
+    begin = at("ego", -2, 140, 10) + at("other", -1, 100, 20)
+    body = """<TimeHeadwayCondition entityRef="other" value="0.5" freespace="{}" rule="lessThan"
+relativeDistanceType="longitudinal"/>"""
+    times = [fired(tmp_path, by_entity(body.format(b)), init=begin) for b in ("true", "false")]
+    assert times == pytest.approx([3.58, 4.0], abs=0.06)
+
+
 def test_there_is_no_headway_to_one_behind(tmp_path):
     body = """<TimeHeadwayCondition entityRef="other" value="99" freespace="false" rule="lessThan"
 relativeDistanceType="longitudinal" coordinateSystem="entity"/>"""
@@ -222,6 +231,12 @@ def test_the_end_of_the_road(tmp_path):
     body = '<EndOfRoadCondition duration="1"/>'
     begin = at("ego", -3, 100) + at("other", -1, 1480)
     assert fired(tmp_path, by_entity(body, "other"), init=begin) == pytest.approx(3.0, abs=0.2)
+
+
+def test_the_end_of_the_road_is_reached_in_the_step_that_ends_there(tmp_path):
+    begin = at("ego", -3, 100) + at("other", -1, 1480)
+    body = '<EndOfRoadCondition duration="0"/>'
+    assert fired(tmp_path, by_entity(body, "other"), init=begin) == pytest.approx(2.0, abs=1e-6)
 
 
 @pytest.mark.osc("OffroadCondition")

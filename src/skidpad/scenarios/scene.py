@@ -14,6 +14,7 @@ from skidpad.core.setup import ActorCommand
 from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import LightState
 from skidpad.recording.run.lamps import LampChange
+from skidpad.recording.run.tilts import Tilted
 from skidpad.scenarios.movement.measures import Point, corners, overlap
 from skidpad.scenarios.movement.motion import Guide
 from skidpad.scenarios.movement.network import Network, Place
@@ -312,7 +313,10 @@ class Actor:
         now = self.v
         dt, self.seen = dt if self.seen else 0.0, True
         box = self.entity.box
-        at = Pose(motion.x, motion.y, self.pose.z if placed else z, yaw=motion.yaw)
+        at = Pose(motion.x, motion.y, z, yaw=motion.yaw)
+        if placed:
+            was = self.pose
+            at = Pose(motion.x, motion.y, was.z, was.roll, was.pitch, motion.yaw)
         if box.forward or box.left:
             at = at.moved(forward=-box.forward, left=-box.left)
         self.pose = at
@@ -355,6 +359,7 @@ class Scene:
     clock: Clock | None = None  # time of day, where the file has said one
     story: list[Happening] = field(default_factory=list)
     lamps: list[LampChange] = field(default_factory=list)  # that the file switches, in their order
+    tilts: list[Tilted] = field(default_factory=list)  # by trajectories, up to now
     seed: int = 0  # of what is drawn
     flows: list[Flow] = field(default_factory=list)  # of traffic actions
     cruising: dict[str, float] = field(default_factory=dict)  # m/s that traffic's vehicles want
@@ -373,6 +378,8 @@ class Scene:
         for actor in self.actors.values():
             i = actor.row
             actor.observe(Motion(x[i], y[i], yaw[i], vx[i], vy[i]), z[i], self.dt)
+            if actor.pose.pitch or actor.pose.roll:
+                self.tilts.append(Tilted(self.t, actor.name, actor.pose.pitch, actor.pose.roll))
         self.contacts = {c.static or truth.table.names[c.actor] for c in truth.contacts}
 
     def between(self, a: str, b: str) -> Point:

@@ -81,6 +81,7 @@ def _world(run: Path, log: RunLog) -> World:
     from skidpad.physics.grip import rain_rate
     from skidpad.recording.formats.osi import World
     from skidpad.recording.run.lamps import read_lamps
+    from skidpad.recording.run.tilts import read_tilts
     from skidpad.roads.bundled import load_map
     from skidpad.scenarios.export.osi_road import Tilt, road_truth
     from skidpad.scenarios.export.run_export import road_of
@@ -89,10 +90,10 @@ def _world(run: Path, log: RunLog) -> World:
         rain = rain_rate(read_run(run.resolve()).weather)
     except InputError:
         rain = None
-    lamps = read_lamps(run)
+    lamps, tilts = read_lamps(run), read_tilts(run)
     road = road_of(log, road_files(run))
     if road is None:
-        return World(rain_mm_h=rain, lamps=lamps)
+        return World(rain_mm_h=rain, lamps=lamps, tilts=tilts)
     map = load_map(road)
     s = map.signals
     places = zip(
@@ -100,4 +101,6 @@ def _world(run: Path, log: RunLog) -> World:
     )
     # a head looks against the traffic that it governs
     heads = {id: Pose(x, y, z, yaw=wrap_angle(heading + pi)) for id, x, y, z, heading in places}
-    return World(map.geo_reference, road.name, heads, rain, road_truth(map), Tilt(map), lamps)
+    return World(
+        map.geo_reference, road.name, heads, rain, road_truth(map), Tilt(map), lamps, tilts
+    )

@@ -26,6 +26,7 @@ from skidpad.recording.run.log import RunLog
 if TYPE_CHECKING:
     from osi3.osi_groundtruth_pb2 import GroundTruth
 
+Tilts = Mapping[tuple[int, str], tuple[float, float]]  # roll and pitch by ms and entity
 EGO = 0  # row of the log's tables; an actor's id is its row
 NANO = 1_000_000_000
 VEHICLES = {  # MovingObject.VehicleClassification.Type
@@ -62,6 +63,7 @@ class World:
     road: GroundTruth | None = None  # lanes, boundaries and signs, for the first message
     tilt: Tilting | None = None
     lamps: tuple[LampChange, ...] = ()  # of vehicles, that a scenario file has switched
+    tilts: Tilts = field(default_factory=dict)  # by trajectories of a scenario file
 
 
 class Tilting(Protocol):
@@ -108,7 +110,7 @@ def moments(log: RunLog, world: World) -> Iterator[GroundTruth]:
         for i in range(len(log.table)):
             if log.present[k, i]:
                 moving = truth.moving_object.add()
-                _write_actor(moving, log, k, i, world.tilt)
+                _write_actor(moving, log, k, i, world)
                 write_lamps_of(moving, log, k, i, world.lamps)
         for signal, state in lamps.at(int(log.tick[k])).items():
             if signal in world.heads:
@@ -140,8 +142,11 @@ def _still(osi3: Any, world: World) -> GroundTruth:
     return truth
 
 
-def _write_actor(object: Any, log: RunLog, k: int, i: int, tilt: Tilting | None) -> None:
-    """Writes an actor: its box's centre is its place; roll and pitch are those of the road under it."""
+def _write_actor(object: Any, log: RunLog, k: int, i: int, world: World) -> None:
+    """Writes an actor: its box's centre is its place.
+
+    Roll and pitch are those of its trajectory, else of the road under it.
+    """
     a, table, base = log.actors, log.table, object.base
     yaw, height = float(a.yaw[k, i]), float(table.height[i])
     object.id.value = i
@@ -150,7 +155,9 @@ def _write_actor(object: Any, log: RunLog, k: int, i: int, tilt: Tilting | None)
     base.position.x, base.position.y = float(a.x[k, i]), float(a.y[k, i])
     base.position.z = float(a.z[k, i]) + 0.5 * height
     where = float(a.x[k, i]), float(a.y[k, i]), float(a.z[k, i])
-    roll, pitch = (0.0, 0.0) if tilt is None else tilt.at(*where, yaw)
+    roll, pitch = (0.0, 0.0) if world.tilt is None else world.tilt.at(*where, yaw)
+    moment = round(1000.0 * float(log.t[k])), table.names[i]
+    roll, pitch = world.tilts.get(moment, (roll, pitch))
     base.orientation.yaw, base.orientation.pitch, base.orientation.roll = (
         wrap_angle(yaw),
         pitch,

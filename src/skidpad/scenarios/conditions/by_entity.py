@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from math import hypot, inf, nan
 
@@ -184,17 +184,23 @@ class Angle:
         """Returns the angle in the world, rad."""
         if self.turn is Turn.HEADING:
             return pose.yaw
-        pitch, roll = scene.network.slopes(pose)
+        tilt = pose.pitch, pose.roll
+        pitch, roll = tilt if any(tilt) else scene.network.slopes(pose)
         return pitch if self.turn is Turn.PITCH else roll
 
     def _against(self, scene: Scene, pose: Pose, track: Track | None) -> float:
-        """Returns the angle in rad in the condition's axes: NaN without trajectory, 0 for pitch and roll."""
+        """Returns the angle in rad in the condition's axes: NaN without trajectory.
+
+        Pitch and roll are 0, unless a trajectory tilts the entity against the road.
+        """
         if self.axes is Axes.WORLD:
             return self._of(scene, pose)
         if self.axes is Axes.TRAJECTORY and track is None:
             return nan
-        if self.turn is not Turn.HEADING or self.axes is Axes.ENTITY:
+        if self.axes is Axes.ENTITY:
             return 0.0
+        if self.turn is not Turn.HEADING:
+            return self._of(scene, pose) - self._of(scene, replace(pose, pitch=0.0, roll=0.0))
         if self.axes is Axes.TRAJECTORY and track is not None:
             return pose.yaw - course(track, scene.t, scene.dt)
         if self.axes is Axes.ROAD:

@@ -138,7 +138,7 @@ def _distance(node: Node, ctx: Context) -> EntityCondition:
 class TimeHeadway:
     """Time until the entity is where the other one is now, at its own speed.
 
-    There is none while the entity stands, or for one that is behind it.
+    There is none while the entity stands, or for one that is behind it: the whole of it, where bodies count.
     """
 
     rule: Rule
@@ -149,9 +149,11 @@ class TimeHeadway:
         """Returns whether the time headway in s meets the comparison; a standing actor has none."""
         own, other = scene.actors[actor], scene.actors[self.other]
         behind = scene.between(actor, self.other)[0] < 0.0
-        if own.v <= 0.0 or (behind and self.measure.direction is Direction.LONGITUDINAL):
+        if own.v <= 0.0:
             return False
         distance = self.measure.distance(scene, own, other.pose, other)
+        if behind and distance > 0.0 and self.measure.direction is Direction.LONGITUDINAL:
+            return False
         return self.rule.is_met(distance / own.v)
 
 

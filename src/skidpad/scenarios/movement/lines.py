@@ -21,13 +21,18 @@ CORNER = 2.0  # m before and behind a corner in which headings without a name tu
 
 @dataclass(frozen=True, slots=True)
 class Vertex:
-    """A point of a line; what is not said is None. time: s; heading: rad."""
+    """A point of a line; what is not said is None. time: s; heading: rad.
+
+    pitch, roll: of an entity there, rad, nose down and left side up; 0 and 0 are those of the road.
+    """
 
     x: float
     y: float
     z: float
     heading: float | None = None
     time: float | None = None
+    pitch: float = 0.0
+    roll: float = 0.0
 
 
 class Line:
@@ -45,6 +50,7 @@ class Line:
         self.x = [v.x for v in points]
         self.y = [v.y for v in points]
         self.z = [v.z for v in points]
+        self.pitch, self.roll = [v.pitch for v in points], [v.roll for v in points]
         self.named, self.tangential = [v.heading for v in points], tangential
         self._nearest: dict[tuple[float, float], float] = {}  # lengths by point, asked in each step
         self.s = [0.0]
@@ -145,7 +151,9 @@ class Line:
             self.x[k] + u * (self.x[j] - self.x[k]),
             self.y[k] + u * (self.y[j] - self.y[k]),
             self.z[k] + u * (self.z[j] - self.z[k]),
-            yaw=self._heading(k, j, u),
+            self.roll[k] + u * wrap_angle(self.roll[j] - self.roll[k]),
+            self.pitch[k] + u * wrap_angle(self.pitch[j] - self.pitch[k]),
+            self._heading(k, j, u),
         )
 
     def _heading(self, k: int, j: int, u: float) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from math import atan2, cos, hypot, pi, sin, sqrt
+from math import atan2, copysign, cos, hypot, pi, sin, sqrt
 
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.roads.queries import LanePoint
@@ -12,6 +12,7 @@ from skidpad.scenarios.movement.network import Network, Place
 from skidpad.simulation.scripted import Demand, Motion
 
 SLOW = 1e-6  # m/s, nothing moves
+REACHED = 1e-6  # m from the end of a road, which is the end
 STEEPEST_TURN = pi / 2.0 - 1e-3  # rad, of an actor against its lane while it goes sideways
 CHANGED = 1e-3  # of that length in a step, beyond which it is measured
 SQUEEZED = 0.1  # least length of a path beside a bend's inner side, per length of the lane
@@ -202,7 +203,7 @@ class Guide:
             return
         further = self.network.ahead(self.base, distance, self.roads)
         if further is not None:
-            self.at_end, self.base = False, further
+            self.at_end, self.base = self._is_last(further, distance), further
             return
         if self.at_end:
             self.v = 0.0  # it stands at the end of the road, and has no speed to go on with
@@ -210,6 +211,15 @@ class Guide:
         rest = self._rest(distance)
         if rest is not None:
             self.base = rest
+
+    def _is_last(self, point: LanePoint, distance: float) -> bool:
+        """Returns whether a place is the end of the road, for one who comes there by this distance."""
+        length = float(self.network.map.lanes.length[point.lane])
+        left = length - point.s if distance > 0.0 else point.s
+        return (
+            left < REACHED
+            and self.network.ahead(point, copysign(2.0 * REACHED, distance), self.roads) is None
+        )
 
     def _rest(self, distance: float) -> LanePoint | None:
         """Returns the last place before the road's end within `distance` m; None where there is none."""

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from lxml import etree
 
-from skidpad.core.geometry import Pose
+from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.movement.lines import Line, Vertex, clothoid, even_knots, nurbs
 from skidpad.scenarios.movement.network import Place
@@ -85,13 +85,22 @@ def _polyline(shape: Node) -> tuple[list[Node], Shape]:
     times = [n.number("time") if n.has("time") else None for n in nodes]
     places = [n.child("Position") for n in nodes]
     named = [_has_heading(p.only()) for p in places]
+    tilts = [_tilt(p.only()) for p in places]
     _check_times(shape, times)
 
     def make(poses: Sequence[Pose]) -> list[Vertex]:
-        rows = zip(poses, named, times, strict=True)
-        return [Vertex(p.x, p.y, p.z, p.yaw if n else None, t) for p, n, t in rows]
+        rows = zip(poses, named, times, tilts, strict=True)
+        return [Vertex(p.x, p.y, p.z, p.yaw if n else None, t, *tilt) for p, n, t, tilt in rows]
 
     return places, make
+
+
+def _tilt(place: Node) -> tuple[float, float]:
+    """Returns pitch and roll in the world that a vertex asks for, rad; 0 where it says nothing."""
+    said = place if place.tag == "WorldPosition" else place.find("Orientation")
+    if said is None:
+        return 0.0, 0.0
+    return wrap_angle(said.number("p", 0.0)), wrap_angle(said.number("r", 0.0))
 
 
 def _has_heading(place: Node) -> bool:
@@ -109,16 +118,27 @@ def _plain_vertex(element: etree._Element) -> Vertex | None:
     place = element[0][0].attrib
     try:
         h, t = place.get("h"), element.get("time")
+        pitch, roll = float(place.get("p", 0.0)), float(place.get("r", 0.0))
         values = Vertex(
             float(place["x"]),
             float(place["y"]),
             float(place.get("z", 0.0)),
             None if h is None else float(h),
             None if t is None else float(t),
+            wrap_angle(pitch),
+            wrap_angle(roll),
         )
     except (KeyError, ValueError):
         return None  # read again with care, which names what is wrong
-    total = values.x + values.y + values.z + (values.heading or 0.0) + (values.time or 0.0)
+    total = (
+        values.x
+        + values.y
+        + values.z
+        + (values.heading or 0.0)
+        + (values.time or 0.0)
+        + pitch
+        + roll
+    )
     return values if abs(total) < float("inf") else None
 
 

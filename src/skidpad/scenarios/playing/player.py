@@ -13,6 +13,7 @@ from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import Control
 from skidpad.recording.run.lamps import LampChange
 from skidpad.recording.run.staging import Staging
+from skidpad.recording.run.tilts import Tilted
 from skidpad.scenarios.actions.routing import go_on_after_track
 from skidpad.scenarios.movement.motion import Guide
 from skidpad.scenarios.movement.network import Place
@@ -49,6 +50,7 @@ class Played:
     boxes: Mapping[str, Box]
     staging: Staging
     lamps: tuple[LampChange, ...] = ()
+    tilts: tuple[Tilted, ...] = ()
 
 
 def setups(scenario: Scenario) -> tuple[ActorSetup, tuple[ActorSetup, ...]]:
@@ -129,7 +131,7 @@ class Player:
             self.scenario, story, driven_by_file,
             went_back=self.way_back > WAY_BACK, left_way=self.way.is_left,
         )  # fmt: skip
-        return Played(story, boxes, staging, tuple(self.scene.lamps))
+        return Played(story, boxes, staging, tuple(self.scene.lamps), tuple(self.scene.tilts))
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
         """Takes in the moment, goes on with the story and returns what actors do until the next.

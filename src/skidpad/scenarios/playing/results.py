@@ -12,6 +12,7 @@ from skidpad.recording.files import write_bytes
 from skidpad.recording.run.lamps import write_lamps
 from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.staging import write_staging
+from skidpad.recording.run.tilts import write_tilts
 from skidpad.scenarios.playing.player import Played
 from skidpad.scenarios.playing.stage import Row, rows_csv
 from skidpad.scenarios.reading.entities import Box
@@ -26,9 +27,10 @@ STORY_COLUMNS = {
 
 
 def write_results(folder: Path, log: RunLog, played: Played) -> None:
-    """Writes staging, lamps, story and trajectories of a run into the folder."""
+    """Writes staging, lamps, tilts, story and trajectories of a run into the folder."""
     write_staging(folder, played.staging)
     write_lamps(folder, played.lamps)
+    write_tilts(folder, played.tilts)
     rows = rows_csv(log_rows(log, played.boxes))
     write_bytes(folder / TRAJECTORIES, rows.encode())
     write_bytes(folder / STORY, story_csv(played.story).encode())

@@ -213,7 +213,7 @@ class Guide:
             self.base = rest
 
     def _is_last(self, point: LanePoint, distance: float) -> bool:
-        """Returns whether a place is the end of the road, for one who comes there by this distance."""
+        """Returns whether a place that is reached by this distance is the end of the road."""
         length = float(self.network.map.lanes.length[point.lane])
         left = length - point.s if distance > 0.0 else point.s
         return (

@@ -106,14 +106,19 @@ SCENARIO_NAMES = Registry("scenario name", "skidpad.scenario_names", ScenarioNam
 
 @dataclass
 class Names:
-    """The names that one file may use. strict: one that is not known is an error, else a note."""
+    """The names that one file may use. strict: one that is not known is an error, else a note.
+
+    asked: those that it did use.
+    """
 
     given: Mapping[str, Make] = field(default_factory=dict)
     strict: bool = False
+    asked: set[str] = field(default_factory=set)
     _made: dict[str, Any] = field(default_factory=dict)
 
     def find(self, name: str) -> Make | None:
         """Returns the class of this name; None where it is not registered."""
+        self.asked.add(name)
         found = {**BUILT_IN, **REGISTERED, **self.given}.get(name)
         if found is None and name in SCENARIO_NAMES.sources():
             found = SCENARIO_NAMES.get(name).made

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import asdict, dataclass, replace
 from math import isfinite, nan, radians
 from pathlib import Path
 from typing import Any
 
+from msgspec import structs
+from msgspec.json import encode
+
 from skidpad.campaign.driving.file_drivers import FILE_DRIVERS
 from skidpad.campaign.driving.file_stack import NAME as STACK_NAME
 from skidpad.campaign.driving.file_stack import PilotConditions, PilotMaker
 from skidpad.campaign.driving.governing import apply_envelope
 from skidpad.campaign.driving.loop import Arrival, Script, Supervising, Timer, Unsupervised
+from skidpad.campaign.driving.sharing import find_shared
 from skidpad.campaign.driving.starts import start_of
 from skidpad.campaign.user_files import road_file
 from skidpad.core.errors import ConfigError, FileError, StackError
@@ -211,7 +215,7 @@ def journey_of(course: Roads, map: RoadMap) -> Journey | None:
 
 def _scenario(spec: RunSpec, course: Scenario) -> Stage:
     """Returns the stage of a run of a scenario file, with its wind and friction."""
-    compiled = load_scenario(course, _pilot_conditions(spec))
+    compiled = load_scenario(course, lambda: _pilot_conditions(spec))
     modes: dict[str, ActorMode | None] = dict.fromkeys(compiled.entities, course.actors)
     modes[compiled.ego] = ActorMode.IDEAL if isinstance(spec.driver, Passenger) else None
     played = Player(
@@ -249,32 +253,53 @@ def _pilot_conditions(spec: RunSpec) -> PilotConditions:
 
 
 def load_scenario(
-    course: Scenario, conditions: PilotConditions = NO_CONDITIONS
+    course: Scenario, conditions: Callable[[], PilotConditions] = PilotConditions
 ) -> scenarios.Scenario:
     """Returns the compiled file of a course; ScenarioError lists all that keeps it from being played.
 
-    conditions: in what stacks of other actors drive.
+    conditions: gives those in which stacks of other actors drive. Within `share_setups` runs share a file
+    that names no code.
     """
-    found = check_scenario(course, conditions).playable()
-    read_disturbances(course.disturb, found)  # what is wrong in them is said here
-    return found
+
+    def compile_file() -> tuple[scenarios.Scenario, bool]:
+        names = _names_of(course, conditions())
+        found = check_scenario(course, names=names).playable()
+        read_disturbances(course.disturb, found)  # what is wrong in them is said here
+        return found, not names.asked and not course.register
+
+    file = file_of(course)
+    changed = file.stat().st_mtime_ns if file.is_file() else 0
+    key = encode(structs.replace(course, draws={}), order="deterministic"), file, changed
+    return find_shared(key, compile_file)
+
+
+def file_of(course: Scenario) -> Path:
+    """Returns the file of a course: one of the catalogue by its name, else by its path."""
+    return scenario_file(course.file) if course.file in NAMES else Path(course.file)
 
 
 def check_scenario(
-    course: Scenario, conditions: PilotConditions = NO_CONDITIONS
+    course: Scenario, conditions: PilotConditions = NO_CONDITIONS, names: Names | None = None
 ) -> scenarios.Compiled:
-    """Returns the check of a course's file, with everything that was found, playable or not."""
-    own = {**FILE_DRIVERS, STACK_NAME: PilotMaker(conditions)}
-    file = scenario_file(course.file) if course.file in NAMES else Path(course.file)
+    """Returns the check of a course's file, with everything that was found, playable or not.
+
+    names: that the file may use; None: those that the course says.
+    """
     return scenarios.check(
-        file,
+        file_of(course),
         course.parameters,
         course.ego,
         maps=[Path(folder) for folder in course.maps],
         ignore_unsupported=course.ignore_unsupported,
         lenient=course.lenient,
-        names=Names({**own, **_load_registered(course.register)}, strict=course.strict),
+        names=_names_of(course, conditions) if names is None else names,
     )
+
+
+def _names_of(course: Scenario, conditions: PilotConditions) -> Names:
+    """Returns the names that a course's file may use."""
+    own = {**FILE_DRIVERS, STACK_NAME: PilotMaker(conditions)}
+    return Names({**own, **_load_registered(course.register)}, strict=course.strict)
 
 
 def _load_registered(texts: Sequence[str]) -> dict[str, type[Any]]:

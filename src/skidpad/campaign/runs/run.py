@@ -136,6 +136,41 @@ def drive(
         ...             duration=60, sensors="objects", stack_settings={"cruise_kmh": 60})
         >>> run.outcome.value, len(run.log.contacts)
     """
+    spec, kind = describe(
+        stack,
+        map=map,
+        weather=weather,
+        seed=seed,
+        duration=duration,
+        traffic=traffic,
+        vehicles=vehicles,
+        route_km=route_km,
+        sensors=sensors,
+        profile=profile,
+        settings=settings,
+        stack_settings=stack_settings,
+        backend=backend,
+    )
+    return run(spec, kind, folder=None if out is None else Path(out))
+
+
+def describe(
+    stack: type[Stack] | str | int,
+    *,
+    map: str | Path = "figure8",
+    weather: str | Weather = "clear-noon",
+    seed: int = 1,
+    duration: float = 500.0,
+    traffic: str = "fixed",
+    vehicles: int = 20,
+    route_km: float = 0.0,
+    sensors: str = "pixels",
+    profile: str = "recommended",
+    settings: Mapping[str, Plain] | None = None,
+    stack_settings: Mapping[str, object] | None = None,
+    backend: BackendChoice | None = None,
+) -> tuple[RunSpec, type[Stack] | None]:
+    """Returns the run that `drive` drives for these arguments, and its stack's class; None: one of ours."""
     driver, kind = _name_driver(stack, dict(stack_settings or {}))
     words = [v.value for v in SensorLevel], [v.value for v in TrafficStart]
     template = RunSpec(
@@ -151,8 +186,7 @@ def drive(
         backend=BackendChoice() if backend is None else backend,
     )
     outside = find_weather(weather) if isinstance(weather, str) else weather
-    spec = describe_run(driver, outside, seed, template)
-    return run(spec, kind, folder=None if out is None else Path(out))
+    return describe_run(driver, outside, seed, template), kind
 
 
 def _name_driver(

@@ -15,6 +15,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from typing import Any
 
+from skidpad.campaign.driving.sharing import share_setups
 from skidpad.core.errors import SkidpadError
 from skidpad.core.told import clean, describe_value
 from skidpad.core.vocabulary import Outcome
@@ -179,6 +180,12 @@ def _kill_group(leader: int | None) -> None:
 
 def _work(pipe: Connection) -> None:
     """Runs jobs from the pipe in the worker process and sends their values, until the parent is gone."""
+    with share_setups():
+        _serve(pipe)
+
+
+def _serve(pipe: Connection) -> None:
+    """Runs jobs as they come, which share what they can."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
     if hasattr(os, "setpgid"):
         os.setpgid(0, 0)  # so that what a stack starts can be ended with it

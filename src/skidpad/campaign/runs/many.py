@@ -1,0 +1,93 @@
+"""Many runs by one call: in this process or over workers, in order, with what they share made once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any, TypeVar, overload
+
+from skidpad.campaign.driving.sharing import share_setups
+from skidpad.campaign.runs.run import Run, describe, run
+from skidpad.campaign.workers.pool import run_jobs
+from skidpad.campaign.workers.worker import Job
+from skidpad.core.errors import BackendError, ConfigError
+from skidpad.core.run import RunSpec
+from skidpad.stack.interface import Stack
+
+T = TypeVar("T")
+Described = RunSpec | Mapping[str, Any]
+CPU = "cpu"
+
+
+@overload
+def drive_many(
+    runs: Sequence[Described], *, workers: int = ..., device: str = ..., judge: None = ...
+) -> list[Run]: ...
+@overload
+def drive_many(
+    runs: Sequence[Described],
+    *,
+    workers: int = ...,
+    device: str = ...,
+    judge: Callable[[Run], T],
+) -> list[T]: ...
+
+
+def drive_many(
+    runs: Sequence[Described],
+    *,
+    workers: int = 1,
+    device: str = CPU,
+    judge: Callable[[Run], Any] | None = None,
+) -> list[Any]:
+    """Drive a list of runs; the results come in the order of the list.
+
+    Each run has the content hash that it has alone. Scenario files are compiled once for all runs that
+    differ in other things only.
+
+    Args:
+        runs: run values, as `skidpad.Scenario(...).spec` is one, or mappings of what `skidpad.drive` takes.
+        workers: processes; 1 drives in this one.
+        device: "cpu". There is no other one yet.
+        judge: is called with each run where it was driven, and its value stands in the list in place of
+            the run. With workers it is a function of a module. Logs are not kept then.
+
+    Returns:
+        A run for each description, or what `judge` made of it.
+
+    Raises:
+        ConfigError: a value is out of its range, or the device is not there.
+        BackendError: a worker's run failed; the message names it.
+
+    Example:
+        >>> runs = drive_many([{"stack": 2, "seed": s, "sensors": "objects"} for s in range(1, 9)])
+        >>> [len(run.log.contacts) for run in runs]
+    """
+    if device != CPU:
+        raise ConfigError(
+            f"device must be 'cpu', got {device!r}: runs are not driven on a graphics card"
+        )
+    if workers < 1:
+        raise ConfigError(f"workers must be at least 1, got {workers}")
+    described = [(one, None) if isinstance(one, RunSpec) else describe(**one) for one in runs]
+    drive_one = partial(_drive_one, judge)
+    if workers == 1:
+        with share_setups():
+            return [drive_one(spec, kind) for spec, kind in described]
+    specs = [spec for spec, _ in described]
+    jobs = [Job(str(k), drive_one, spec, spec.deadline_s) for k, spec in enumerate(specs)]
+    found: dict[int, Any] = {}
+    for finished in run_jobs(jobs, workers):
+        k = int(finished.job.key)
+        if finished.failure is not None:
+            raise BackendError(f"run {k} ({specs[k].name}): {finished.detail.strip()}")
+        found[k] = finished.value
+    return [found[k] for k in range(len(specs))]
+
+
+def _drive_one(
+    judge: Callable[[Run], Any] | None, spec: RunSpec, kind: type[Stack] | None = None
+) -> Any:
+    """Drives a run and returns it, or what `judge` makes of it. kind: the stack's class, if it is loaded."""
+    driven = run(spec, kind)
+    return driven if judge is None else judge(driven)

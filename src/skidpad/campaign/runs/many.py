@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any, TypeVar, overload
 
 from skidpad.campaign.driving.sharing import share_setups
+from skidpad.campaign.runs.folder import last_line
 from skidpad.campaign.runs.run import Run, describe, run
 from skidpad.campaign.workers.pool import run_jobs
 from skidpad.campaign.workers.worker import Job
@@ -80,7 +81,7 @@ def drive_many(
     for finished in run_jobs(jobs, workers):
         k = int(finished.job.key)
         if finished.failure is not None:
-            raise BackendError(f"run {k} ({specs[k].name}): {finished.detail.strip()}")
+            raise BackendError(f"run {k} ({specs[k].name}): {last_line(finished.detail)}")
         found[k] = finished.value
     return [found[k] for k in range(len(specs))]
 

@@ -79,5 +79,6 @@ def listed_ids() -> set[str]:
 def check_ids(texts: list[str]) -> None:
     """Asserts that every id in the texts stands beside its sentence, and that a page explains it."""
     assert sum(map(len, texts)) > 100
-    assert {text: ids for text in texts if (ids := bare_ids(text))} == {}
+    bare = {text: ids for text in texts if (ids := bare_ids(text))}
+    assert bare == {}, bare
     assert {m for text in texts for m in ID.findall(text)} <= listed_ids()

@@ -4,9 +4,11 @@ import pytest
 import typer
 from typer.core import TyperOption
 
+from skidpad.campaign.workers.worker import Finished
 from skidpad.cli.main import app
 from skidpad.cli.options.campaigns import CampaignOptions, Estimate
 from skidpad.core.errors import OutputError
+from skidpad.core.vocabulary import Outcome
 from support.toy_campaign import campaign
 
 ROOT = typer.main.get_command(app)
@@ -44,6 +46,26 @@ def test_the_terminal_shows_cells_as_they_end_and_then_the_report(tmp_path, caps
     again = CampaignOptions(out=tmp_path / "out", workers=1, resume=True)(campaign(), str)
     assert (again.driven, again.content_hash) == (0, summary.content_hash)
     assert "even: 4 runs, 2 heads" in capsys.readouterr().err
+
+
+def test_where_no_run_has_a_result_the_command_fails_and_says_so(tmp_path, capsys, monkeypatch):
+    def crash(jobs):
+        for k, job in enumerate(jobs):
+            if k < crashing:
+                yield Finished(job, failure=Outcome.CRASHED, detail="gone")
+            else:
+                yield Finished(job, value=job.work(job.argument))
+
+    monkeypatch.setattr("skidpad.campaign.workers.pool.local", lambda *_: crash)
+    crashing = 8
+    with pytest.raises(typer.Exit) as ended:
+        CampaignOptions(out=tmp_path / "all", workers=1)(campaign(), lambda folder: "a report")
+    assert ended.value.exit_code == 1
+    shown = capsys.readouterr()
+    assert shown.out == "a report\n", "the page says what crashed"
+    assert "none of 8 runs has a result" in shown.err
+    crashing = 7
+    assert CampaignOptions(out=tmp_path / "most", workers=1)(campaign(), str).failed == 7
 
 
 def test_another_campaign_goes_to_the_next_folder(tmp_path, capsys):

@@ -58,6 +58,10 @@ def test_dispersion_is_one_for_poisson_counts_and_none_without_events() -> None:
     assert dispersion_index([0, 0, 0]) is None
     assert dispersion_index([4]) is None
     assert dispersion_index([0, 8]) == 8.0
+    assert dispersion_index([0, 8, 0], [1.0, 1.0, 0.0]) == 8.0, (
+        "a run without exposure says nothing"
+    )
+    assert dispersion_index([4, 0], [1.0, 0.0]) is None
 
 
 @pytest.mark.req("T-6")

@@ -42,6 +42,15 @@ def listening(broker, tmp_path):
             listener.close()
 
 
+def test_a_listener_may_be_closed_twice_and_without_a_start(tmp_path):
+    with closing(make_world(tmp_path / "data", None)) as world:
+        listener = BatchListener(world.fleet, Broker(host="127.0.0.1", port=1), WAIT_S)
+        listener.start()
+        listener.close()
+        listener.close()
+        BatchListener(world.fleet, Broker(host="127.0.0.1", port=1), WAIT_S).close()
+
+
 def posting(world, broker, name="red-1"):
     return mqtt_poster(broker, world.accounts[name].token, world.clock, WAIT_S)
 

@@ -86,6 +86,17 @@ def test_migration_makes_the_tables_that_the_code_knows(world):
         assert columns == {c.name: c.nullable for c in table.columns}
 
 
+def test_a_credential_ends_once_and_is_counted_once(world):
+    principal = world.accounts["red operator"].principal.id
+    with world.fleet.engine.begin() as connection:
+        assert end_credentials(connection, principal, "the board", NOW + 5.0) == 1
+        assert end_credentials(connection, principal, "the board", NOW + 6.0) == 0
+        ids = connection.execute(
+            text("SELECT c.id FROM credentials c WHERE c.principal = :p"), {"p": principal}
+        ).scalars()
+        assert len(events_of(connection, list(ids))) == 1
+
+
 def test_an_ended_credential_opens_nothing(world):
     account = world.accounts["red operator"]
     with world.fleet.engine.begin() as connection:

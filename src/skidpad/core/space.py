@@ -117,16 +117,27 @@ class Choice(Struct, frozen=True, tag="choice", forbid_unknown_fields=True):
     """One of several words, each with its weight."""
 
     words: tuple[str, ...]
-    weights: tuple[float, ...] = ()  # (): alike
+    weights: tuple[float, ...] = ()  # (): alike; else one per word, 0 or more and one above 0
+
+    def __post_init__(self) -> None:
+        """Checks the weights; ConfigError names them where they make no distribution."""
+        total = sum(self.weights)
+        fits = len(self.weights) == len(self.words) and min(self.weights, default=0.0) >= 0.0
+        if self.weights and not (fits and 0.0 < total < math.inf):
+            raise ConfigError(
+                f"weights of {len(self.words)} words must be as many, 0 or more and one above 0, "
+                f"got {', '.join(f'{weight:g}' for weight in self.weights)}"
+            )
 
     def value(self, u: float) -> str:
         """Returns the word in whose share of the distribution `u` lies."""
-        reached = 0.0
+        reached, last = 0.0, self.words[-1]
         for word, share in zip(self.words, self._shares(), strict=True):
             reached += share
             if u < reached:
                 return word
-        return self.words[-1]
+            last = word if share > 0.0 else last
+        return last  # shares that add up to a hair below 1
 
     def likelihood(self, value: str) -> float:
         """Returns the weight of a word relative to that of the likeliest, 0 to 1; 0 for another word."""

@@ -107,15 +107,16 @@ def poisson_interval(count: int, exposure: float = 1.0, confidence: float = CONF
 def dispersion_index(counts: ArrayLike, exposures: ArrayLike | None = None) -> float | None:
     """Returns variance over mean of counts, 1 for Poisson; None below two runs or without events.
 
-    Of unequal exposures it is Pearson's: squared deviations over expectations, per run but one.
+    Of unequal exposures it is Pearson's: squared deviations over expectations, per run but one. Runs
+    without exposure say nothing and do not count.
     """
     c = np.asarray(counts, dtype=np.float64)
     e = np.ones_like(c) if exposures is None else np.asarray(exposures, dtype=np.float64)
-    use = e > 0.0
-    if c.size < 2 or c.sum() == 0.0 or not use.any():
+    c, e = c[e > 0.0], e[e > 0.0]
+    if c.size < 2 or c.sum() == 0.0:
         return None
-    expected = c.sum() * e[use] / e.sum()
-    return float(np.sum((c[use] - expected) ** 2 / expected) / (c.size - 1))
+    expected = c.sum() * e / e.sum()
+    return float(np.sum((c - expected) ** 2 / expected) / (c.size - 1))
 
 
 def event_rate(counts: Sequence[int], exposures: Sequence[float] | None = None) -> Rate:

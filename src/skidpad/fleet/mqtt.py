@@ -50,7 +50,9 @@ class BatchListener:
         self._thread.start()
 
     def close(self) -> None:
-        """Ends the thread; a batch without an answer is sent again by its vehicle. Not to be called twice."""
+        """Ends the thread, the first time; a batch without an answer is sent again by its vehicle."""
+        if self._loop.is_closed():
+            return
         if self._main is not None:
             self._loop.call_soon_threadsafe(self._main.cancel)
             self._thread.join()

@@ -19,14 +19,13 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import yaml
 from msgspec import structs
 
 from skidpad.core.errors import BackendError
-from skidpad.evidence.channels import hazards as rules_module
 
 OPERATORS = ("Red Cabs", "Blue Vans")
 MAKER = "Axle"
@@ -42,7 +41,9 @@ LOOSER = (
 
 def rule_sets() -> dict[str, bytes]:
     """Returns the rules that vehicles come with (as printed), better ones (tracked), and worse ones."""
-    source = Path(rules_module.__file__).with_name("hazard_rules.yaml")
+    import yaml
+
+    source = resources.files("skidpad.evidence.channels").joinpath("hazard_rules.yaml")
     table = yaml.safe_load(source.read_text(encoding="utf-8"))
     tracked = json.dumps({"tracked": table["tracked"]})
     looser = tracked
@@ -318,20 +319,20 @@ def open_recorded(out: Path, port: int, say: Callable[[str], None]) -> Iterator[
     import time
 
     from skidpad.fleet.recorded import unpack_recorded
-    from skidpad.fleet.service import Places, open_fleet
     from skidpad.fleet.store.accounts import add_person
+    from skidpad.fleet.store.engine import open_engine, sqlite_url
     from skidpad.fleet.words import Role
 
     about = unpack_recorded(out / "data")
     people = ((MAKER, Role.MANUFACTURER), (OPERATORS[0], Role.OPERATOR))
-    fleet = open_fleet(Places(data=out / "data"))
-    try:
-        with fleet.engine.begin() as connection:
-            accounts = [add_person(connection, t, r, "visitor", time.time()) for t, r in people]
-    finally:
-        fleet.close()
     say(about.describe())
-    with serving(out / "data", port) as address:
+    with serving(out / "data", port) as address:  # which brings the store to this version
+        engine = open_engine(sqlite_url(out / "data"))
+        try:
+            with engine.begin() as connection:
+                accounts = [add_person(connection, t, r, "visitor", time.time()) for t, r in people]
+        finally:
+            engine.dispose()
         visitor = Demo(out, address, "", [], 0.0, lambda _: [], say)
         for account in accounts:
             path = visitor.call(account.token, "POST", "/api/v1/session").json()["path"]

@@ -66,9 +66,11 @@ class CampaignOptions(Driving, frozen=True, kw_only=True):
         """Drives the campaign under a progress bar and prints what `report` says of its folder.
 
         parts: further campaigns by the folder below its own, driven after it. Returns the summary of the
-        campaign itself.
+        campaign itself; ends with exit code 1 when none of its runs has a result.
         """
         from dataclasses import replace
+
+        from skidpad.core.wording import count_text
 
         campaign = replace(campaign, until_halfwidth=self.until_halfwidth)
         identities = {".": campaign.identity()} | {n: c.identity() for n, c in parts.items()}
@@ -79,6 +81,9 @@ class CampaignOptions(Driving, frozen=True, kw_only=True):
         for name, part in parts.items():
             self._run(part, out / name, out)
         typer.echo(report(out))
+        if summary.failed == summary.runs > 0:
+            typer.echo(f"none of {count_text(summary.runs, 'run')} has a result", err=True)
+            raise typer.Exit(1)
         return summary
 
     def _run(self, campaign: Campaign[Any, Any, Any], folder: Path, out: Path) -> Summary:

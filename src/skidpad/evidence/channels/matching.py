@@ -225,13 +225,14 @@ def _mean(values: Sequence[float | None]) -> float | None:
 def merge_spans(spans: Iterable[Span], pause: float = 2.0) -> list[Span]:
     """Returns the spans with those of one hazard whose pause is under `pause` s as one (decision C-5).
 
-    A merged span has weight 1 and the objects of all its parts.
+    A merged span has the objects of all its parts and the largest of their weights.
     """
     out: list[Span] = []
     for s in sorted(spans, key=lambda s: (s.hazard.value, s.t_start)):
         last = out[-1] if out else None
         if last and last.hazard is s.hazard and s.t_start - last.t_end < pause:
-            out[-1] = Span(s.hazard, last.t_start, max(last.t_end, s.t_end), last.about | s.about)
+            end, weight = max(last.t_end, s.t_end), max(last.weight, s.weight)
+            out[-1] = Span(s.hazard, last.t_start, end, last.about | s.about, weight)
         else:
             out.append(s)
     return out

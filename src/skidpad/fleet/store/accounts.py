@@ -131,12 +131,15 @@ def _principal(connection: Connection, which: ColumnElement[bool], at: float) ->
 
 
 def end_credentials(connection: Connection, principal: str, by: str, at: float) -> int:
-    """Adds an event that ends it to every credential of a principal; returns how many there are.
+    """Adds an event that ends it to every credential of a principal; returns how many it ended.
 
-    Those that ended before are among them. by: actor; at: s.
+    Those that ended before stay as they are and do not count. by: actor; at: s.
     """
+    ended = select(events.c.number).where(
+        events.c.subject == credentials.c.id, events.c.what == ENDED
+    )
     rows = connection.execute(
-        select(credentials.c.id).where(credentials.c.principal == principal)
+        select(credentials.c.id).where(credentials.c.principal == principal, ~ended.exists())
     ).all()
     for row in rows:
         add_event(connection, ("credential", row.id), ENDED, (by, at))

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from alembic import command
-from alembic.config import Config
 from sqlalchemy import Engine, create_engine, event, make_url
 from sqlalchemy.exc import ArgumentError, SQLAlchemyError
 
@@ -39,6 +37,9 @@ def sqlite_url(folder: Path) -> str:
 
 def migrate(engine: Engine) -> None:
     """Brings the tables to this version; ConfigError when the database cannot be used."""
+    from alembic import command
+    from alembic.config import Config
+
     config = Config()
     config.set_main_option("script_location", SCRIPTS.replace("%", "%%"))
     try:

@@ -350,6 +350,16 @@ def test_spans_with_short_pauses_are_one():
     assert [(s.t_start, s.t_end) for s in merge_spans(rows)] == [(0, 4), (6.0, 7)]
 
 
+def test_a_merged_span_has_the_largest_weight_of_its_parts():
+    rows = [
+        Span(TAILGATED, start, start + 1.0, frozenset({name}), weight)
+        for start, name, weight in ((0.0, "a", 0.25), (2.0, "b", 0.5), (9.0, "c", 0.125))
+    ]
+    merged = merge_spans(rows)
+    assert [s.weight for s in merged] == [0.5, 0.125]
+    assert merged[0].about == {"a", "b"}
+
+
 @pytest.mark.req("C-211", "C-213", "C-215")
 def test_a_drive_is_judged_by_rules_truths_and_labels():
     rows, names = scene(

@@ -109,6 +109,37 @@ def test_the_command_opens_it_and_says_where(tmp_path):
     assert again.returncode == 2, "a folder that holds something is not touched"
 
 
+LOADED = """
+import sys
+from pathlib import Path
+{}
+heavy = ("numba", "polars", "alembic", "fastapi", "scipy.stats", "skidpad.fleet.loop.judging")
+print(*(name for name in heavy if name in sys.modules))
+"""
+
+
+def loaded_by(statements):
+    """What a fresh interpreter has loaded, of what takes longest to load."""
+    code = LOADED.format(statements)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(done.stdout.splitlines()[-1].split())
+
+
+def test_what_opens_the_recorded_fleet_loads_nothing_that_its_server_loads_again(tmp_path):
+    opening = f"""
+from skidpad.cli.fleet.demo import open_recorded
+with open_recorded(Path({str(tmp_path / "fleet")!r}), 0, print):
+    pass
+"""
+    assert loaded_by(opening) == set()
+
+
+def test_the_server_starts_without_what_only_an_evaluation_needs():
+    assert not loaded_by("import skidpad.fleet.server") & {
+        "scipy.stats", "skidpad.fleet.loop.judging"
+    }  # fmt: skip
+
+
 def test_a_damaged_recording_is_one_sentence(tmp_path, monkeypatch):
     monkeypatch.setattr(recorded, "ARCHIVE", tmp_path / "fleet.tar.gz")
     (tmp_path / "fleet.tar.gz").write_bytes(b"nothing")

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import stats
 from scipy.special import chdtri, stdtrit
 
 from skidpad.core.arrays import Floats
@@ -31,6 +30,8 @@ def count_limits(
     and Nelder (1989), Generalized Linear Models, 2nd ed., section 6.2.3. Widening and tails are
     calibrated by simulation.
     """
+    from scipy import stats
+
     t, k, d = (np.asarray(v, dtype=np.float64) for v in (totals, with_events, dispersions))
     tail = (1.0 - CONFIDENCE) / 2.0
     student = float(stdtrit(runs - 1, 1.0 - tail) / stats.norm.ppf(1.0 - tail))

@@ -19,7 +19,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import stats
 
 from skidpad.core.arrays import Floats
 from skidpad.core.errors import require_range
@@ -98,6 +97,8 @@ class Comparison:
 
 def poisson_interval(count: int, exposure: float = 1.0, confidence: float = CONFIDENCE) -> Interval:
     """Returns exact limits of a Poisson rate. Source: Garwood (1936), Biometrika 28."""
+    from scipy import stats
+
     tail = (1.0 - confidence) / 2.0
     low = stats.chi2.ppf(tail, 2 * count) / 2.0 if count else 0.0
     high = stats.chi2.ppf(1.0 - tail, 2 * count + 2) / 2.0
@@ -236,6 +237,8 @@ def pairs_needed(comparison: Comparison, smallest: float, power: float = 0.8) ->
 
     By the normal approximation at 5 %, two-sided; None when the pairs do not vary or beyond 10 000.
     """
+    from scipy import stats
+
     z = stats.norm.ppf(1.0 - (1.0 - CONFIDENCE) / 2.0) + stats.norm.ppf(power)
     difference = max(abs(comparison.mean), smallest)
     if comparison.spread == 0.0 or difference == 0.0:
@@ -249,6 +252,8 @@ def mcnemar(only_a: int, only_b: int) -> float:
 
     1 without such a pair. Source: McNemar (1947), Psychometrika 12.
     """
+    from scipy import stats
+
     if only_a + only_b == 0:
         return 1.0
     return float(stats.binomtest(only_a, only_a + only_b).pvalue)
@@ -259,6 +264,8 @@ def clopper_pearson(k: int, n: int, confidence: float = CONFIDENCE) -> Interval:
 
     Source: Clopper and Pearson (1934), Biometrika 26.
     """
+    from scipy import stats
+
     require_range("successes", k, 0, n)
     if n == 0:
         return Interval(0.0, 1.0)
@@ -271,6 +278,8 @@ def share_bound(k: int, n: int, confidence: float = CONFIDENCE) -> float:
 
     Source: as `clopper_pearson`.
     """
+    from scipy import stats
+
     require_range("successes", k, 0, n)
     return 1.0 if k == n else float(stats.beta.ppf(confidence, k + 1, n - k))
 
@@ -282,6 +291,8 @@ def median_time(times: ArrayLike, end: float) -> tuple[float, Interval | None]:
     no form of the distribution is assumed; fewer than six times have none. Source: Thompson
     (1936), Ann. Math. Stat. 7, confidence ranges for the median.
     """
+    from scipy import stats
+
     t = np.asarray(times, dtype=np.float64)
     if t.size == 0:
         raise ValueError("a median needs at least one time")

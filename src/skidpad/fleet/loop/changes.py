@@ -10,7 +10,6 @@ from sqlalchemy import Connection, select
 
 from skidpad.core.vocabulary import HazardType
 from skidpad.fleet.identity import new_id
-from skidpad.fleet.loop.judging import errors_of
 from skidpad.fleet.patterns.analysis import cluster_row
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.events import add_event
@@ -83,6 +82,8 @@ def re_evaluate(
 
     Scenes that were evaluated earlier are not judged again.
     """
+    from skidpad.fleet.loop.judging import errors_of
+
     kind, _, content = payload_of(fleet, who, change)
     settings = [read_payload_content(*before), read_payload_content(kind, content)]
     with fleet.engine.connect() as connection:

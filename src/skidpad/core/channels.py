@@ -17,19 +17,32 @@ class ChannelFrame(NamedTuple):
 
     `plan` begins at the ego's place. n objects; predictions have p points each. Shapes are given
     as polygons relative to the object's own position and heading.
+
+    Attributes:
+        t: s, time of the cycle.
+        ego: (5,) x, y, heading, vx, vy.
+        ego_polygon: (k, 2).
+        plan: (m, 3) x, y, t relative to `t`; (0, 3) when there is none.
+        objects: (n, 5) x, y, heading, vx, vy.
+        polygons: (n, k, 2), rows beyond polygon_size are NaN.
+        polygon_size: (n,).
+        predictions: (n, p, 2).
+        prediction_t: (p,) relative to `t`.
+        ids: (n,) -1: this channel gives no identity.
+        classes: (n,) SemanticClass, -1: unknown.
     """
 
-    t: float  # s, time of the cycle
-    ego: Floats  # (5,) x, y, heading, vx, vy
-    ego_polygon: Floats  # (k, 2)
-    plan: Floats  # (m, 3) x, y, t relative to `t`; (0, 3) when there is none
-    objects: Floats  # (n, 5) x, y, heading, vx, vy
-    polygons: Floats  # (n, k, 2), rows beyond polygon_size are NaN
-    polygon_size: NDArray[np.int64]  # (n,)
-    predictions: Floats  # (n, p, 2)
-    prediction_t: Floats  # (p,) relative to `t`
-    ids: NDArray[np.int64]  # (n,) -1: this channel gives no identity
-    classes: NDArray[np.int64]  # (n,) SemanticClass, -1: unknown
+    t: float
+    ego: Floats
+    ego_polygon: Floats
+    plan: Floats
+    objects: Floats
+    polygons: Floats
+    polygon_size: NDArray[np.int64]
+    predictions: Floats
+    prediction_t: Floats
+    ids: NDArray[np.int64]
+    classes: NDArray[np.int64]
 
 
 class TruthFrame(NamedTuple):

@@ -140,21 +140,39 @@ class Segments(NamedTuple):
 @fill_slots
 @dataclass(frozen=True, slots=True)
 class SensorFrame:
-    """One tick of all sensors of the ego (decision L-3)."""
+    """One tick of all sensors of the ego (decision L-3).
+
+    Attributes:
+        tick: Number of the tick.
+        ego: What localisation and own sensors say.
+        images: By sensor id; rendered when first read.
+        segments: By id of the depth camera; object level only, else empty.
+        radar: Returns of the common radar.
+        lights: By signal id: the lights that this stack may see.
+        contacts: Contacts that began in this tick.
+        invasions: Lane markings that were crossed in this tick.
+        supervision: Phase of the recovery supervisor.
+        extra: Readings of the sensors that the stack asked for, by id: plain data and
+            arrays as their type in `core.sensor_types` says; each is made when it is first
+            read.
+        radar_objects: Of each row of `radar`: setting radar_output.
+        radar_tracks: Tracks of the common radar: setting radar_output.
+
+    Example:
+        >>> nearest = min(frame.radar.range, default=200.0)
+    """
 
     tick: int
     ego: EgoEstimate
-    images: Mapping[str, CameraImage]  # by sensor id; rendered when first read
-    segments: Mapping[str, Segments]  # by id of the depth camera; object level only, else empty
+    images: Mapping[str, CameraImage]
+    segments: Mapping[str, Segments]
     radar: RadarPoints
-    lights: Mapping[int, LightState]  # by signal id: the lights that this stack may see
+    lights: Mapping[int, LightState]
     contacts: tuple[ContactEvent, ...] = ()
     invasions: tuple[LaneInvasion, ...] = ()
     supervision: Supervision = Supervision.NONE
-    # readings of the sensors that the stack asked for, by id: plain data and
-    # arrays as their type in `core.sensor_types` says; each is made when it is first read
     extra: Mapping[str, Any] = field(default_factory=dict)
-    radar_objects: RadarObjects | None = None  # of each row of `radar`: setting radar_output
+    radar_objects: RadarObjects | None = None
     radar_tracks: RadarTracks | None = None
 
 

@@ -100,9 +100,51 @@ class CameraOptics:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setup:
-    """Everything that a backend needs to begin a run."""
+    """Everything that a backend needs to begin a run.
 
-    map: str | Path  # name of a bundled map, or a file
+    Attributes:
+        map: Name of a bundled map, or a file.
+        weather: Of the whole run, unless a file or a person changes it.
+        specs: The sensors of the ego: the common ones and those that the stack asked for.
+        ego: Vehicle and start of the ego.
+        actors: Those who are there from the start, besides the ego and traffic.
+        traffic: Background traffic; None: there is none.
+        grip: How weather acts on tyres.
+        range_model: How weather acts on what sensors see.
+        camera_effect: Weather acts on RGB images.
+        camera_optics: Of RGB images (embedded backend).
+        rain_hides_night: In rain the camera effect of the night is left out (D-094).
+        mu_ref: Friction at CARLA's tire_friction 3.5 on a dry road.
+        tyres: Of vehicles that have none of their own (embedded backend).
+        tyre_stiffness: Slip stiffness falls on water, snow and ice (embedded backend).
+        water_drag: Wheels push water aside (embedded backend).
+        sheet_flow: Rain is deeper where superelevation is low (embedded backend).
+        material_base: mu_ref that <material friction> of the map replaces; None: it is not
+            read (embedded backend).
+        lidar: Of the lidars that a stack asks for (embedded backend).
+        lidar_effects: On such lidars (embedded backend).
+        spray: Behind vehicles, for such lidars (embedded backend).
+        radar_model: Of the common radar (embedded backend).
+        radar_multipath: Of such a radar.
+        radar_interference: Share of vehicles whose radar disturbs such a radar.
+        radar_output: Of such a radar.
+        stability: All vehicles have stability and traction control (embedded backend).
+        anti_lock: Of vehicles that have them (embedded backend).
+        stability_control: Where there is one.
+        roll_over: Vehicles can tip over their outer wheels (embedded backend).
+        wind: That pushes vehicles; None: no air moves (embedded backend).
+        wakes: Lorries, buses and vans push air aside (embedded backend).
+        level: Whether cameras give images or boxes of objects.
+        asked: Ids among specs whose readings go to `frame.extra` (L-3).
+        render_all: Every image every tick, read or not.
+        patches: Parts of the road with a surface of their own.
+        scenery: Beside the roads (embedded backend).
+        bodywork: Of all actors (embedded backend).
+        localisation_noise: m, standard deviation of the ego's x and y; 0: exact (L-3).
+        dt: s, the length of a tick.
+    """
+
+    map: str | Path
     weather: Weather
     specs: tuple[SensorSpec, ...]
     ego: ActorSetup
@@ -110,36 +152,35 @@ class Setup:
     traffic: TrafficSetup | None = None
     grip: GripModel = GripModel.PHYSICAL
     range_model: RangeModel = RangeModel.PHYSICAL
-    camera_effect: bool = True  # weather acts on RGB images
-    camera_optics: CameraOptics = CameraOptics()  # of RGB images (embedded backend)
-    rain_hides_night: bool = False  # in rain the camera effect of the night is left out (D-094)
-    mu_ref: float = 0.9  # friction at CARLA's tire_friction 3.5 on a dry road
-    tyres: str = REFERENCE  # of vehicles that have none of their own (embedded backend)
-    tyre_stiffness: bool = False  # slip stiffness falls on water, snow and ice (embedded backend)
-    water_drag: bool = False  # wheels push water aside (embedded backend)
-    sheet_flow: bool = False  # rain is deeper where superelevation is low (embedded backend)
-    # mu_ref that <material friction> of the map replaces; None: it is not read (embedded backend)
+    camera_effect: bool = True
+    camera_optics: CameraOptics = CameraOptics()
+    rain_hides_night: bool = False
+    mu_ref: float = 0.9
+    tyres: str = REFERENCE
+    tyre_stiffness: bool = False
+    water_drag: bool = False
+    sheet_flow: bool = False
     material_base: float | None = None
-    lidar: LidarModel = LidarModel.EXACT  # of the lidars that a stack asks for (embedded backend)
-    lidar_effects: LidarEffects = LidarEffects()  # on such lidars (embedded backend)
-    spray: bool = False  # behind vehicles, for such lidars (embedded backend)
-    radar_model: RadarModel = RadarModel.GEOMETRIC  # of the common radar (embedded backend)
-    radar_multipath: bool = False  # of such a radar
-    radar_interference: float = 0.0  # share of vehicles whose radar disturbs such a radar
-    radar_output: RadarOutput = RadarOutput.POINTS  # of such a radar
-    stability: bool = False  # all vehicles have stability and traction control (embedded backend)
-    anti_lock: AntiLock = AntiLock.IDEAL  # of vehicles that have them (embedded backend)
-    stability_control: StabilityControl = StabilityControl.IDEAL  # where there is one
-    roll_over: bool = False  # vehicles can tip over their outer wheels (embedded backend)
-    wind: Wind | None = None  # that pushes vehicles; None: no air moves (embedded backend)
-    wakes: bool = False  # lorries, buses and vans push air aside (embedded backend)
+    lidar: LidarModel = LidarModel.EXACT
+    lidar_effects: LidarEffects = LidarEffects()
+    spray: bool = False
+    radar_model: RadarModel = RadarModel.GEOMETRIC
+    radar_multipath: bool = False
+    radar_interference: float = 0.0
+    radar_output: RadarOutput = RadarOutput.POINTS
+    stability: bool = False
+    anti_lock: AntiLock = AntiLock.IDEAL
+    stability_control: StabilityControl = StabilityControl.IDEAL
+    roll_over: bool = False
+    wind: Wind | None = None
+    wakes: bool = False
     level: SensorLevel = SensorLevel.PIXELS
-    asked: frozenset[str] = frozenset()  # ids among specs whose readings go to `frame.extra` (L-3)
-    render_all: bool = False  # every image every tick, read or not
+    asked: frozenset[str] = frozenset()
+    render_all: bool = False
     patches: tuple[SurfacePatch, ...] = ()
-    scenery: Scenery = Scenery.NONE  # beside the roads (embedded backend)
-    bodywork: Bodywork = Bodywork.PLAIN  # of all actors (embedded backend)
-    localisation_noise: float = 0.0  # m, standard deviation of the ego's x and y; 0: exact (L-3)
+    scenery: Scenery = Scenery.NONE
+    bodywork: Bodywork = Bodywork.PLAIN
+    localisation_noise: float = 0.0
     dt: float = DT
 
 

@@ -17,7 +17,18 @@ from skidpad.core.vocabulary import DetectionStatus, LightSource, LightState, Ti
 @fill_slots
 @dataclass(frozen=True, slots=True)
 class VehicleCommand:
-    """What a driver does: pedals in [0, 1], steer in [-1, 1] with left positive (ISO 8855)."""
+    """What a driver does: pedals in [0, 1], steer in [-1, 1] with left positive (ISO 8855).
+
+    Attributes:
+        throttle: Pedal, 0 to 1.
+        brake: Pedal, 0 to 1.
+        steer: -1 to 1, left positive.
+        handbrake: Pulled: locks the rear wheels.
+        reverse: The gear is reverse.
+
+    Example:
+        >>> VehicleCommand(throttle=0.3, steer=0.05)
+    """
 
     throttle: float = 0.0
     brake: float = 0.0
@@ -31,20 +42,34 @@ class ActorStates(NamedTuple):
 
     The position is the centre of the box's footprint at road height; the velocity is that point's.
     A named tuple of arrays, so that kernels take it as it is.
+
+    Attributes:
+        x: m.
+        y: m.
+        z: m.
+        yaw: rad.
+        pitch: Body attitude relative to the horizontal.
+        roll: Body attitude, rad.
+        vx: m/s, world frame.
+        vy: m/s, world frame.
+        yaw_rate: rad/s.
+        ax: Body frame, forward.
+        ay: Body frame, left.
+        present: False: not (or no longer) in the world.
     """
 
     x: Floats
     y: Floats
     z: Floats
     yaw: Floats
-    pitch: Floats  # body attitude relative to the horizontal
+    pitch: Floats
     roll: Floats
     vx: Floats
     vy: Floats
     yaw_rate: Floats
-    ax: Floats  # body frame, forward
-    ay: Floats  # body frame, left
-    present: NDArray[np.bool_]  # False: not (or no longer) in the world
+    ax: Floats
+    ay: Floats
+    present: NDArray[np.bool_]
 
     @classmethod
     def empty(cls, n: int) -> ActorStates:
@@ -71,15 +96,25 @@ class ActorStates(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ActorTable:
-    """What does not change about n actors during a run; row 0 is the ego. Arrays of shape (n,)."""
+    """What does not change about n actors during a run; row 0 is the ego. Arrays of shape (n,).
+
+    Attributes:
+        names: By which events and pages call them.
+        types: Vehicle type ids of physics, or "pedestrian", "bicycle", prop ids.
+        kind: ActorKind.
+        length: m, of the box.
+        width: m, of the box.
+        height: m, of the box.
+        rgb: (n, 3) paint.
+    """
 
     names: tuple[str, ...]
-    types: tuple[str, ...]  # vehicle type ids of physics, or "pedestrian", "bicycle", prop ids
-    kind: NDArray[np.uint8]  # ActorKind
+    types: tuple[str, ...]
+    kind: NDArray[np.uint8]
     length: Floats
     width: Floats
     height: Floats
-    rgb: NDArray[np.uint8]  # (n, 3) paint
+    rgb: NDArray[np.uint8]
 
     def __len__(self) -> int:
         return len(self.names)

@@ -30,24 +30,49 @@ RANGES: dict[str, tuple[float, float]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Weather:
-    """The state of sky, air and road. Percentages are CARLA's; `ice_thickness` 100 is 2 cm (B-017)."""
+    """The state of sky, air and road. Percentages are CARLA's; `ice_thickness` 100 is 2 cm (B-017).
 
-    name: str = ""  # slug
-    title: str = ""  # as published
-    cloudiness: float = 0.0  # percent
-    precipitation: float = 0.0  # percent
-    precipitation_deposits: float = 0.0  # percent of the road under water
-    wind_intensity: float = 0.0  # percent
+    Attributes:
+        name: Slug.
+        title: As published.
+        cloudiness: percent.
+        precipitation: percent.
+        precipitation_deposits: percent of the road under water.
+        wind_intensity: percent.
+        sun_azimuth_deg: deg.
+        sun_altitude_deg: deg above the horizon.
+        fog_density: percent.
+        fog_distance: m, where fog begins.
+        wetness: percent.
+        fog_falloff: How fast fog thins with height, as in CARLA.
+        scattering_intensity: Of the sky, as in CARLA.
+        mie_scattering_scale: Of the sky, as in CARLA.
+        rayleigh_scattering_scale: Of the sky, as in CARLA.
+        ice_thickness: percent of 20 mm.
+        snow_depth_mm: mm of snow on the road.
+        air_temperature_c: deg C.
+        road_temperature_c: deg C.
+
+    Example:
+        >>> Weather(name="drizzle", precipitation=15.0, wetness=40.0)
+    """
+
+    name: str = ""
+    title: str = ""
+    cloudiness: float = 0.0
+    precipitation: float = 0.0
+    precipitation_deposits: float = 0.0
+    wind_intensity: float = 0.0
     sun_azimuth_deg: float = 0.0
     sun_altitude_deg: float = 75.0
-    fog_density: float = 0.0  # percent
-    fog_distance: float = 0.0  # m, where fog begins
-    wetness: float = 0.0  # percent
+    fog_density: float = 0.0
+    fog_distance: float = 0.0
+    wetness: float = 0.0
     fog_falloff: float = 0.0
     scattering_intensity: float = 0.0
     mie_scattering_scale: float = 0.0
     rayleigh_scattering_scale: float = 0.0331
-    ice_thickness: float = 0.0  # percent of 20 mm
+    ice_thickness: float = 0.0
     snow_depth_mm: float = 0.0
     air_temperature_c: float = 15.0
     road_temperature_c: float = 15.0

@@ -59,11 +59,22 @@ class SignalAhead:
 
 
 class RoadMap:
-    """One map: `samples`, `lanes`, `signals`, `roadside`, and questions about them.
+    """One map, and questions about it.
 
-    name: str; content_hash: str (SHA-256 over all baked arrays, decision L-6); arrays: what kernels
-    of other packages take; ego_start: where the ego starts unless told otherwise, or None;
-    geo_reference: the file's projection text.
+    Attributes:
+        name: The name of the map.
+        content_hash: SHA-256 over all baked arrays (decision L-6).
+        samples: Points along the centre of each lane.
+        lanes: What holds for a whole lane, one row each.
+        signals: Traffic lights and signs, one row each.
+        roadside: Barriers, crosswalks and objects beside the lanes.
+        arrays: What kernels of other packages take.
+        geo_reference: The file's projection text.
+        ego_start: Where the ego starts unless told otherwise, or None.
+
+    Example:
+        >>> here = map.project(frame.ego.pose.x, frame.ego.pose.y, frame.ego.pose.z)
+        >>> aim = map.ahead(here, 20.0) if here else None
     """
 
     name: str

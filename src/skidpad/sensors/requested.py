@@ -54,7 +54,19 @@ class GeoMap(SceneMap, Protocol):
 
 
 class SensorHost(Protocol):
-    """What a sensor is given to measure with: the world of the present tick, and the run."""
+    """What a sensor is given to measure with: the world of the present tick, and the run.
+
+    Attributes:
+        tick: Number of the present tick.
+        seed: Seed of the run, for noise.
+        setup: Map, weather, settings and the length of a tick.
+        table: Sizes and kinds of all actors; row 0 is the ego.
+        states: Where all actors are in this tick, and how they move.
+
+    Example:
+        >>> def make_thermometer(spec, host):
+        ...     return lambda: host.setup.weather.air_temperature_c
+    """
 
     @property
     def tick(self) -> int:

@@ -27,7 +27,22 @@ class DrivingFunction(Protocol):
     """
 
     def update(self, frame: SensorFrame, command: VehicleCommand) -> VehicleCommand:
-        """Returns the command of this tick, changed or as it is."""
+        """Returns the command of this tick, changed or as it is.
+
+        Args:
+            frame: What the stack saw in this tick.
+            command: What the stack, and the functions before this one, would do.
+
+        Returns:
+            The command that the next function gets, or the vehicle.
+
+        Raises:
+            Exception: anything; the run ends as a failure of the stack that names this function.
+
+        Example:
+            >>> def update(self, frame, command):
+            ...     return replace(command, throttle=min(command.throttle, 0.5))
+        """
         ...
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, sin
 
 from skidpad.core.geometry import Pose
 from skidpad.core.run import ActorMode
 from skidpad.core.setup import DT, ActorCommand, ActorSetup
-from skidpad.core.states import WorldTruth
+from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import Control
 from skidpad.recording.run.lamps import LampChange
 from skidpad.recording.run.staging import Staging
@@ -17,13 +17,13 @@ from skidpad.recording.run.tilts import Tilted
 from skidpad.scenarios.actions.routing import go_on_after_track
 from skidpad.scenarios.movement.motion import Guide
 from skidpad.scenarios.movement.network import Place
+from skidpad.scenarios.movement.tracking import track_demand
 from skidpad.scenarios.playing.disturbing import Disturbances
-from skidpad.scenarios.playing.piloting import control
 from skidpad.scenarios.playing.staging import WayOfEgo, staging_of
 from skidpad.scenarios.playing.telling import Telling
 from skidpad.scenarios.reading.entities import TYRES, Box
 from skidpad.scenarios.scenario import Scenario
-from skidpad.scenarios.scene import Actor, Happening, Running, Scene
+from skidpad.scenarios.scene import Actor, Controlling, Happening, Running, Scene
 from skidpad.scenarios.signals import SignalPlan
 from skidpad.scenarios.traffic import drive
 from skidpad.scenarios.trailers import connect_at_begin, tow_command, tractors_first
@@ -216,3 +216,52 @@ class Player:
 def _motion(pose: Pose, v: float) -> Motion:
     """Returns the planar motion of a body at a pose that moves along its yaw at v in m/s."""
     return Motion(pose.x, pose.y, pose.yaw, v * cos(pose.yaw), v * sin(pose.yaw))
+
+
+# Controllers of actors at work: along the lane by an acceleration, or with pedals and steer.
+
+
+def control(scene: Scene) -> None:
+    """Steps every active controller; an action of the file goes before it in its domain.
+
+    Sets the pedals of an actor whose controller has them, else its demanded speed.
+    """
+    for actor in scene.actors.values():
+        actor.piloted, controller = None, actor.controller
+        if controller is None or not actor.present:
+            continue
+        if controller.drives:
+            actor.piloted = pilot(scene, actor, controller)
+        elif actor.longitudinal is None and actor.controls[1]:
+            guide = actor.guide
+            v = max(guide.v + controller.acceleration(scene, actor.name) * scene.dt, 0.0)
+            guide.v, guide.a = v, (v - guide.v) / scene.dt
+
+
+def pilot(scene: Scene, actor: Actor, controller: Controlling) -> VehicleCommand | None:
+    """Returns pedals by the controller, steer by the file, or the other way round, or both by one.
+
+    None, with a notice, for an actor without pedals.
+    """
+    if actor.driver is None:
+        scene.notice(f"{actor.name} has no pedals: its controller does nothing")
+        return None
+    asked = controller.command(scene, actor.name)
+    lateral, longitudinal = actor.controls
+    timed = actor.track is not None and actor.track.timed
+    steers = lateral and actor.lateral is None and actor.track is None
+    paces = longitudinal and actor.longitudinal is None and not timed
+    if steers:
+        actor.follow_road(scene.network, actor.guide.v)
+    if paces:
+        actor.guide.v, actor.guide.a = actor.motion.speed, 0.0
+    if steers and paces:
+        return asked
+    if actor.track is not None:
+        demand = track_demand(actor.track, actor.motion, scene.t, scene.dt, actor.centre)
+    else:
+        demand = actor.guide.demand(actor.motion)
+    own = actor.driver.command(actor.motion, demand)
+    if paces:
+        return replace(asked, steer=own.steer)
+    return replace(own, steer=asked.steer) if steers else own

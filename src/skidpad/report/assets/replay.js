@@ -21,7 +21,8 @@ for (const figure of document.querySelectorAll(".replay")) {
   const images = (data.pictures ?? []).map((source, i) => Object.assign(new Image(), { src: source, onload: () => i === k && draw() }));
   const speed = i => {  // km/h, over half a second; before a contact, over what led to it
     if (!data.frames) return "";
-    const e = 3 * data.ego, n = Math.max(Math.round(.25 / data.dt), 1), a = Math.max(i - n, 0), b = i === data.mark ? i : Math.min(i + n, last);
+    const e = 3 * data.ego, n = Math.max(Math.round(.25 / data.dt), 1), early = i === data.mark ? 1 : 0;
+    const a = Math.max(i - n - early, 0), b = early ? Math.max(i - 1, 0) : Math.min(i + n, last);
     if (a === b) return "";
     const v = 3.6 * u * Math.hypot(data.frames[b][e] - data.frames[a][e], data.frames[b][e + 1] - data.frames[a][e + 1]) / ((b - a) * data.dt);
     return v < 400 ? ` · ${Math.round(v)} km/h` : "";

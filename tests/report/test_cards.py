@@ -112,7 +112,8 @@ CAME = Moment(0.1, 3.7)
                 first=dataclasses.replace(SEEN, before=8.5), braked=Moment(2.0, 30.0, 100.0 / KMH),
             ),
             ("traffic_17 drove at 50 km/h ahead; the ego braked 2.0 s before, from 100 km/h, 30.0 m "
-            "away; a full braking on a friction of 0.80 takes 12 m, less than that."),
+            "away; to match its speed by full braking on a friction of 0.80 takes 12 m of gap, less than "
+            "that."),
         ),
         (
             a_story(
@@ -121,8 +122,16 @@ CAME = Moment(0.1, 3.7)
                 slowed=Moment(4.0, 60.0, 110.0 / KMH),
             ),
             ("traffic_17 ahead slowed from 110 km/h to 50 km/h within 4.0 s; the ego braked 2.0 s "
-            "before, from 100 km/h, 30.0 m away; a full braking on a friction of 0.20 takes 49 m, "
-            "more than that."),
+            "before, from 100 km/h, 30.0 m away; to match its speed by full braking on a friction of 0.20 "
+            "takes 49 m of gap, more than that."),
+        ),
+        (
+            a_story(
+                a_crash(mu=0.5, v_other=0.0), arrival=Arrival.DRIVEN_UP, arrived=Moment(9.0, 75.0),
+                first=dataclasses.replace(SEEN, before=8.5), braked=Moment(2.0, 30.0, 20.0),
+            ),
+            ("traffic_17 stood ahead; the ego braked 2.0 s before, from 72 km/h, 30.0 m away; to stop by "
+            "full braking on a friction of 0.50 takes 41 m, more than that."),
         ),
         (
             a_story(a_crash(v_other=0.0)),

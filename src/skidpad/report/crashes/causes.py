@@ -156,7 +156,12 @@ def _describe_braking(story: Story) -> str:
         return text
     needed = faster**2 / (2.0 * crash.mu * G)
     enough = "less than" if needed < braked.gap else "more than"
-    return f"{text}; a full braking on a friction of {crash.mu:.2f} takes {needed:.0f} m, {enough} that"
+    moves = (crash.v_other or 0.0) > STANDS
+    end, way = ("match its speed", " of gap") if moves else ("stop", "")
+    return (
+        f"{text}; to {end} by full braking on a friction of {crash.mu:.2f} takes {needed:.0f} m{way}, "
+        f"{enough} that"
+    )
 
 
 def _describe_departure(story: Story) -> list[str]:

@@ -21,6 +21,7 @@ from skidpad.report.channels.worlds import UNIT, worlds_replay
 from skidpad.report.elements.figures import PALETTE
 from skidpad.report.elements.timeline import Mark, Strip, timelines
 from support.channel_worlds import Eyes, World, drive
+from support.report_page import read_page
 from support.svg_values import curves_of
 
 WORLD = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(-11.0, 0, 0, 15.5, 0), (50.0, 3.5, 0, 15, 0)]))
@@ -76,7 +77,7 @@ def test_every_indicator_carries_what_a_violation_points_at_into_the_page(folder
     assert len(claimed) >= 9
     assert all(claimed)
     assert [row[0].hint for row in table.rows] == meanings
-    html = unescape(write_drive_report(folder).read_text(encoding="utf-8"))
+    html = unescape(read_page(write_drive_report(folder)))
     for meaning in filter(None, meanings):
         assert f'title="{meaning}"' in html
 

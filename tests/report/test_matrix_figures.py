@@ -27,6 +27,7 @@ from skidpad.report.matrix.tables import (
 )
 from skidpad.report.published import Source, read_published
 from support.matrix_drawn import key, write_drawn_campaign
+from support.report_page import read_page
 from support.svg_values import bars, curves_of, frames, marks_of, shapes, texts
 
 CONFIGS = ("1", "2", "3", "4")
@@ -36,7 +37,7 @@ CONFIGS = ("1", "2", "3", "4")
 def page(tmp_path_factory):
     folder = tmp_path_factory.mktemp("seven")
     write_drawn_campaign(folder, seeds=3)
-    html = write_report(folder).read_text(encoding="utf-8")
+    html = read_page(write_report(folder))
     rows = pl.read_parquet(folder / "results.parquet")
     return html, rows.with_columns(crashes=pl.col("fatal_collisions"))  # no contact is graded here
 

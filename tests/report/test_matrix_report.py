@@ -18,6 +18,7 @@ from skidpad.report.matrix.headline import headline_numbers, headline_tables
 from skidpad.report.matrix.page import build_page, write_report
 from skidpad.report.matrix.tables import per_weather
 from support.matrix_drawn import RATES, key, write_drawn_campaign
+from support.report_page import read_page
 
 NONE_OF_9 = f"in at most {100 * (1 - 0.05 ** (1 / 9)):.0f} % of seeds"
 
@@ -27,7 +28,7 @@ def html(tmp_path_factory):
     """The page of a campaign of three seeds."""
     folder = tmp_path_factory.mktemp("three")
     write_drawn_campaign(folder)
-    return write_report(folder).read_text(encoding="utf-8")
+    return read_page(write_report(folder))
 
 
 @pytest.mark.req("A-258", "A-259")

@@ -7,7 +7,9 @@ from skidpad.report.elements.page import (
     Card,
     Cards,
     Cell,
+    Code,
     Definitions,
+    Figure,
     Page,
     Section,
     Table,
@@ -77,3 +79,21 @@ def test_backticks_make_code_and_nothing_else_does():
     assert "<p>run <code>a &lt;b&gt;</code>, not &lt;i&gt;</p>" in render(page)
     option = Page(title="t", subtitle="", sections=[Section("s", [Text("ask `--seeds 10`")])])
     assert '<code class="option">--seeds 10</code>' in render(option), "not broken after its dashes"
+
+
+def test_a_number_and_its_unit_stay_on_one_line():
+    told = "in 95 % of `drive 5 m` at 80 km/h, 12 s and 3 m/s² in 4 months"
+    table = Table([("row", "")], [[Cell("2 km", note="[1, 9] 7 mm")]], caption="20 m on")
+    figure = Figure("<svg><text>30 m</text></svg>", "95 % of 100 km")
+    code = Code("as it stands", "wait 5 s")
+    blocks = [Text(told), table, figure, code]
+    html = render(Page(title="t", subtitle="3 s", sections=[Section("s", blocks)]))
+    joined = "in 95~% of <code>drive 5 m</code> at 80~km/h, 12~s and 3~m/s² in 4 months"
+    for part in (
+        f"<p>{joined}</p>", ">2~km<", "[1, 9] 7~mm", "<figcaption>20~m on<",
+        "<figcaption>95~% of 100~km<", "<svg><text>30 m</text></svg>", "<pre>wait 5 s</pre>",
+        ">3~s<",
+    ):  # fmt: skip
+        assert part.replace("~", "\u00a0") in html, part
+    assert table.csv_uri() in html
+    assert "2 km" in table.csv()

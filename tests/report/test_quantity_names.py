@@ -17,6 +17,7 @@ from skidpad.recording.campaign.results import definitions_of
 from skidpad.report.matrix.data import load_matrix
 from skidpad.report.matrix.page import build_page, write_report
 from support.matrix_drawn import write_drawn_campaign
+from support.report_page import read_page
 
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "src/skidpad"
@@ -126,7 +127,7 @@ def campaign(tmp_path_factory):
 
 
 def test_the_page_of_the_matrix_has_one_name_for_each_quantity(campaign):
-    html = write_report(campaign).read_text(encoding="utf-8")
+    html = read_page(write_report(campaign))
     html = re.sub(r"<style.*?</style>|<script.*?</script>", "", html, flags=re.DOTALL)
     text = re.sub(r"\s*\n\s*", "\n", re.sub(r"<[^>]+>", "\n", html))
     assert all(name in text for name in ("Interventions per run", "mean distance error"))

@@ -12,6 +12,7 @@ from skidpad.recording.campaign.searches import Trial, read_trials
 from skidpad.search.exposure import read_exposure
 from skidpad.search.probability import Weighted
 from skidpad.search.risk import influence_of
+from support.report_page import read_page
 
 CALL = (
     "ghost_cut_in", "--vary", "GhostS=25:60", "--vary", "GhostSpeed=15:23", "--vary", "MergeDistance=2:8",
@@ -51,7 +52,7 @@ def test_the_text_tells_answer_interval_and_rate(done):
     assert f"{found.p:.2g} [{found.low:.2g}, {found.high:.2g}] per encounter" in text
     assert f"Per hour, with 0.5 encounters: {0.5 * found.p:.2g} crashes" in text
     assert asked.assumptions == ["GhostS", "GhostSpeed", "MergeDistance"]
-    page = (out / "report.html").read_text(encoding="utf-8")
+    page = read_page(out / "report.html")
     assert text.splitlines()[0] in page
     assert "Inputs without a source: GhostS, GhostSpeed, MergeDistance." in page
 

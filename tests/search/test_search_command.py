@@ -20,6 +20,7 @@ from skidpad.recording.campaign.searches import (
 from skidpad.recording.files import write_bytes
 from skidpad.recording.run.log_files import log_hash, read_log
 from skidpad.search.space import apply_values
+from support.report_page import read_page
 
 CALL = (
     "ghost_cut_in", "--vary", "GhostS=25:45", "--vary", "GhostSpeed=17:21", "--vary", "MergeDistance=5:8",
@@ -58,7 +59,7 @@ def test_the_answer_counts_what_the_trials_say(found):
         in text
     )
     assert len(avoided) >= max(reference, bound) > 0
-    page = (out / "report.html").read_text(encoding="utf-8")
+    page = read_page(out / "report.html")
     assert text.splitlines()[0] in page
 
 

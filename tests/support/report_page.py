@@ -1,6 +1,8 @@
-"""A page of the report with one of each block."""
+"""A page of the report with one of each block, and how pages are read."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 from skidpad.report.elements.page import (
     Answer,
@@ -28,6 +30,11 @@ REPLAY = {
     "size": [[4.5, 1.8]],
     "frames": [[0, 0, 0], [100, 0, 0]],
 }
+
+
+def read_page(path: Path) -> str:
+    """Returns a page's HTML with plain spaces, also between numbers and units."""
+    return path.read_text(encoding="utf-8").replace("\u00a0", " ")
 
 
 def page():

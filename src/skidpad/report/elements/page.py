@@ -20,6 +20,7 @@ from markupsafe import Markup, escape
 from skidpad.recording.files import write_bytes
 
 REPORT = "report.html"
+_CODE_OR_QUANTITY = re.compile(r"(?P<code>`[^`]+`)|(?<=\d) (?=(?:%|km/h|km|mm|m|s)(?!\w))")
 
 
 @dataclass(frozen=True, slots=True)
@@ -332,15 +333,28 @@ def _asset(name: str) -> str:
 
 def _prose(text: str) -> Markup:
     """Returns escaped text as HTML in which what stands between backticks is code."""
-    found = re.sub(r"`(--[^`]{,20})`", r'<code class="option">\1</code>', str(escape(text)))
+    found = re.sub(
+        r"`(--[^`]{,20})`", r'<code class="option">\1</code>', str(escape(_join_units(text)))
+    )
     return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", found))
+
+
+def _join_units(value: Any) -> Any:
+    """Returns plain text with no-break spaces between numbers and units, but in code; else the value."""
+    if type(value) is not str:
+        return value  # a number, or markup such as a drawing
+    return _CODE_OR_QUANTITY.sub(lambda m: m[0] if m["code"] else "\u00a0", value)
 
 
 @cache
 def _template() -> jinja2.Template:
     """Returns the HTML template of a page, with escaping on and strict about names."""
     environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=_join_units,
     )
     environment.filters["prose"] = _prose
     return environment.from_string(_asset("page.html.j2"))

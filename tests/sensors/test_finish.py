@@ -1,5 +1,7 @@
 """Additions to pictures for people: where each one may change a pixel, and that nothing else changes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,10 +12,12 @@ from skidpad.core.inputs import Beam, Outside
 from skidpad.core.specs import CameraSpec, Modality
 from skidpad.core.vocabulary import ActorKind, GripModel, LightState, RangeModel, SemanticClass
 from skidpad.core.weather import Weather
+from skidpad.physics.optics import transmission
 from skidpad.physics.presets import preset
 from skidpad.roads.roadside import Box, SignalHead
 from skidpad.sensors.finish.extras import ALL_EXTRAS, NO_EXTRAS, Extra
 from skidpad.sensors.finish.outline import MOST, spans
+from skidpad.sensors.pictures.lighting import lighting
 from skidpad.sensors.raster.view import camera_view
 from skidpad.sensors.scene.materials import Material
 from skidpad.sensors.suite import PixelSettings, PixelSuite
@@ -74,6 +78,39 @@ def test_stars_shine_in_a_clear_night_sky_only():
     assert not changed[~sky].any()
     assert (added.rgb >= plain.rgb).all()
     assert not both(preset("rain-night"), Extra.CLOUDS)[2].any()
+
+
+def test_dense_fog_hides_the_sky_as_it_hides_the_ground():
+    def spread(seen):
+        light = (seen.rgb[seen.labels == SemanticClass.SKY] / 255.0) ** 2
+        return (light.std(axis=0) / light.mean(axis=0)).max()
+
+    clear = Weather(cloudiness=60.0)
+    _, foggy, changed = both(replace(clear, fog_density=90.0), Extra.CLOUDS)
+    sky = foggy.labels == SemanticClass.SKY
+    assert not changed[~sky].any()
+    assert spread(foggy) < 0.02
+    assert spread(Seen(clear, {Extra.CLOUDS})) > 0.08
+    haze = 255.0 * np.sqrt(foggy.suite.shading.light.horizon)
+    assert np.abs(foggy.rgb[sky] - haze).max() < 6.0, "one colour with what the ground fades into"
+
+
+def test_in_fog_at_night_lamps_and_walls_fade_into_one_dim_light():
+    fog = Weather(cloudiness=100.0, fog_density=90.0, sun_altitude_deg=-30.0)
+    seen = Seen(fog, {Extra.LAMPS}, beam=Beam.OFF)
+    shading, one = seen.suite.shading, seen.suite._pass_of["rgb"]
+    view, ego = camera_view(seen.suite.cameras["rgb"], seen.suite._ego), seen.suite._ego
+    packed = np.zeros((300, 400), dtype=np.uint32)
+    shading.paint(view, ego, one.inverse, one.key, packed)  # without bloom
+    red = (packed.view(np.uint8).reshape(300, 400, 4)[..., 0] / 255.0) ** 2
+    left, haze = transmission(fog, 40.0), float(shading.light.horizon[0])
+    lamp = np.median(red[seen.material == Material.LAMP_RED])
+    assert lamp == pytest.approx(left + (1.0 - left) * haze, abs=0.03)
+    wall = red[seen.labels == SemanticClass.BUILDING]
+    assert wall.min() > 0.6 * haze
+    assert haze > 3.0 * lighting(fog).horizon[0]
+    clear = replace(fog, fog_density=0.0)
+    assert Seen(clear, {Extra.LAMPS}).suite.shading.light.horizon[0] == lighting(clear).horizon[0]
 
 
 def test_edges_are_softened_where_two_surfaces_meet_and_nowhere_else():

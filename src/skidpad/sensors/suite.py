@@ -22,6 +22,7 @@ from skidpad.physics.grip import rain_rate
 from skidpad.physics.optics import depth_range, label_range, radar_range
 from skidpad.sensors.finish.extras import NO_EXTRAS, Extra
 from skidpad.sensors.finish.finish import Finish
+from skidpad.sensors.finish.fog import light_fog
 from skidpad.sensors.pictures.degradation import CameraNoise, degradation
 from skidpad.sensors.pictures.exposure import expose
 from skidpad.sensors.pictures.lens import LensDrops
@@ -114,6 +115,8 @@ class PixelSuite:
         light = lighting(weather, beam, haze=settings.optics.haze)
         if settings.optics.exposure:
             light = expose(light, weather)
+        if Extra.LAMPS in settings.extras:
+            light = light_fog(light, weather)
         snowed = Extra.SNOW in settings.extras
         static = self.scene.static
         self.shading = Shading(

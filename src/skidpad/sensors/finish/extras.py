@@ -9,10 +9,10 @@ class Extra(str, Enum):
     """One addition; none of them touches depth or classes."""
 
     SHADOWS = "shadows"  # of vehicles and of what stands beside the road, and where they touch it
-    LAMPS = "lamps"  # bloom of head, tail and brake lamps and of traffic lights
+    LAMPS = "lamps"  # bloom of all lamps, and their light in fog
     REFLECTIONS = "reflections"  # of those lamps on a wet road
     RETRO = "retro"  # markings, signs and plates send the headlights back
-    CLOUDS = "clouds"  # and stars, where there are few of them at night
+    CLOUDS = "clouds"  # and stars, where there are few of them at night; fog before both
     EDGES = "edges"  # softened where one surface meets another
     SNOW = "snow"  # on the road, not only beside it
     CALM = "calm"  # less of the published camera effect, so that a night can be read

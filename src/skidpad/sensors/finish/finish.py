@@ -15,6 +15,7 @@ from skidpad.roads.roadside import Roadside
 from skidpad.sensors.finish.clouds import DRIFT, SIZE, draw_clouds, layer_of
 from skidpad.sensors.finish.edges import soften_edges
 from skidpad.sensors.finish.extras import Extra
+from skidpad.sensors.finish.fog import fog_of, veil_sky
 from skidpad.sensors.finish.glow import shine
 from skidpad.sensors.finish.lamps import Lamps
 from skidpad.sensors.finish.retro import gains, send_back
@@ -61,6 +62,7 @@ class Finish:
         self._gains = gains(light)
         self._layer = layer_of(weather, light)
         self._stars = starlight_of(weather, light)
+        self._fog = fog_of(weather, light)
         self._wet = light.wet * (1.0 - light.snow) if light.wet > LEAST_WET else 0.0
         self._drift = DRIFT * self._dt * (0.2 + 0.8 * weather.wind_intensity / 100.0)
 
@@ -88,6 +90,8 @@ class Finish:
             draw_clouds(view, self._layer, shift, inverse, out)
         if Extra.CLOUDS in extras and self._stars > 0.0:
             draw_stars(view, STARS, self._stars, inverse, out)
+        if Extra.CLOUDS in extras and self._fog.per_m > 0.0:
+            veil_sky(view, self._fog, inverse, out)
         if Extra.SHADOWS in extras:
             self._bodies.present[0] = own
             for bodies, reach in ((self._near, STANDING_REACH), (self._bodies, REACH)):

@@ -14,6 +14,7 @@ from skidpad.scenarios.actions.world import global_action, user_defined
 from skidpad.scenarios.context import Context, Path
 from skidpad.scenarios.reading.document import Node
 from skidpad.scenarios.reading.findings import Fault, Kind
+from skidpad.scenarios.reading.outline import describe_element
 from skidpad.scenarios.reading.parameters import inner
 from skidpad.scenarios.triggers import Trigger, compile_trigger
 
@@ -29,11 +30,15 @@ class Priority(Enum):
 
 @dataclass(frozen=True, slots=True)
 class NamedAction:
-    """An action of an event, of its actors or of the world."""
+    """An action of an event, of its actors or of the world.
+
+    outline: what the file says of it, in one line.
+    """
 
     path: Path
     private: PrivateAction | None
     worldwide: GlobalAction | None
+    outline: str = "nothing"
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,10 +215,11 @@ def _action(node: Node, above: Path, ctx: Context) -> NamedAction:
         ctx.findings.append(node.finding("holds no action: over as it begins", Kind.NOTE))
         return NamedAction(path, None, None)
     what = node.only()
+    outline = describe_element(what)
     if what.tag == "PrivateAction":
-        return NamedAction(path, private_action(what, ctx), None)
+        return NamedAction(path, private_action(what, ctx), None, outline)
     if what.tag == "GlobalAction":
-        return NamedAction(path, None, global_action(what, ctx))
+        return NamedAction(path, None, global_action(what, ctx), outline)
     if what.tag == "UserDefinedAction":
-        return NamedAction(path, None, user_defined(what, ctx))
+        return NamedAction(path, None, user_defined(what, ctx), outline)
     raise what.unsupported_fault()

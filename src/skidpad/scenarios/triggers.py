@@ -13,6 +13,7 @@ from skidpad.scenarios.conditions.by_value import BY_VALUE, Never
 from skidpad.scenarios.conditions.distances import DISTANCES
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.outline import describe_element
 from skidpad.scenarios.scene import Happening, Path, Scene
 
 ENTITY_CONDITIONS = {**BY_ENTITY, **DISTANCES}
@@ -55,12 +56,13 @@ class AnyEntity:
 
 @dataclass(frozen=True, slots=True)
 class Timed:
-    """A condition with its name, edge and delay in s."""
+    """A condition with its name, edge and delay in s. outline: what the file says of it, in one line."""
 
     name: str
     condition: Condition
     edge: Edge
     delay: float
+    outline: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +165,9 @@ def _timed_condition(node: Node, ctx: Context) -> Timed:
     delay = node.number("delay", 0.0)
     if delay < 0.0:
         raise node.error(f"delay must be >= 0, got {delay:g}")
-    return Timed(node.label(), condition(node, ctx), edge, delay)
+    made = condition(node, ctx)
+    outline = describe_element(node.find("ByEntityCondition", "EntityCondition") or node.only())
+    return Timed(node.label(), made, edge, delay, outline)
 
 
 def condition(node: Node, ctx: Context) -> Condition:

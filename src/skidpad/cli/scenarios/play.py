@@ -70,6 +70,9 @@ def play(
     check: Annotated[
         bool, typer.Option("--check", help="List all that is wrong or unknown; run nothing.")
     ] = False,
+    tree: Annotated[
+        bool, typer.Option("--tree", help="As --check, and print the storyboard as a tree.")
+    ] = False,
 ) -> None:
     """Play a scenario, or all of a folder; ends with verdicts, a page and a table."""
     from skidpad.core.errors import ConfigError
@@ -78,11 +81,11 @@ def play(
     file = find_scenario(file)
     template = play_template(cross, ego, run, scenario, tuned, backend)
     expected.check()  # what cannot be read is said before anything is driven
-    if check:
-        _check(file, structs.replace(scenario, parameters=cross.parameters()))
+    if check or tree:
+        _check(file, structs.replace(scenario, parameters=cross.parameters()), tree)
         return
     if out is None:
-        raise ConfigError("play needs --out DIR for the run, or --check")
+        raise ConfigError("play needs --out DIR for the run, or --check, or --tree")
     from skidpad.campaign.runs.play import run_to
     from skidpad.scenarios.reading.distributions import is_distribution
 
@@ -199,21 +202,28 @@ def _hindrance(file: Path, template: RunSpec) -> str:
     return ""
 
 
-def _check(path: Path, course: Scenario) -> None:
-    """Prints of a file, or of each in a folder, all that is wrong or unknown; exits with 2 if any is."""
+def _check(path: Path, course: Scenario, tree: bool) -> None:
+    """Prints of a file, or of each in a folder, all that is wrong or unknown; exits with 2 if any is.
+
+    tree: the storyboards of those that can be played are printed too.
+    """
     from skidpad.campaign.recipes.files import scenario_files
 
     files = scenario_files(path) if path.is_dir() else [path]
-    clean = [_is_clean(file, course) for file in files]
+    clean = [_is_clean(file, course, tree) for file in files]
     if not all(clean):
         raise typer.Exit(2)
 
 
-def _is_clean(file: Path, course: Scenario) -> bool:
-    """Prints all that is found in a file or its choices; returns True when all can be played."""
+def _is_clean(file: Path, course: Scenario, tree: bool) -> bool:
+    """Prints all that is found in a file or its choices; returns True when all can be played.
+
+    tree: each storyboard among the choices is printed too, once.
+    """
     from skidpad.campaign.driving.run_setup import check_scenario
     from skidpad.campaign.recipes.files import courses_of
     from skidpad.core.errors import FileError
+    from skidpad.scenarios.tree import storyboard_tree
 
     try:
         found = [check_scenario(one) for one in courses_of(course, file)]
@@ -222,7 +232,11 @@ def _is_clean(file: Path, course: Scenario) -> bool:
         return False
     for finding in dict.fromkeys(f for compiled in found for f in compiled.findings):
         typer.echo(f"{finding.kind.value}: {finding}")
-    if any(compiled.scenario is None for compiled in found):
+    scenarios = [compiled.scenario for compiled in found if compiled.scenario is not None]
+    if len(scenarios) < len(found):
         return False
     typer.echo(f"{file.name}: can be played")
+    if tree:
+        for text in dict.fromkeys(storyboard_tree(one.storyboard) for one in scenarios):
+            typer.echo(text)
     return True

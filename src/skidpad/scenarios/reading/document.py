@@ -88,10 +88,14 @@ class Node:
         return self.element.get(name) is not None
 
     def label(self) -> str:
-        """Returns the attribute `name` as it is shown to people; what cannot be worked out stays as it is."""
-        raw = self.element.get("name", "")
+        """Returns the attribute `name` as it is shown to people."""
+        return self.shown("name")
+
+    def shown(self, name: str) -> str:
+        """Returns an attribute as it is shown to people; what cannot be worked out stays as it is."""
+        raw = self.element.get(name, "")
         try:
-            return self.text("name", "")
+            return self.text(name, "")
         except Fault:
             return raw
 

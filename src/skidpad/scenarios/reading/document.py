@@ -89,9 +89,9 @@ class Node:
 
     def label(self) -> str:
         """Returns the attribute `name` as it is shown to people."""
-        return self.shown("name")
+        return self.format_attribute("name")
 
-    def shown(self, name: str) -> str:
+    def format_attribute(self, name: str) -> str:
         """Returns an attribute as it is shown to people; what cannot be worked out stays as it is."""
         raw = self.element.get(name, "")
         try:

@@ -27,5 +27,8 @@ def describe_element(node: Node) -> str:
 def _describe_alone(node: Node) -> str:
     """Returns an element's name with its attributes, parameters filled in."""
     return " ".join(
-        [node.tag, *(f"{name}={node.shown(name)}" for name in map(str, node.element.attrib))]
+        [
+            node.tag,
+            *(f"{name}={node.format_attribute(name)}" for name in map(str, node.element.attrib)),
+        ]
     )

@@ -90,7 +90,8 @@ def search_path() -> str:
 def read_lines(folder: Path) -> Lines:
     """Returns the lines of the package that the data files of coverage.py in a folder hold.
 
-    A process that a test killed while it wrote leaves a file that is none; it adds no line.
+    A process that a test killed while it wrote leaves a file that is none; it adds no line. Neither do
+    copies of the package that tests make elsewhere.
     """
     from coverage import CoverageData
     from coverage.exceptions import DataError
@@ -103,6 +104,8 @@ def read_lines(folder: Path) -> Lines:
         except DataError:
             continue
         for file in data.measured_files():
+            if not Path(file).is_relative_to(PACKAGE):
+                continue
             reached[Path(file).relative_to(PACKAGE).as_posix()] |= set(data.lines(file) or ())
     return {file: sorted(lines) for file, lines in sorted(reached.items())}
 

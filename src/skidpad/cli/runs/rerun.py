@@ -104,7 +104,9 @@ def study(
     out: Annotated[Path | None, typer.Option(help="Write the rows to this .csv file.")] = None,
     figure: Annotated[
         Path | None,
-        typer.Option(help="Draw both arms of A-278 beside the published ones into this .svg file."),
+        typer.Option(
+            help="Of `skidpad study A-278`: draw both arms beside the published into this .svg file."
+        ),
     ] = None,
 ) -> None:
     """Drive the experiment that a finding of the sources needs, and judge it."""
@@ -117,7 +119,7 @@ def study(
 
     require_choice("study", id, tuple(STUDIES))
     if figure is not None and id != "A-278":
-        raise ConfigError(f"--figure draws the arms of study A-278, not of {id}")
+        raise ConfigError(f"--figure draws the arms of `skidpad study A-278`, not of {id}")
     from skidpad.campaign.studies.study import run_study
     from skidpad.recording.files import write_csv
 

@@ -95,15 +95,37 @@ def test_dense_fog_hides_the_sky_as_it_hides_the_ground():
     assert np.abs(foggy.rgb[sky] - haze).max() < 6.0, "one colour with what the ground fades into"
 
 
+def painted(suite):
+    """Red of the picture without what is laid over it, bloom among it."""
+    camera, one, ego = suite.cameras["rgb"], suite._pass_of["rgb"], suite._ego
+    packed = np.zeros((300, 400), dtype=np.uint32)
+    suite.shading.paint(camera_view(camera, ego), ego, one.inverse, one.key, packed)
+    return packed.view(np.uint8).reshape(300, 400, 4)[..., 0].astype(int)
+
+
+def test_the_pool_of_the_headlights_begins_without_a_line_beside_the_car():
+    behind = Pose(-8.5, 0.0, 3.4, 0.0, np.radians(9.0), 0.0)
+    camera = CameraSpec("rgb", Modality.RGB, 400, 300, 75.0, behind, shows_own_body=True)
+
+    def steepest(extras):
+        settings = PixelSettings(camera_effect=False, extras=frozenset(extras))
+        table = table_of([ActorKind.CAR] * 2)
+        suite = PixelSuite(straight(300), table, [camera], preset("clear-night"), settings)
+        _ = suite.observe(40, states_at(MOMENT), {}).images["rgb"].rgb
+        road = (suite._pass_of["rgb"].key & 255) == Material.ASPHALT
+        red = painted(suite)
+        assert red[road].max() > 60, "the road is lit"
+        return np.abs(np.diff(red, axis=0))[road[1:] & road[:-1]].max()
+
+    assert steepest(NO_EXTRAS) > 24
+    assert steepest({Extra.LAMPS}) < 12
+
+
 def test_in_fog_at_night_lamps_and_walls_fade_into_one_dim_light():
     fog = Weather(cloudiness=100.0, fog_density=90.0, sun_altitude_deg=-30.0)
     seen = Seen(fog, {Extra.LAMPS}, beam=Beam.OFF)
-    shading, one = seen.suite.shading, seen.suite._pass_of["rgb"]
-    view, ego = camera_view(seen.suite.cameras["rgb"], seen.suite._ego), seen.suite._ego
-    packed = np.zeros((300, 400), dtype=np.uint32)
-    shading.paint(view, ego, one.inverse, one.key, packed)  # without bloom
-    red = (packed.view(np.uint8).reshape(300, 400, 4)[..., 0] / 255.0) ** 2
-    left, haze = transmission(fog, 40.0), float(shading.light.horizon[0])
+    red = (painted(seen.suite) / 255.0) ** 2
+    left, haze = transmission(fog, 40.0), float(seen.suite.shading.light.horizon[0])
     lamp = np.median(red[seen.material == Material.LAMP_RED])
     assert lamp == pytest.approx(left + (1.0 - left) * haze, abs=0.03)
     wall = red[seen.labels == SemanticClass.BUILDING]
@@ -161,14 +183,15 @@ def test_markings_signs_and_plates_send_the_headlights_back():
 
 def test_lamps_bloom_where_they_are_seen():
     plain, added, changed = both(preset("clear-night"), Extra.LAMPS)
-    assert (added.rgb >= plain.rgb).all()
+    far = plain.depth < 1.0 / 6.0  # nearer, the beam rises
+    assert (added.rgb >= plain.rgb)[far].all()
     red = added.rgb[..., 0] - plain.rgb[..., 0]
     for material in (Material.TAIL_LAMP, Material.HEADLAMP, Material.LAMP_RED):
         rows, columns = np.nonzero(plain.material == material)
         assert len(rows), material
         near = red[rows.min() - 6 : rows.max() + 7, columns.min() - 6 : columns.max() + 7]
         assert near.max() > 20, material
-    assert changed.mean() < 0.2
+    assert changed[far].mean() < 0.2
     # a lamp behind another vehicle, and one that looks away, shine on nothing
     hidden = [MOMENT[0], (106.0, -8.75, 0.0, 0.0), (114.0, -8.75, 0.0, np.pi)]
     behind = [MOMENT[0], (80.0, -8.75, 0.0, 0.0), (60.0, -8.75, 0.0, 0.0)]

@@ -37,6 +37,9 @@ from skidpad.sensors.raster.rasteriser import AUTO_LEVEL
 from skidpad.sensors.raster.view import View, camera_view
 
 EGO = 0
+BEAM_ONSET = (
+    4.0  # m before the lamps, where the ground is lit in full, in a picture for people; by eye
+)
 CALM = 0.3  # share of the published camera effect in a calm picture for people; by eye
 NO_NOISE = PerceptionNoise()
 
@@ -116,7 +119,7 @@ class PixelSuite:
         if settings.optics.exposure:
             light = expose(light, weather)
         if Extra.LAMPS in settings.extras:
-            light = light_fog(light, weather)
+            light = light_fog(light, weather)._replace(onset=BEAM_ONSET)
         snowed = Extra.SNOW in settings.extras
         static = self.scene.static
         self.shading = Shading(

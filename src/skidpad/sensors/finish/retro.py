@@ -16,7 +16,14 @@ from skidpad.core.vocabulary import SemanticClass
 from skidpad.physics.optics import air_depth
 from skidpad.sensors.finish.glow import add_light
 from skidpad.sensors.pictures.lighting import Lighting
-from skidpad.sensors.pictures.shading import HEADLAMP_X, HEADLAMP_Z, beam_at, beam_of, behind_lamps
+from skidpad.sensors.pictures.shading import (
+    HEADLAMP_X,
+    HEADLAMP_Z,
+    beam_at,
+    beam_of,
+    behind_lamps,
+    rise_of_beam,
+)
 from skidpad.sensors.raster.view import View
 from skidpad.sensors.scene.materials import MATERIALS, Material
 
@@ -83,6 +90,7 @@ def _send_back(
 ) -> None:
     """Adds to the picture `out` what retroreflective surfaces send back of the ego's own beam."""
     beam, slope, reach = beam_of(light)
+    onset = np.float32(light.onset)
     per = np.float32(1.0 / view.focal)
     nearest = np.float32(1.0 / FAR)
     for row in range(view.top, view.height):
@@ -104,6 +112,7 @@ def _send_back(
                 px = z * (to_body[0, 0] * u + to_body[0, 1] * v + to_body[0, 2]) + offset[0]
                 py = z * (to_body[1, 0] * u + to_body[1, 1] * v + to_body[1, 2]) + offset[1]
                 pz = z * (to_body[2, 0] * u + to_body[2, 1] * v + to_body[2, 2]) + offset[2]
+                back *= rise_of_beam(px, onset)
                 cone = back * beam_at(px, py, np.float32(0.0), beam, slope, reach)
                 if cone < LEAST:
                     continue

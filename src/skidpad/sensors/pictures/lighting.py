@@ -40,6 +40,7 @@ class Lighting(NamedTuple):
     headlights: float  # strength of the ego's beam, 0 off
     high: bool  # it is the high beam
     lamps: float  # strength of other vehicles' lamps, 0 by day
+    onset: float = 0.0  # m over which the beam rises before the lamps; 0: at once, as published
 
 
 def lighting(weather: Weather, beam: Beam | None = None, *, haze: bool = False) -> Lighting:

@@ -222,7 +222,7 @@ def _settling(light: Lighting) -> Floats32:
     return shares
 
 
-_HALF = np.float32(0.5)
+_HALF, _TWO, _THREE = np.float32(0.5), np.float32(2.0), np.float32(3.0)
 _TINY = np.float32(1e-12)
 _GLOSS_SHARE = np.float32(0.35)
 _F0 = np.float32(0.03)  # reflectance of water and glass at normal incidence, about
@@ -265,6 +265,16 @@ def beam_at(
 
 
 @inner_kernel
+def rise_of_beam(px: np.float32, onset: np.float32) -> np.float32:
+    """Returns the share of the beam that has risen `px` m before the lamps; all of it for an onset of 0."""
+    t = px / (onset if onset > ZERO else ONE)
+    t = t if t < ONE else ONE
+    t = t if onset > ZERO else ONE
+    risen: np.float32 = t * t * (_THREE - _TWO * t)
+    return risen
+
+
+@inner_kernel
 def beam_of(light: Lighting) -> tuple[np.float32, np.float32, np.float32]:
     """Returns power, slope of the cut-off and reach (1/m^2) of the ego's beam; power 0 where it is off."""
     beam = np.float32(light.headlights) * _BEAM_POWER
@@ -299,6 +309,7 @@ def _headlights(
 ) -> None:
     """Writes the light of the ego's beam on a block's pixels into lane H of `work`."""
     beam, slope, reach = beam_of(light)
+    onset = np.float32(light.onset)
     b00, b01, b02 = to_body[0, 0], to_body[0, 1], to_body[0, 2]
     b10, b11, b12 = to_body[1, 0], to_body[1, 1], to_body[1, 2]
     b20, b21, b22 = to_body[2, 0], to_body[2, 1], to_body[2, 2]
@@ -309,7 +320,7 @@ def _headlights(
         px = z * (b00 * u + b01 * v + b02) + o0
         py = z * (b10 * u + b11 * v + b12) + o1
         pz = z * (b20 * u + b21 * v + b22) + o2
-        work[H + x] = beam_at(px, py, pz, beam, slope, reach)
+        work[H + x] = beam_at(px, py, pz, beam, slope, reach) * rise_of_beam(px, onset)
 
 
 @inner_kernel

@@ -59,6 +59,9 @@ def listed_findings() -> set[str]:
 CUT = re.compile(r"<(script|style|svg)\b.*?</\1>", re.DOTALL)
 LINK = re.compile(r"<a\b[^>]*>.*?</a>", re.DOTALL)
 CELLS = re.compile(r"</(?:td|th|dt)>\s*<(?:td|th|dd)\b[^>]*>")
+STAMP = re.compile(
+    r'</code><span class="stamp">[^<]*</span></header><h4>'
+)  # a verdict before its claim
 INLINE = re.compile(r"</?(?:b|i|em|strong|span|small|code|sub|sup)\b[^>]*>")
 COMMAND = re.compile(r"<code\b[^>]*>skidpad [^<]*</code>")  # where an id is an argument
 TAG = re.compile(r"<[^>]+>")
@@ -66,7 +69,7 @@ TAG = re.compile(r"<[^>]+>")
 
 def texts_of(page: str) -> list[str]:
     """Returns the texts of an HTML page by block; cells of a row are one text, links are left out."""
-    page = LINK.sub(" ", CUT.sub(" ", page))
+    page = STAMP.sub(": ", LINK.sub(" ", CUT.sub(" ", page)))
     page = INLINE.sub("", CELLS.sub(": ", COMMAND.sub(" ", page)))
     return [text for part in TAG.split(page) if (text := " ".join(unescape(part).split()))]
 

@@ -166,6 +166,7 @@ def end(
     import time
 
     from skidpad.core.errors import require_choice
+    from skidpad.core.wording import count_text
 
     with fleet_extra():
         from skidpad.fleet.store import accounts
@@ -176,7 +177,7 @@ def end(
         found = accounts.principals_named(connection, tenant, known, name)
         ended = sum(accounts.end_credentials(connection, o, "command", now) for o in found)
         fresh = accounts.add_credential(connection, found[-1], now) if renew else None
-    typer.echo(fresh or f"{ended} credentials ended")
+    typer.echo(fresh or f"{count_text(ended, 'credential')} ended")
 
 
 @fleet.command("open")

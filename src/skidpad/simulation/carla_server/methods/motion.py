@@ -176,7 +176,7 @@ def set_actor_enable_gravity(served: Served, id: Any, enabled: Any) -> None:
     served.episode.falling.weigh(actor, wire.flag(enabled, "enabled"))
 
 
-@TABLE.method("set_actor_dead", Shape.VOID, without_effect="nobody lies down")
+@TABLE.method("set_actor_dead", Shape.VOID, without_effect="walkers do not lie down")
 def set_actor_dead(served: Served, id: Any) -> None:
     """Accepts the call and does nothing, as walkers do not fall down."""
     served.episode.actors.get(id)

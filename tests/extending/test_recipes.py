@@ -72,7 +72,7 @@ PARTS = {
     ),
     "A weather preset": ("out/fog", "freezing-fog: Freezing fog [package freezing-fog]"),
     "A backend": ("out/late", "Pedals and steering act 0.15 s late [package late-actuators]"),
-    "A map": ("out/circle", "circle-60.xodr"),  # the run keeps the road, not who made it
+    "A map": ("out/circle", "circle-60.xodr"),  # the run keeps the road, not the package
 }
 
 

@@ -14,7 +14,7 @@ from support.toy_campaign import campaign
 ROOT = typer.main.get_command(app)
 CAMPAIGNS = {"adas": "adas", "grip": "grip", "channels drive": "channels", "play": "play"}
 SHARED = {"out", "workers", "cluster", "until_halfwidth", "resume", "or_next", "csv"}
-OF_FILES = {"check", "expect", "junit"}  # what is asked of scenarios costs no run
+OF_FILES = {"check", "expect", "junit", "tree"}  # what is asked of scenarios costs no run
 OF_ONE_FILE = {"checkpoints"}  # of `play`; the estimate is of a folder
 
 

@@ -50,5 +50,5 @@ def test_published_values_are_the_means_of_the_eleven_common_runs():
 
 def test_the_command_draws_this_study_alone(tmp_path):
     told = CliRunner().invoke(app, ["study", "F-08", "--figure", str(tmp_path / "x.svg")])
-    assert told.exit_code == 2 or "A-278, not of F-08" in str(told.exception)
+    assert told.exit_code == 2 or "A-278`, not of F-08" in str(told.exception)
     assert not (tmp_path / "x.svg").exists()

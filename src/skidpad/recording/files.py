@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import csv
 import errno
 import hashlib
 import os
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from io import BytesIO
+from io import BytesIO, StringIO
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import polars as pl
 
 from skidpad.core.errors import FileError, OutputError
 from skidpad.core.reading import UNUSABLE, is_file, read_bytes, unusable
+
+T = TypeVar("T")
 
 SUM, NO_SUM = "skidpad.sum", "0" * 64  # of a file's bytes, with zeros in place of itself
 PARQUET_MAX = 4 * 1024**3  # bytes of a file
@@ -99,6 +102,29 @@ def _require_sum(content: bytes, path: Path) -> None:
 def write_csv(path: Path, table: pl.DataFrame) -> None:
     """Writes `table` as CSV, atomically."""
     write_bytes(path, table.write_csv().encode())
+
+
+def csv_text(columns: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    """Returns rows as CSV below the names of their columns; lines end in a line feed."""
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def read_rows(file: Path, make: Callable[[dict[str, str]], T]) -> list[T]:
+    """Returns what `make` makes of each row of a CSV file that `csv_text` wrote; nothing where there is none.
+
+    FileError where the file or a row is not as this version writes it.
+    """
+    if not file.is_file():
+        return []
+    try:
+        with file.open(encoding="utf-8", newline="") as lines:
+            return [make(row) for row in csv.DictReader(lines)]
+    except (KeyError, TypeError, ValueError, csv.Error) as error:
+        raise FileError(f"{file}: not as this version writes it: {error}") from None
 
 
 def read_parquet(path: Path) -> tuple[pl.DataFrame, dict[str, str]]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import shutil
 import time
 from pathlib import Path
@@ -15,7 +13,7 @@ from skidpad.core.names import inside
 from skidpad.evidence.pairs import Pair, pairs, pairs_of_others
 from skidpad.recording.campaign.folder import RUNS
 from skidpad.recording.campaign.results import Timing
-from skidpad.recording.files import output_error, write_bytes
+from skidpad.recording.files import csv_text, output_error, write_bytes
 from skidpad.recording.run.log_files import write_log
 from skidpad.recording.run.readings import write_readings
 from skidpad.scenarios.playing.results import write_results
@@ -78,13 +76,11 @@ def write_played(folder: Path, driven: Run) -> None:
     if driven.played is None:
         return
     write_results(folder, driven.log, driven.played)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(Pair._fields)
-    for pair in (*pairs(driven.log), *pairs_of_others(driven.log)):
-        numbers = ("" if v is None else f"{v:.4f}" for v in pair[2:])
-        writer.writerow((pair.one, pair.other, *numbers))
-    write_bytes(folder / PAIRS, text.getvalue().encode())
+    rows = (
+        (pair.one, pair.other, *("" if v is None else f"{v:.4f}" for v in pair[2:]))
+        for pair in (*pairs(driven.log), *pairs_of_others(driven.log))
+    )
+    write_bytes(folder / PAIRS, csv_text(Pair._fields, rows).encode())
 
 
 def last_line(error: str) -> str:

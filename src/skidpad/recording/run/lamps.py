@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from skidpad.core.errors import FileError
-from skidpad.recording.files import write_bytes
+from skidpad.recording.files import csv_text, read_rows, write_bytes
 
 FILE = "lamps.csv"
 COLUMNS = {
@@ -78,26 +75,16 @@ def write_lamps(folder: Path, changes: Sequence[LampChange]) -> None:
     """Writes the lamp changes of a run to `lamps.csv` in its folder; no file where there are none."""
     if not changes:
         return
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for c in changes:
-        writer.writerow(
-            (f"{c.t:.3f}", c.entity, c.lamp.value, c.mode.value, f"{c.on:g}", f"{c.off:g}")
-        )
-    write_bytes(folder / FILE, text.getvalue().encode())
+    rows = (
+        (f"{c.t:.3f}", c.entity, c.lamp.value, c.mode.value, f"{c.on:g}", f"{c.off:g}")
+        for c in changes
+    )
+    write_bytes(folder / FILE, csv_text(COLUMNS, rows).encode())
 
 
 def read_lamps(folder: Path) -> tuple[LampChange, ...]:
     """Returns the changes of a run's folder; none where the file of the run switches no lamp."""
-    file = folder / FILE
-    if not file.is_file():
-        return ()
-    try:
-        with file.open(encoding="utf-8", newline="") as lines:
-            return tuple(_change(row) for row in csv.DictReader(lines))
-    except (KeyError, TypeError, ValueError, csv.Error) as error:
-        raise FileError(f"{file}: not as this version writes it: {error}") from None
+    return tuple(read_rows(folder / FILE, _change))
 
 
 def _change(row: Mapping[str, str]) -> LampChange:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from skidpad.core.errors import FileError
-from skidpad.recording.files import write_bytes
+from skidpad.recording.files import csv_text, read_rows, write_bytes
 
 FILE = "tilts.csv"
 COLUMNS = {
@@ -34,26 +31,16 @@ def write_tilts(folder: Path, tilts: Sequence[Tilted]) -> None:
     """Writes the tilts of a run to `tilts.csv` in its folder; no file where there are none."""
     if not tilts:
         return
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    writer.writerows((f"{x.t:.3f}", x.entity, f"{x.pitch:.6g}", f"{x.roll:.6g}") for x in tilts)
-    write_bytes(folder / FILE, text.getvalue().encode())
+    rows = ((f"{x.t:.3f}", x.entity, f"{x.pitch:.6g}", f"{x.roll:.6g}") for x in tilts)
+    write_bytes(folder / FILE, csv_text(COLUMNS, rows).encode())
 
 
 def read_tilts(folder: Path) -> Mapping[tuple[int, str], tuple[float, float]]:
     """Returns roll and pitch by ms and entity, of a run's folder; nothing where the road alone tilts."""
-    file = folder / FILE
-    if not file.is_file():
-        return {}
-    try:
-        with file.open(encoding="utf-8", newline="") as lines:
-            return {
-                (round(1000.0 * float(r["time"])), r["entity"]): (
-                    float(r["roll"]),
-                    float(r["pitch"]),
-                )
-                for r in csv.DictReader(lines)
-            }
-    except (KeyError, TypeError, ValueError, csv.Error) as error:
-        raise FileError(f"{file}: not as this version writes it: {error}") from None
+    return dict(read_rows(folder / FILE, _tilt))
+
+
+def _tilt(row: Mapping[str, str]) -> tuple[tuple[int, str], tuple[float, float]]:
+    """Returns ms and entity, and roll and pitch, of a row of CSV."""
+    key = round(1000.0 * float(row["time"])), row["entity"]
+    return key, (float(row["roll"]), float(row["pitch"]))

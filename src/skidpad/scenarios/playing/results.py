@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Iterator, Mapping
 from math import cos, hypot, sin
 from pathlib import Path
 
-from skidpad.recording.files import write_bytes
+from skidpad.recording.files import csv_text, write_bytes
 from skidpad.recording.run.lamps import write_lamps
 from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.staging import write_staging
@@ -53,8 +51,4 @@ def log_rows(log: RunLog, boxes: Mapping[str, Box]) -> Iterator[Row]:
 
 def story_csv(story: Iterable[Happening]) -> str:
     """Returns the story as CSV with STORY_COLUMNS."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(STORY_COLUMNS)
-    writer.writerows((f"{h.t:.3f}", "::".join(h.path), h.what) for h in story)
-    return text.getvalue()
+    return csv_text(STORY_COLUMNS, ((f"{h.t:.3f}", "::".join(h.path), h.what) for h in story))

@@ -6,8 +6,6 @@ of files.
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import copysign, cos, hypot, sin
@@ -19,6 +17,7 @@ from skidpad.core.run import ActorMode
 from skidpad.core.setup import DT, ActorCommand
 from skidpad.core.states import ActorStates, ActorTable, WorldTruth
 from skidpad.core.vocabulary import ActorKind
+from skidpad.recording.files import csv_text
 from skidpad.scenarios.playing.player import Player, setups
 from skidpad.scenarios.reading.entities import Body
 from skidpad.scenarios.scenario import Scenario
@@ -62,13 +61,11 @@ class PlayedScenario:
 
 def rows_csv(rows: Iterable[Row]) -> str:
     """Returns rows as CSV with the columns time,id,name,x,y,z,h,speed."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(Row.__dataclass_fields__)
-    for r in rows:
-        numbers = (f"{v:.4f}" for v in (r.x, r.y, r.z, r.h, r.speed))
-        writer.writerow((f"{r.time:.3f}", r.id, r.name, *numbers))
-    return text.getvalue()
+    cells = (
+        (f"{r.time:.3f}", r.id, r.name, *(f"{v:.4f}" for v in (r.x, r.y, r.z, r.h, r.speed)))
+        for r in rows
+    )
+    return csv_text(Row.__dataclass_fields__, cells)
 
 
 class IdealWorld:

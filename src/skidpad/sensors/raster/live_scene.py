@@ -149,7 +149,7 @@ def make_actors(table: ActorTable) -> Actors:
             meshes.append(body_mesh(ActorKind(shape[0]), *shape[1:]))
         which.append(known[shape])
     if not meshes:
-        meshes.append(body_mesh(ActorKind.PROP, 1.0, 1.0, 1.0))  # of nobody: arrays have a type
+        meshes.append(body_mesh(ActorKind.PROP, 1.0, 1.0, 1.0))  # of no actor: arrays have a type
     vertices = np.array([len(m.vertices) for m in meshes])
     triangles = np.array([len(m.triangles) for m in meshes])
     radius = np.array([np.linalg.norm(m.vertices, axis=1).max() for m in meshes])

@@ -8,7 +8,7 @@ from typing import Any, TypeVar, overload
 
 from skidpad.campaign.driving.sharing import share_setups
 from skidpad.campaign.runs.folder import last_line
-from skidpad.campaign.runs.run import Run, describe, run
+from skidpad.campaign.runs.run import Run, describe, drive, run
 from skidpad.campaign.workers.pool import run_jobs
 from skidpad.campaign.workers.worker import Job
 from skidpad.core.errors import BackendError, ConfigError
@@ -18,6 +18,7 @@ from skidpad.stack.interface import Stack
 T = TypeVar("T")
 Described = RunSpec | Mapping[str, Any]
 CPU = "cpu"
+DEFAULTS = {name: value for name, value in drive.__kwdefaults__.items() if name != "out"}
 
 
 @overload
@@ -70,7 +71,9 @@ def drive_many(
         )
     if workers < 1:
         raise ConfigError(f"workers must be at least 1, got {workers}")
-    described = [(one, None) if isinstance(one, RunSpec) else describe(**one) for one in runs]
+    described = [
+        (one, None) if isinstance(one, RunSpec) else describe(**{**DEFAULTS, **one}) for one in runs
+    ]
     drive_one = partial(_drive_one, judge)
     if workers == 1:
         with share_setups():

@@ -50,11 +50,8 @@ def find_mutants(text: str) -> list[Mutant]:
             for new in _changes(node):
                 start = begins[node.lineno - 1] + node.col_offset
                 end = begins[node.end_lineno - 1] + node.end_col_offset  # type: ignore[operator]
-                found.append(
-                    Mutant(node.lineno, start, end, raw[start:end].decode(), f"({new})")
-                    if isinstance(node, ast.expr)
-                    else Mutant(node.lineno, start, end, raw[start:end].decode(), new)
-                )
+                put = f"({new})" if isinstance(node, ast.expr) else new
+                found.append(Mutant(node.lineno, start, end, raw[start:end].decode(), put))
     return sorted(found, key=lambda m: (m.start, m.end, m.new))
 
 

@@ -215,11 +215,16 @@ def by_seed(tables: list[pl.DataFrame], of: pl.Expr) -> Floats:
 def speed_text(governed: list[pl.DataFrame], rivals: list[pl.DataFrame]) -> str:
     """Returns how much faster the governed runs are on average, with limits over the seeds of all maps."""
     speed = pl.col("mean_speed_kmh").mean()
-    found = compare_pairs(by_seed(governed, speed) - by_seed(rivals, speed))
-    limits = "no limits" if found.interval is None else (
-        f"{found.interval.low:+.1f} to {found.interval.high:+.1f}"
-    )  # fmt: skip
-    return f"{found.mean:+.1f} ({limits})"
+    return compared_text(by_seed(governed, speed) - by_seed(rivals, speed), 1)
+
+
+def compared_text(differences: Floats, digits: int) -> str:
+    """Returns the mean of paired differences with its limits: "+1.2 (+0.4 to +2.0)"."""
+    found = compare_pairs(differences)
+    if found.interval is None:
+        return f"{found.mean:+.{digits}f} (no limits)"
+    low, high = found.interval
+    return f"{found.mean:+.{digits}f} ({low:+.{digits}f} to {high:+.{digits}f})"
 
 
 def fewer_by_seed(rivals: list[pl.DataFrame], governed: list[pl.DataFrame]) -> float:
@@ -284,11 +289,7 @@ def difference_text(rival: pl.DataFrame, governed: pl.DataFrame, column: str) ->
     """Returns how much more of a column governed runs have, with limits over the seeds they share."""
     both = rival.join(governed, on="seed", suffix="_governed").sort("seed")
     differences = both[f"{column}_governed"].fill_null(0.0) - both[column].fill_null(0.0)
-    found = compare_pairs(differences.to_numpy())
-    limits = "no limits" if found.interval is None else (
-        f"{found.interval.low:+.0f} to {found.interval.high:+.0f}"
-    )  # fmt: skip
-    return f"{found.mean:+.0f} ({limits})"
+    return compared_text(differences.to_numpy(), 0)
 
 
 def pareto(folder: Path) -> str:

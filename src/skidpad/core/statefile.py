@@ -141,8 +141,12 @@ class _Writer:
 
     def write(self) -> Plain:
         """Returns the state as plain data."""
-        there = []
+        there: list[Plain] = []
+        found: Any
         for number, found in enumerate(self.ground.objects):
+            if hasattr(type(found), "copy_place"):  # its copy would hold its whole history
+                there.append([number, self._write_copy(found.copy_place())])
+                continue
             copier = self.ground.copiers[type(found)]
             put_back, state, _ = (None, None, ()) if copier is None else copier(found)
             if put_back is not None:

@@ -313,10 +313,9 @@ class Actor:
         now = self.v
         dt, self.seen = dt if self.seen else 0.0, True
         box = self.entity.box
-        at = Pose(motion.x, motion.y, z, yaw=motion.yaw)
-        if placed:
-            was = self.pose
-            at = Pose(motion.x, motion.y, was.z, was.roll, was.pitch, motion.yaw)
+        was = self.pose
+        tilt = (was.z, was.roll, was.pitch) if placed else (z, 0.0, 0.0)
+        at = Pose(motion.x, motion.y, *tilt, motion.yaw)
         if box.forward or box.left:
             at = at.moved(forward=-box.forward, left=-box.left)
         self.pose = at

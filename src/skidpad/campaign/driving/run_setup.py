@@ -63,7 +63,6 @@ from skidpad.stack.interface import Stack
 from skidpad.stack.loading import GuardedStack, import_class, load_stack
 
 CRUISE = "cruise_speed"  # property of a scenario's ego, m/s
-NO_CONDITIONS = PilotConditions()
 ROUTE_LENGTH = "route_length"  # another one, m
 
 
@@ -278,9 +277,7 @@ def file_of(course: Scenario) -> Path:
     return scenario_file(course.file) if course.file in NAMES else Path(course.file)
 
 
-def check_scenario(
-    course: Scenario, conditions: PilotConditions = NO_CONDITIONS, names: Names | None = None
-) -> scenarios.Compiled:
+def check_scenario(course: Scenario, names: Names | None = None) -> scenarios.Compiled:
     """Returns the check of a course's file, with everything that was found, playable or not.
 
     names: that the file may use; None: those that the course says.
@@ -292,7 +289,7 @@ def check_scenario(
         maps=[Path(folder) for folder in course.maps],
         ignore_unsupported=course.ignore_unsupported,
         lenient=course.lenient,
-        names=_names_of(course, conditions) if names is None else names,
+        names=_names_of(course, PilotConditions()) if names is None else names,
     )
 
 

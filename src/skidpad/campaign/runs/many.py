@@ -18,7 +18,7 @@ from skidpad.stack.interface import Stack
 T = TypeVar("T")
 Described = RunSpec | Mapping[str, Any]
 CPU = "cpu"
-DEFAULTS = {name: value for name, value in drive.__kwdefaults__.items() if name != "out"}
+DEFAULTS = {name: value for name, value in (drive.__kwdefaults__ or {}).items() if name != "out"}
 
 
 @overload

@@ -136,48 +136,39 @@ def same_segment(recording: Path) -> bool:
 
 def first_ticks(log: RunLog, n: int) -> RunLog:
     """Returns the log cut to its first n ticks, events too; 1 <= n <= length of the log."""
-
-    def cut_series(series: Any) -> Any:
-        return type(series)._make(a[:n] for a in series)
-
-    last = int(log.tick[n - 1])
+    last, cut = int(log.tick[n - 1]), _cut(log, slice(n))
     return replace(
-        log,
-        tick=log.tick[:n],
-        actors=cut_series(log.actors),
-        present=log.present[:n],
-        mu=log.mu[:n],
-        ego=cut_series(log.ego),
-        applied=cut_series(log.applied),
-        requested=cut_series(log.requested),
-        report=cut_series(log.report),
-        supervision=log.supervision[:n],
-        weather=log.weather[:n],
-        weathers=log.weathers[: int(log.weather[:n].max()) + 1],
+        cut,
+        weathers=log.weathers[: int(cut.weather.max()) + 1],
         events=tuple(e for e in log.events if e.tick <= last),
     )
 
 
 def last_ticks(log: RunLog, n: int) -> RunLog:
     """Returns the log without its first n ticks and their events; 0 <= n < length of the log."""
+    first = int(log.tick[n])
+    events = tuple(e for e in log.events if e.tick >= first)
+    return replace(_cut(log, slice(n, None)), events=events)
+
+
+def _cut(log: RunLog, rows: slice) -> RunLog:
+    """Returns the log with some of its rows, and all of its events."""
 
     def cut_series(series: Any) -> Any:
-        return type(series)._make(a[n:] for a in series)
+        return type(series)._make(a[rows] for a in series)
 
-    first = int(log.tick[n])
     return replace(
         log,
-        tick=log.tick[n:],
+        tick=log.tick[rows],
         actors=cut_series(log.actors),
-        present=log.present[n:],
-        mu=log.mu[n:],
+        present=log.present[rows],
+        mu=log.mu[rows],
         ego=cut_series(log.ego),
         applied=cut_series(log.applied),
         requested=cut_series(log.requested),
         report=cut_series(log.report),
-        supervision=log.supervision[n:],
-        weather=log.weather[n:],
-        events=tuple(e for e in log.events if e.tick >= first),
+        supervision=log.supervision[rows],
+        weather=log.weather[rows],
     )
 
 

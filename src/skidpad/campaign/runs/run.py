@@ -346,7 +346,7 @@ class OpenRun:
         """
         if self.stepper is None:
             raise CheckpointError("a run needs at least one step before its state is saved")
-        return RunCheckpoint(self, self.backend.truth().tick)
+        return RunCheckpoint(self, self.tick)
 
     def restore(self, checkpoint: RunCheckpoint, branch: str = "") -> None:
         """Goes back to a state that `save` gave, or forward again; moments before are void.
@@ -436,7 +436,7 @@ class OpenRun:
     def _note_failure(self, failure: StackError) -> None:
         """Keeps the stack's failure and notes it in the log at the present tick."""
         self.failure = failure
-        self.log.log.notice(self.backend.truth().tick, NoticeSource.STACK, str(failure))
+        self.log.log.notice(self.tick, NoticeSource.STACK, str(failure))
 
 
 def log_of(spec: RunSpec, stage: Stage, desk: Desk | None = None) -> Log:

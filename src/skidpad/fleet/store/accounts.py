@@ -15,6 +15,11 @@ from skidpad.fleet.words import Principal, Role
 
 YEAR = 365.25 * 86400.0  # s that a credential is good for
 ENDED = "credential ended"
+HAS_ENDED = (  # of a row of credentials
+    select(events.c.number)
+    .where(events.c.subject == credentials.c.id, events.c.what == ENDED)
+    .exists()
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,13 +122,10 @@ def principal_by_id(connection: Connection, id: str, at: float) -> Principal | N
 
 def _principal(connection: Connection, which: ColumnElement[bool], at: float) -> Principal | None:
     """Returns the principal of a credential that is valid at `at`; None where there is none."""
-    ended = select(events.c.number).where(
-        events.c.subject == credentials.c.id, events.c.what == ENDED
-    )
     row = connection.execute(
         select(principals)
         .join(credentials, credentials.c.principal == principals.c.id)
-        .where(which, credentials.c.expires > at, ~ended.exists())
+        .where(which, credentials.c.expires > at, ~HAS_ENDED)
     ).first()
     if row is None:
         return None
@@ -135,11 +137,8 @@ def end_credentials(connection: Connection, principal: str, by: str, at: float) 
 
     Those that ended before stay as they are and do not count. by: actor; at: s.
     """
-    ended = select(events.c.number).where(
-        events.c.subject == credentials.c.id, events.c.what == ENDED
-    )
     rows = connection.execute(
-        select(credentials.c.id).where(credentials.c.principal == principal, ~ended.exists())
+        select(credentials.c.id).where(credentials.c.principal == principal, ~HAS_ENDED)
     ).all()
     for row in rows:
         add_event(connection, ("credential", row.id), ENDED, (by, at))

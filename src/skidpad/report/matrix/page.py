@@ -43,9 +43,9 @@ from skidpad.report.matrix.tables import RATE, mean_quantity, rate_quantity
 from skidpad.report.matrix.ways import way_blocks
 
 Level = tuple[str, float]  # functions, cruise target in km/h
-COUNTS = (
-    *((column, f"{name_of(column)} per run") for column in ("crashes_vehicle", "road_departures")),
-    (EVENTS, f"{EVENTS} per run"),
+COUNTS = tuple(
+    (column, f"{name_of(column)} per run")
+    for column in ("crashes_vehicle", "road_departures", EVENTS)
 )
 CLAIMS = (*FINDINGS, *ACCEPTANCE)
 GRADED = """A crash is a serious contact, a departure or a roll-over. A contact is serious when it \

@@ -200,6 +200,8 @@ class Angle:
         if self.axes is Axes.ENTITY:
             return 0.0
         if self.turn is not Turn.HEADING:
+            if not (pose.pitch or pose.roll):
+                return 0.0
             return self._of(scene, pose) - self._of(scene, replace(pose, pitch=0.0, roll=0.0))
         if self.axes is Axes.TRAJECTORY and track is not None:
             return pose.yaw - course(track, scene.t, scene.dt)

@@ -59,8 +59,13 @@ def _row(route: str, part: pl.DataFrame) -> dict[str, Any]:
         "drives": len(part),
         "hours": hours,
         "metres": metres,
-        "speed": metres / hours / 1000.0 if metres is not None and hours else None,
+        "speed": _speed(metres, hours) if metres is not None and hours else None,
     }
+
+
+def _speed(metres: float, hours: float) -> float:
+    """Returns the mean speed in km/h."""
+    return metres / hours / 1000.0
 
 
 def weather_text(row: Row) -> str:
@@ -83,16 +88,17 @@ def _town_rows() -> list[dict[str, Any]]:
             "weather": f"{r['weather']}, {r['time_of_day']}",
             "hours": r["duration_h"],
             "metres": float(r["distance_m"]),
-            "speed": r["distance_m"] / r["duration_h"] / 1000.0,
+            "speed": _speed(r["distance_m"], r["duration_h"]),
         }
         for r in towns.to_dicts()
     ]
     hours, metres = float(towns["duration_h"].sum()), float(towns["distance_m"].sum())
     total = {
         "route": "all towns",
+        "weather": "",
         "hours": hours,
         "metres": metres,
-        "speed": metres / hours / 1000.0,
+        "speed": _speed(metres, hours),
     }
     return [row | {"kind": "published"} for row in (*rows, total)]
 
@@ -111,5 +117,5 @@ def _cell(name: str, row: Row) -> Cell:
     if isinstance(value, str):
         return Cell(value, kind=kind)
     if value is None:
-        return Cell("-" if name != "weather" else "", kind=kind or "muted")
+        return Cell("-", kind=kind or "muted")
     return Cell(format(value, FORMATS[name].value), sort=float(value), kind=kind)

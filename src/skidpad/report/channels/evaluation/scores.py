@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from skidpad.evidence.channels.matching import percent
+from skidpad.evidence.channels.matching import Tally, percent
 from skidpad.evidence.statistics import Interval
 from skidpad.report.elements.page import Block, Cell, Table, Text, words
 from skidpad.report.elements.tables import Column, Format, table
@@ -161,19 +160,21 @@ def route_ratios(evaluation: Row, truth: str) -> Table:
     """Returns the table of precision and recall per route, made from the counts; published towns, too."""
 
     def ratios(hazard: str, row: Row) -> str:
-        if len(row["counts"].get(hazard, ())) < 3:
+        if not (counts := row["counts"].get(hazard)):
             return "-"
-        tp, fp, fn = row["counts"][hazard]
-        shares = (tp / all_ if all_ else None for all_ in (tp + fp, tp + fn))
-        return " / ".join(ratio_text(share) for share in shares)
+        found = Tally(*counts)
+        return f"{ratio_text(found.precision)} / {ratio_text(found.recall)}"
 
-    found = _by_route(evaluation, truth, ratios, "Precision / recall per route, %")
     note = "From the counts above. A dash: nothing was found, or nothing was there to find."
-    return replace(found, note=note)
+    return _by_route(evaluation, truth, ratios, "Precision / recall per route, %", note)
 
 
 def _by_route(
-    evaluation: Row, truth: str, of_hazard: Callable[[str, Row], str], caption: str
+    evaluation: Row,
+    truth: str,
+    of_hazard: Callable[[str, Row], str],
+    caption: str,
+    note: str = "",
 ) -> Table:
     """Returns a table with a row per route and identifier, and a column per hazard."""
     judged = [r["rules"] for r in headline(evaluation) if r["truth"] == truth]
@@ -194,7 +195,7 @@ def _by_route(
         Column("identifier", partial(cell, lambda r: r["identifier"])),
         *(Column(words(h), partial(cell, partial(of_hazard, h))) for h in HAZARDS),
     ]
-    return table(columns, rows, f"{caption}, {short(truth)}")
+    return table(columns, rows, f"{caption}, {short(truth)}", note)
 
 
 def _published_towns() -> list[Row]:

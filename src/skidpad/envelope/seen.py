@@ -188,7 +188,8 @@ class FurtherSight:
         """Returns what was seen as columns of a recording, NaN where nothing was."""
         walkers = self.walkers or SeenDistances(0.0)
         nothing = float("nan")
-        told = {"lane_reach_m": nothing if self.lane_reach is None else self.lane_reach}
+        lane = self.lane_reach
+        told = {"lane_reach_m": nothing if lane is None else lane}
         told["walker_m"] = nothing if self.walker is None else self.walker
         told["walker_dropouts"] = float(walkers.dropouts)
         for name, kept in (("first", walkers.first), ("last", walkers.last)):

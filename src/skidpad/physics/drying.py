@@ -62,7 +62,7 @@ def dried_film(film_mm: float, minutes: float, weather: Weather, *, traffic: boo
 
     traffic: it lies in the wheel paths.
     """
-    if weather.precipitation > 0.0:
+    if minutes <= 0.0 or weather.precipitation > 0.0:
         return film_mm
     evaporation = evaporation_mm_h(weather)
     for k in range(int(minutes / STEP) + 1):

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from skidpad.core.arrays import Floats, Ints
 from skidpad.core.jit import inner_kernel
@@ -56,13 +55,18 @@ def _find_joints(lines: Floats, lengths: Floats) -> NDArray[np.bool_]:
     """Returns for each line (m, 4), shape (m, 2), whether another one goes on where it begins and ends."""
     joined = np.zeros((len(lines), 2), dtype=np.bool_)
     known = np.flatnonzero(lengths > SHORTEST)
+    n = len(known)
+    if not n:
+        return joined
+    from scipy.spatial import cKDTree  # large; maps without walls need none
+
     along = (lines[known, 2:] - lines[known, :2]) / lengths[known, None]
     ends = np.concatenate([lines[known, :2], lines[known, 2:]])
     outward = np.concatenate([-along, along])
-    for p, q in cKDTree(ends).query_pairs(JOINT) if len(known) else ():
-        if p % len(known) != q % len(known) and outward[p] @ outward[q] < -STRAIGHT:
-            for end in (p, q):
-                joined[known[end % len(known)], end // len(known)] = True
+    p, q = cKDTree(ends).query_pairs(JOINT, output_type="ndarray").T
+    goes_on = (p % n != q % n) & (np.sum(outward[p] * outward[q], axis=1) < -STRAIGHT)
+    for end in (p[goes_on], q[goes_on]):
+        joined[known[end % n], end // n] = True
     return joined
 
 

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError
+from skidpad.roads.edge import LEVEL
 from skidpad.roads.queries import LanePoint, RoadMap
 
 AnyFloats = NDArray[np.floating[Any]]
 STEP = 5.0  # m between the places of a journey
 WINDOW = 16  # places ahead of the last one among which a car is looked for
 NEAR = 15.0  # m from a place within which a car is on its way: beside it on a road of four lanes
-LEVEL = 4.0  # m above or below: farther is another road (decision M-12)
 
 
 class Journey:

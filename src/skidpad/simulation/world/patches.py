@@ -134,13 +134,10 @@ class Patches:
         states.yaw[:], states.present[:] = samples.heading, True
         states.vx[:] = np.where(np.isnan(samples.limit), USUAL_SPEED, samples.limit)
         sides = np.array([(0.0, left) for left in (PATH_OFFSET, -PATH_OFFSET) * 2])
-        kind = self.kinds.index(self.road.tyres)
-        wheels = WheelPlaces(np.tile(sides, (n, 1, 1)), np.full(n, kind))
         placed = places_for(np.zeros(n), np.zeros(n))
         placed["lane"], placed["sample"] = samples.lane, np.arange(n)
-        share, stiffness, film = (np.zeros((n, 4)) for _ in range(3))
-        fill_patches(self.map.held, self._held, wheels, states, placed, share, stiffness, film)
-        return np.asarray(share.min(axis=1))
+        shares = self._share_of_places(np.tile(sides, (n, 1, 1)), states, placed)
+        return np.asarray(shares.min(axis=1))
 
     def ratio_at(self, x: float, y: float, z: float, v: float = 0.0) -> float:
         """Return the friction at a point of the road at a speed in m/s over that without patches.
@@ -150,11 +147,18 @@ class Patches:
         states, at = ActorStates.empty(1), np.zeros((1, 4, 2))
         states.x[0], states.y[0], states.z[0], states.vx[0] = x, y, z, v
         states.present[0] = True
-        one = WheelPlaces(at, np.array([self.kinds.index(self.road.tyres)], np.int64))
-        share, stiffness, film = (np.zeros((1, 4)) for _ in range(3))
-        placed = places_for(np.zeros(1), np.zeros(1))
-        fill_patches(self.map.held, self._held, one, states, placed, share, stiffness, film)
-        return float(share[0, 0])
+        return float(self._share_of_places(at, states, places_for(np.zeros(1), np.zeros(1)))[0, 0])
+
+    def _share_of_places(self, wheels: Floats, states: ActorStates, placed: Places) -> Floats:
+        """Returns the friction at wheels (n, 4, 2) of the run's tyres over that without patches, (n, 4)."""
+        n = len(wheels)
+        tyres = np.full(n, self.kinds.index(self.road.tyres), np.int64)
+        share, stiffness, film = (np.zeros((n, 4)) for _ in range(3))
+        fill_patches(
+            self.map.held, self._held, WheelPlaces(wheels, tyres), states, placed,
+            share, stiffness, film,
+        )  # fmt: skip
+        return share
 
 
 def _arrays(

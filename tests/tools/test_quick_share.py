@@ -10,7 +10,6 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from coverage import CoverageData
 
 import quick_share
 
@@ -44,8 +43,11 @@ def test_a_package_has_the_lines_of_all_pieces():
 
 def test_a_file_that_a_killed_process_left_unfinished_adds_no_line(tmp_path):
     """Its first table is there and empty. A copy of the package elsewhere adds none either."""
+    coverage = pytest.importorskip(
+        "coverage", reason="coverage.py is not installed: make check does"
+    )
     module = quick_share.PACKAGE / "core" / "a.py"
-    data = CoverageData(str(tmp_path / "data.whole"))
+    data = coverage.CoverageData(str(tmp_path / "data.whole"))
     data.add_lines({str(module): [3, 1], str(tmp_path / "skidpad" / "core" / "a.py"): [7]})
     data.write()
     with closing(sqlite3.connect(tmp_path / "data.killed")) as file:

@@ -46,6 +46,11 @@ PICTURES = os.environ.get("SKIDPAD_PICTURES")  # a folder for screenshots, to be
 LATE = """() => { const real = window.createImageBitmap; window.late = 'not yet';
     window.createImageBitmap = async (blob) => { window.createImageBitmap = real; window.late = 'soon';
         await new Promise((done) => setTimeout(done, 6000)); window.late = 'now'; return real(blob); }; }"""
+THROTTLE = "parseFloat(document.querySelector('.pedals .throttle').style.height)"  # percent
+FINGER = """([name, type, x, y]) => { const pad = document.querySelector(`[data-touch=${name}]`);
+    const box = pad.getBoundingClientRect(); pad.setPointerCapture = () => {};
+    pad.dispatchEvent(new PointerEvent(type, { bubbles: true, cancelable: true, pointerId: 7,
+    clientX: box.left + x * box.width, clientY: box.top + y * box.height })); }"""
 PAUSED = "() => document.querySelector('.cockpit').dataset.paused === 'true'"
 FACT = """name => [...document.querySelectorAll('.cockpit dt')]
     .find(dt => dt.textContent === name)?.nextElementSibling.textContent"""
@@ -363,3 +368,41 @@ def test_a_page_that_is_put_to_sleep_lets_another_one_drive(browser, tmp_path):
         page.keyboard.press("p")
         until(page, "() => document.querySelector('.cockpit').dataset.paused === 'false'")
         context.close()
+
+
+@pytest.mark.req("A-274")
+def test_a_person_drives_by_pedals_and_wheel_on_a_touch_screen(browser, tmp_path):
+    folder, errors = tmp_path / "run", []
+    words = ["drive", "--no-browser", "--out", folder, "--vehicles", "2", "--sensors", "objects"]
+    with running(*words, cwd=tmp_path) as command:
+        context = browser.new_context(
+            viewport={"width": 844, "height": 800}, has_touch=True, is_mobile=True
+        )
+        context.set_default_timeout(WAIT)
+        page = context.new_page()
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        page.goto(command.address())
+        until(page, "() => document.querySelector('.stage canvas')?.width === 800")
+        page.get_by_role("button", name="take over / hand back").tap()
+        until(page, "() => document.querySelector('.cockpit').classList.contains('manual')")
+        until(
+            page,
+            "() => document.querySelector('[data-touch=throttle]').getBoundingClientRect().top > 0",
+        )
+        for name, x, y in (("throttle", 0.5, 0.25), ("steer", 0.25, 0.5)):
+            page.evaluate(FINGER, [name, "pointerdown", x, y])
+        until_fact(page, "drives", "you, by touch")
+        until(page, f"() => {THROTTLE} === 75")
+        photograph(page, "touch")
+        for name in ("throttle", "steer"):
+            page.evaluate(FINGER, [name, "pointerup", 0.5, 0.5])
+        until(page, f"() => {THROTTLE} === 0")
+        page.get_by_role("button", name="end").tap()
+        status, said = command.ended()
+        context.close()
+    assert status == 0, said
+    assert errors == []
+    done = [timed.input for timed in read_inputs(folder, read_run(folder).inputs)]
+    touched = [p for p in done if isinstance(p, Pedals) and p.method is Method.TOUCH]
+    assert 0.75 in {p.throttle for p in touched}
+    assert 0.5 in {p.steer for p in touched}

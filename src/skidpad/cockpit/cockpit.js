@@ -39,6 +39,10 @@ export default {
       <div class="pedals"><i ref="throttle" class="throttle"></i><i ref="brake" class="brake"></i>
         <span class="steer"><i ref="steer"></i></span></div>
     </div>
+    <div class="touch" v-if="kind === 'drive'">
+      <div v-for="t in touchpads" :key="t" :data-touch="t" @pointerdown.prevent="touch(t, $event)" @pointermove="touch(t, $event)"
+        @pointerup="release(t)" @pointercancel="release(t)" @contextmenu.prevent><i ref="pads"></i><small>{{ t }}</small></div>
+    </div>
     <div class="keys" v-if="helpShown" @click="helpShown = false"><h3>Keys</h3><dl><template v-for="[k, does] in help" :key="k"><dt>{{ k }}</dt><dd>{{ does }}</dd></template></dl></div>
     <div class="lamp" ref="lamp"></div>
     <div class="alert" ref="alert"></div>
@@ -59,12 +63,12 @@ export default {
   <div class="line" v-if="timeline"><canvas ref="line" width="1200" height="70" @pointerdown="seek"
     @pointermove="$event.buttons && seek($event)"></canvas></div>
 </div>`,
-  data: () => ({ helpShown: false, wheels: [[4, 10], [45, 10], [4, 48], [45, 48]], ...layout() }),
+  data: () => ({ helpShown: false, touchpads: ["steer", "brake", "throttle"], wheels: [[4, 10], [45, 10], [4, 48], [45, 48]], ...layout() }),
   mounted() {
-    this.keys = {}; this.history = []; this.pressed = false; this.shownAt = []; this.waiting = {};
+    this.keys = {}; this.touched = {}; this.history = []; this.pressed = false; this.shownAt = []; this.waiting = {};
     for (const name of this.tiers) this.$refs.tiers.append(Object.assign(document.createElement("li"), { textContent: name }));
     this.down = (e) => this.key(e, true); this.up = (e) => this.key(e, false);
-    this.away = () => { this.keys = {}; this.beat(); };
+    this.away = () => { this.keys = {}; this.touched = {}; this.beat(); };
     document.addEventListener("keydown", this.down); document.addEventListener("keyup", this.up);
     window.addEventListener("blur", this.away); document.addEventListener("visibilitychange", this.away);
     this.beating = setInterval(() => this.beat(), HEARTBEAT);
@@ -148,6 +152,8 @@ export default {
       r.stop.textContent = m.stop_m === null ? "-" : m.stop_m < 1000 ? m.stop_m : "> 999";
       r.grip.style.width = `${100 * Math.min(m.grip || 0, 1)}%`; r.grip.style.background = this.ink(m.grip);
       r.gripSaid.textContent = m.grip === null ? "no grip" : `grip ${m.grip.toFixed(2)}`;
+      if (seat.manual && !this.$el.classList.contains("manual") && matchMedia("(pointer: coarse)").matches)
+        this.$el.scrollIntoView();  // on a phone the button lies far below the wheel and pedals
       r.mode.textContent = s.mode || ""; this.$el.classList.toggle("manual", !!seat.manual);
       r.throttle.style.height = `${100 * (m.throttle || 0)}%`; r.brake.style.height = `${100 * (m.brake || 0)}%`;
       r.steer.style.left = `${50 - 50 * (m.steer || 0)}%`;
@@ -240,7 +246,7 @@ export default {
     },
     beat(now = false) {
       if (this.kind !== "drive" || !this.socket) return;
-      const pedals = this.gamepad() || this.keyboard(), pressed = pedals.throttle > 0 || pedals.brake > 0 || Math.abs(pedals.steer) > 0 || pedals.handbrake;
+      const pedals = this.gamepad() || this.fingers() || this.keyboard(), pressed = pedals.throttle > 0 || pedals.brake > 0 || Math.abs(pedals.steer) > 0 || pedals.handbrake;
       if (pressed || this.pressed || now) this.say("pedals", pedals);
       this.pressed = pressed;
     },
@@ -251,6 +257,23 @@ export default {
     keyboard() {
       const k = this.keys, n = (v) => v ? 1 : 0;
       return { throttle: n(k.up), brake: n(k.down), steer: n(k.left) - n(k.right), handbrake: !!k.hand, method: "keyboard" };
+    },
+    touch(name, e) {  // from the middle of the wheel to the left is 1; the higher on a pedal, the more
+      if (e.type === "pointerdown") e.target.setPointerCapture(e.pointerId);
+      else if (!(name in this.touched)) return;
+      const box = e.currentTarget.getBoundingClientRect(), clip = (v, low) => Math.round(100 * Math.max(low, Math.min(1, v))) / 100;
+      this.touched[name] = name === "steer" ? clip(1 - 2 * (e.clientX - box.left) / box.width, -1) : clip((box.bottom - e.clientY) / box.height, 0);
+      this.lean(name); if (e.type === "pointerdown") this.beat(true);
+    },
+    release(name) { delete this.touched[name]; this.lean(name); this.beat(true); },
+    lean(name) {  // the wheel turns and a pedal fills as they are touched
+      const v = this.touched[name] || 0, mark = this.$refs.pads[this.touchpads.indexOf(name)];
+      if (name === "steer") mark.style.transform = `rotate(${-90 * v}deg)`; else mark.style.height = `${100 * v}%`;
+    },
+    fingers() {
+      const t = this.touched; if (Object.keys(t).length) this.fingered = true; else if (!this.fingered) return null;
+      if (!Object.keys(t).length) this.fingered = false;
+      return { throttle: t.throttle || 0, brake: t.brake || 0, steer: t.steer || 0, handbrake: false, method: "touch" };
     },
     trodden(pad, i) {  // 1 is released; a browser says exactly 0, half the way, until a pedal is first moved
       this.moved = this.moved || {}; const v = pad.axes[i] ?? 1, name = `${pad.id} ${i}`;

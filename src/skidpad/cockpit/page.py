@@ -82,6 +82,10 @@ KEYS: dict[str, Keys] = {
             "throttle, brake, left, right; hold the brake at standstill to reverse",
         ),
         ("space", "handbrake"),
+        (
+            "touch screen",
+            "wheel on the left, brake and throttle on the right: the higher, the more",
+        ),
         ("1 to 7", "switch a driving function on or off"),
         ("L", "headlights: automatic, low, high, off"),
         ("N, H", "next weather, next time of day"),

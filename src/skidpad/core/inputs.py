@@ -23,6 +23,7 @@ class Method(str, Enum):
     KEYBOARD = "keyboard"
     GAMEPAD = "gamepad"
     WHEEL = "wheel"
+    TOUCH = "touch"  # pedals and wheel on a touch screen
 
 
 class LampSwitch(str, Enum):

@@ -331,8 +331,8 @@ class Hands:
             self.reverse, self.pressed = True, 0.0
 
     def _turn(self, pedals: Pedals, v: float) -> None:
-        """Turns the wheel by the pedals at `v` m/s: directly, or by keys at a limited rate."""
-        if pedals.method is not Method.KEYBOARD:
+        """Turns the wheel by the pedals at `v` m/s: directly, or by keys or fingers at a limited rate."""
+        if pedals.method not in (Method.KEYBOARD, Method.TOUCH):
             self.steer = pedals.steer
             return
         limit = min(1.0, KEY_A_LAT * WHEELBASE / max(v * v, 1e-6) / MAX_STEER)

@@ -11,8 +11,8 @@ from typer.main import get_command
 
 from docs_hooks import ROOT, _leaves
 from skidpad.cli.main import app
-from skidpad.core.setting import describe_settings
-from skidpad.core.settings import PARTS
+from skidpad.core.settings.parts import PARTS
+from skidpad.core.settings.setting import describe_settings
 from support.ids import ID, bare_ids
 
 SOURCE = ROOT / "src" / "skidpad"

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from result_texts import markdown
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.evidence.limits import count_limits, skew_limits
 from skidpad.evidence.statistics import RUNS_WITH_EVENT_FROM, UNITS_FROM, ratio_limits
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from skidpad.core.environment.tyres import TREADS, known_tyres
 from skidpad.core.geometry import mps_from_kmh
-from skidpad.core.lefthanded import pose_to_carla
+from skidpad.core.maths.lefthanded import pose_to_carla
 from skidpad.core.sensor_types import SENSORS
 from skidpad.core.specs import CameraSpec, PointSensorSpec, RadarSpec, SensorSpec
-from skidpad.core.tyres import TREADS, known_tyres
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.grip import GripParams, Road, mu_at, road_surface

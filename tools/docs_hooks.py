@@ -88,8 +88,8 @@ def command_reference() -> str:
 
 def settings_reference() -> str:
     """Returns every setting with its meaning, values and default, as Markdown."""
-    from skidpad.core.setting import describe_settings
-    from skidpad.core.settings import PARTS, load_profile
+    from skidpad.core.settings.parts import PARTS, load_profile
+    from skidpad.core.settings.setting import describe_settings
 
     recommended = load_profile("recommended").to_plain()
     lines = ["# Settings", "", "Of `--set name=value`, `settings=` and a profile's file.", ""]

@@ -21,9 +21,9 @@ from grip_judging import (
     judge_estimates,
     keep_signals,
 )
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.run import Roads, RunSpec
-from skidpad.core.settings import load_profile
-from skidpad.core.surface import SurfacePatch
+from skidpad.core.settings.parts import load_profile
 from skidpad.core.vocabulary import Govern, SensorLevel
 from skidpad.evidence.statistics import poisson_interval
 from skidpad.physics.presets import find_weather

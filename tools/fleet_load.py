@@ -37,7 +37,7 @@ from tempfile import TemporaryDirectory
 
 from sqlalchemy import select
 
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.fleet.identity import digest
 from skidpad.fleet.service import Places, open_fleet, open_store
 from skidpad.fleet.store.accounts import add_vehicle

@@ -26,7 +26,7 @@ import numpy as np
 import polars as pl
 
 from fleet_load import record, start
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.fleet.identity import new_id

@@ -16,7 +16,7 @@ from scipy import stats
 from coverage_table import Floats, counts_of, write_block
 from result_tables import ROOT
 from result_texts import markdown
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.evidence.compare import ALPHA, seeds_to_fire
 from skidpad.evidence.statistics import holm, sign_tests
 

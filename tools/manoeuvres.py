@@ -13,8 +13,8 @@ from math import pi, radians
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skidpad.core.constants import G
 from skidpad.core.geometry import Pose, mps_from_kmh
+from skidpad.core.maths.constants import G
 from skidpad.physics.fleet import Fleet
 from skidpad.physics.types import VehicleType
 from skidpad.physics.vehicle import BRAKE, STEER, THROTTLE, steer_share

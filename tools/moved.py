@@ -7,7 +7,7 @@ from pathlib import Path
 
 import polars as pl
 
-from skidpad.core.wording import count_text
+from skidpad.core.text.wording import count_text
 
 APART = ("outcome", "version", "log_hash", "motion_hash", "fingerprint")  # columns that name no run
 KEYS = (

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from skidpad.campaign.driving.run_setup import ego_model
 from skidpad.core.setup import ActorCommand, ActorSetup, LanePosition, Setup
-from skidpad.core.sight import DriverView, RoadLook, SeenActors
 from skidpad.core.states import VehicleCommand, WorldTruth
+from skidpad.core.traffic.sight import DriverView, RoadLook, SeenActors
 from skidpad.core.vocabulary import Control, GripModel, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import find_weather

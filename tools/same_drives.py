@@ -25,7 +25,7 @@ from msgspec import structs
 from skidpad.campaign.cells.grip import Cross, cross, template
 from skidpad.campaign.runs.run import run
 from skidpad.core.run import AdasDriver, Roads, RunSpec
-from skidpad.core.settings import load_profile
+from skidpad.core.settings.parts import load_profile
 from skidpad.core.vocabulary import SensorLevel, TrafficStart
 from skidpad.physics.presets import all_presets
 from skidpad.recording.run.log import RunLog

@@ -32,7 +32,7 @@ from skidpad.campaign.workers.worker import Finished, Job
 from skidpad.cli.main import app
 from skidpad.core.arrays import Floats
 from skidpad.core.errors import OutputError
-from skidpad.core.space import Choice, Space
+from skidpad.core.maths.space import Choice, Space
 from skidpad.recording.campaign.searches import Search, Trial, read_search, read_trials
 from skidpad.search import methods
 from skidpad.search.loop import search, write_search

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manoeuvres import STEERING_RATIO, TICK, Bench
-from skidpad.core.constants import G
+from skidpad.core.maths.constants import G
 from skidpad.physics.types import VehicleType
 
 HIGH, LOW = 0.8, 0.2  # friction left and right

@@ -31,9 +31,9 @@ from manoeuvres import (
     time_to_speed,
     understeer,
 )
-from skidpad.core.constants import G
 from skidpad.core.errors import MissingExtra
 from skidpad.core.geometry import Pose, kmh_from_mps, mps_from_kmh
+from skidpad.core.maths.constants import G
 from skidpad.physics.fleet import Fleet
 from skidpad.physics.grip import GripParams, RoadSurface, mu_at, physical_params, stiffness_at
 from skidpad.physics.stopping import stops

@@ -15,8 +15,8 @@ from statistics import median, quantiles
 from msgspec import structs
 
 from skidpad.campaign.bench.tick import bench_run, tick_cost
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.run import RunSpec
-from skidpad.core.surface import SurfacePatch
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.roads.bundled import load_map
 

@@ -12,8 +12,8 @@ import skidpad
 from skidpad.campaign.runs.checkpoints import FIXED
 from skidpad.campaign.runs.run import OpenRun
 from skidpad.campaign.runs.run import run as drive
-from skidpad.core.checkpoint import Checkpoint
 from skidpad.core.errors import CheckpointError
+from skidpad.core.objects.checkpoint import Checkpoint
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.recording.run.log_files import log_hash
@@ -141,7 +141,7 @@ def test_a_branch_draws_from_streams_of_its_own():
 
 def test_every_kind_of_state_counts(monkeypatch):
     """What is left out of a checkpoint shows in the hash: the tests above would find it."""
-    from skidpad.core import checkpoint
+    from skidpad.core.objects import checkpoint
 
     spec = spec_of("figure8", 4, duration=15.0)
     whole = log_hash(drive(spec).log)

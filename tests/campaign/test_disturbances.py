@@ -9,9 +9,9 @@ from typer.testing import CliRunner
 import skidpad
 from skidpad.campaign.runs.run import run as drive
 from skidpad.cli.main import app
-from skidpad.core.disturbance import KNOT_S, LARGEST, SHARE, Disturbance, parse_disturbance
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import run_from_plain
+from skidpad.core.traffic.disturbance import KNOT_S, LARGEST, SHARE, Disturbance, parse_disturbance
 from skidpad.recording.run.log_files import log_hash
 from skidpad.scenarios.playing.disturbing import Disturbances
 

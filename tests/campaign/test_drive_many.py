@@ -14,7 +14,7 @@ from skidpad.campaign.driving.sharing import share_setups
 from skidpad.campaign.runs.checkpoints import FIXED
 from skidpad.campaign.runs.run import run as drive
 from skidpad.core.errors import BackendError, ConfigError, FileError
-from skidpad.core.statefile import Ground
+from skidpad.core.objects.statefile import Ground
 from skidpad.recording.run.log_files import log_hash
 from skidpad.scenarios.shipped import FOLDER
 from support.cut_runs import SCRIPTS

@@ -16,7 +16,7 @@ from skidpad.campaign.studies.effects import (
     settings_of_arm,
 )
 from skidpad.cli.main import app
-from skidpad.core.settings import load_profile
+from skidpad.core.settings.parts import load_profile
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.roads.bundled import load_map
 

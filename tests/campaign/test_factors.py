@@ -16,7 +16,7 @@ from skidpad.cli.campaigns.adas_plan import plan
 from skidpad.cli.options.asked import Climate, Drivers
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import AdasDriver, Function, ReferenceDriver, Roads, RunSpec
-from skidpad.core.stack_settings import CapScope
+from skidpad.core.settings.stack import CapScope
 from skidpad.core.vocabulary import Outcome, SensorLevel, TrafficStart
 from skidpad.physics.presets import find_weather
 from skidpad.recording.campaign.results import read_results

@@ -19,7 +19,7 @@ from skidpad.campaign.workers.pool import local
 from skidpad.campaign.workers.worker import Finished, Runner
 from skidpad.core.errors import OutputError
 from skidpad.core.run import AgentDriver, Friction, RunSpec
-from skidpad.core.settings import load_profile
+from skidpad.core.settings.parts import load_profile
 from skidpad.core.vocabulary import GripModel
 from skidpad.physics.presets import preset
 from skidpad.recording.campaign.grip import GripEntry, read_series

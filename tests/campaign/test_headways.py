@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from skidpad.campaign.bench.headways import field_sources, judge
-from skidpad.core.space import Normal
+from skidpad.core.maths.space import Normal
 
 
 def test_log_normals_have_what_the_sources_say() -> None:

@@ -29,7 +29,7 @@ from skidpad.campaign.runs.state_files import (
 )
 from skidpad.core.errors import CheckpointError
 from skidpad.core.run import Friction, Scenario
-from skidpad.core.settings import load_profile
+from skidpad.core.settings.parts import load_profile
 from skidpad.core.simulator import BackendChoice
 from skidpad.core.vocabulary import GripModel, SensorLevel
 from skidpad.physics.presets import find_weather
@@ -152,7 +152,7 @@ def test_a_damaged_file_is_refused(tmp_path):
     [
         [["object", "subprocess:Popen"], []],
         [["object", "skidpad.recording.run.staging:Path"], []],
-        [["object", "skidpad.core.checkpoint:deepcopy"], []],
+        [["object", "skidpad.core.objects.checkpoint:deepcopy"], []],
         [["object", "builtins:eval"], []],
         [["list"], [["struct", "skidpad.campaign.runs.rerun:Film", [["path", "gone.mp4"]]]]],
         [["list"], [["named", "skidpad.campaign.runs.rerun:Film", ["gone.mp4"]]]],

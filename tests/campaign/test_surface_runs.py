@@ -15,13 +15,13 @@ from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.campaign.driving.surfaces import read_surface
 from skidpad.campaign.runs.run import run
 from skidpad.cli.main import app
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import ConfigError
 from skidpad.core.inputs import Outside
 from skidpad.core.run import RunSpec, Scenario, run_from_plain
-from skidpad.core.settings import load_profile
+from skidpad.core.settings.parts import load_profile
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.states import VehicleCommand
-from skidpad.core.surface import SurfacePatch
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.recording.run.log_files import log_hash, read_log
 from skidpad.simulation.embedded.engine import EmbeddedBackend

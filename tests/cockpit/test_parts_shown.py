@@ -9,7 +9,7 @@ import pytest
 
 from skidpad.cockpit.about import About
 from skidpad.cockpit.parts import list_parts
-from skidpad.core.registry import Source
+from skidpad.core.objects.registry import Source
 from skidpad.core.run import AdasDriver, Function, Roads, RunSpec, Scenario, StackDriver
 from skidpad.core.simulator import BACKENDS, BackendChoice
 from skidpad.core.weather import Weather

@@ -19,7 +19,7 @@ ASK = """
 from typer.testing import CliRunner
 from skidpad.cli.main import app
 from skidpad.core.run import RunSpec, run_from_plain
-from skidpad.core.settings import load_profile, parse_assignments
+from skidpad.core.settings.parts import load_profile, parse_assignments
 from skidpad.core.errors import ConfigError
 from docs_hooks import settings_reference
 
@@ -42,7 +42,7 @@ except ConfigError as error:
 def test_a_new_setting_appears_in_help_files_python_and_docs(tmp_path: Path) -> None:
     copy = tmp_path / "skidpad"
     shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    module = copy / "core" / "settings.py"
+    module = copy / "core" / "settings" / "parts.py"
     text = module.read_text(encoding="utf-8")
     assert text.count(BEFORE) == 1
     module.write_text(text.replace(BEFORE, LINE + BEFORE), encoding="utf-8")
@@ -55,7 +55,7 @@ def test_a_new_setting_appears_in_help_files_python_and_docs(tmp_path: Path) -> 
     assert answer.stdout == "slush must be between 0 and 2, got 3.0\n"
 
 
-RUN_PATH = ("core/run.py", "core/settings.py", "campaign/runs/run.py", "campaign/driving/run_setup.py",
+RUN_PATH = ("core/run.py", "core/settings/parts.py", "campaign/runs/run.py", "campaign/driving/run_setup.py",
             "campaign/recipes/matrix.py", "campaign/cells/matrix.py", "campaign/stepping.py",
             "cli/options/asked.py")  # fmt: skip
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from skidpad.core.depthcode import bgra_from_inverse_depth, inverse_depth_from_bgra
+from skidpad.core.kernels.depthcode import bgra_from_inverse_depth, inverse_depth_from_bgra
 
 STEP = 1000.0 / 16777215  # m
 

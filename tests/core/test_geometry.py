@@ -7,8 +7,8 @@ from hypothesis.strategies import floats
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, footprint, wrap_angle
-from skidpad.core.lefthanded import pose_from_carla, pose_to_carla
-from skidpad.core.randomness import stream
+from skidpad.core.maths.lefthanded import pose_from_carla, pose_to_carla
+from skidpad.core.maths.randomness import stream
 from skidpad.core.weather import Weather
 
 angles = floats(-1.5, 1.5)

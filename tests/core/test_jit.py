@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from skidpad.core import jit
-from skidpad.core.jit import imported, kernel_hash
+from skidpad.core.kernels import jit
+from skidpad.core.kernels.jit import imported, kernel_hash
 
 FILES = {
     "low": "from house.jit import kernel\n@kernel\ndef f(x): return x",
@@ -73,13 +73,14 @@ def test_an_edit_reaches_those_who_may_call_it(house: Path, edited: str, fresh: 
 def test_an_edited_callee_is_compiled_into_its_caller(tmp_path: Path, decorator: str) -> None:
     """The real decorator over two files, in processes of their own."""
     root = tmp_path / "skidpad"
-    (root / "core").mkdir(parents=True)
-    for package in (root, root / "core"):
+    kernels = root / "core" / "kernels"
+    kernels.mkdir(parents=True)
+    for package in (root, root / "core", kernels):
         (package / "__init__.py").touch()
-    source = Path(sys.modules["skidpad.core.jit"].__file__ or "")
+    source = Path(sys.modules["skidpad.core.kernels.jit"].__file__ or "")
     for name in ("jit.py", "refcounts.py"):
-        (root / "core" / name).write_bytes((source.parent / name).read_bytes())
-    head = "from skidpad.core.jit import inner_kernel, kernel\n"
+        (kernels / name).write_bytes((source.parent / name).read_bytes())
+    head = "from skidpad.core.kernels.jit import inner_kernel, kernel\n"
     caller = head + "from skidpad.callee import f\n@kernel\ndef g(x):\n    return f(x)\n"
     (root / "caller.py").write_text(caller)
 
@@ -120,7 +121,7 @@ class {name}(NamedTuple):
 USER = """
 import sys; sys.path.insert(0, {folder!r})
 import numpy as np
-from skidpad.core.jit import hold
+from skidpad.core.kernels.jit import hold
 from record import {name}
 assert hold({name}(np.ones(3))) is not None
 """

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from skidpad.core.errors import FileError
-from skidpad.core.reading import read_arrays
+from skidpad.core.files.reading import read_arrays
 
 CENTRAL = b"PK\x01\x02"  # begins a member's entry of the central directory
 

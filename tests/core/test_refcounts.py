@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import Held, hold, inner_kernel, kernel
-from skidpad.core.refcounts import (
+from skidpad.core.kernels.jit import Held, hold, inner_kernel, kernel
+from skidpad.core.kernels.refcounts import (
     allocates,
     without_counting,
 )

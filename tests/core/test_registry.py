@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import pytest
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.registry import Registry
+from skidpad.core.objects.registry import Registry
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from inspect import signature
 import pytest
 
 from skidpad.core.geometry import Pose
-from skidpad.core.slots import fill_slots
+from skidpad.core.objects.slots import fill_slots
 from skidpad.core.states import StackReport
 
 

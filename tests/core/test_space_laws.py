@@ -3,7 +3,7 @@
 import pytest
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.space import Choice
+from skidpad.core.maths.space import Choice
 
 
 def test_a_word_of_weight_zero_is_never_drawn():

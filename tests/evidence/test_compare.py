@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 import gate_table as gate
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.evidence.compare import (
     Answer,
     compare_campaigns,

@@ -13,7 +13,7 @@ import polars as pl
 import pytest
 
 import coverage_table as coverage
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.evidence.contrasts import Amount, Contrast, contrast_pairs
 from skidpad.evidence.statistics import (
     CONFIDENCE,

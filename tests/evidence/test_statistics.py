@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.evidence.limits import count_limits
 from skidpad.evidence.statistics import (
     Interval,

@@ -9,7 +9,7 @@ from msgspec import structs
 
 from skidpad.campaign.runs.folder import fresh_folder
 from skidpad.core.errors import ConfigError
-from skidpad.core.names import LONGEST, inside, path_part, slug
+from skidpad.core.files.names import LONGEST, inside, path_part, slug
 from skidpad.core.run import Scenario, StackDriver
 from skidpad.core.weather import Weather
 from skidpad.recording.campaign.folder import RUNS, CampaignFolder

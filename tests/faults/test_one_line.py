@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from skidpad.core.errors import SkidpadError
-from skidpad.core.settings import Settings
-from skidpad.core.told import LONGEST
+from skidpad.core.settings.parts import Settings
+from skidpad.core.text.told import LONGEST
 from skidpad.fleet.alerting.keeping import parse_alert
 from skidpad.fleet.batch import drive_of
 from skidpad.live.outcome import LINK, read_outcome

@@ -5,8 +5,8 @@ import inspect
 import numpy as np
 import pytest
 
-from skidpad.core.constants import G
 from skidpad.core.geometry import Pose
+from skidpad.core.maths.constants import G
 from skidpad.physics import antilock
 from skidpad.physics.antilock import CYCLES, GAP, PRESSURE
 from skidpad.physics.fleet import Fleet

@@ -7,7 +7,7 @@ from hypothesis import assume, given, settings
 from hypothesis.strategies import floats
 from shapely.affinity import rotate, translate
 
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics import contact, segments
 from skidpad.physics.contact import CONTACT_LAW, Contacts, bodies, resolve_contacts

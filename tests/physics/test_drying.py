@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from skidpad.campaign.driving.surfaces import read_surface
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import ConfigError
-from skidpad.core.surface import SurfacePatch
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.drying import dried_film, evaporation_mm_h, wear_mm_h

@@ -15,7 +15,7 @@ from manoeuvres import (
     time_to_speed,
     understeer,
 )
-from skidpad.core.constants import G
+from skidpad.core.maths.constants import G
 from skidpad.physics.types import EGO_TYPE, VehicleType, traffic_types, vehicle_type
 from split_friction import split_stop
 

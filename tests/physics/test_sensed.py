@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from manoeuvres import Bench, pedals_in_turn, sine_with_dwell
-from skidpad.core.constants import G
+from skidpad.core.maths.constants import G
 from skidpad.physics import sensed
 from skidpad.physics.sensed import CUTS, DRIVE, SIDE, SPEED, TURN, TURN_MOST
 from skidpad.physics.types import vehicle_type

@@ -2,9 +2,9 @@
 
 import pytest
 
-from skidpad.core.constants import G
+from skidpad.core.environment.tyres import REFERENCE, find_tyres, known_tyres
 from skidpad.core.errors import ConfigError
-from skidpad.core.tyres import REFERENCE, find_tyres, known_tyres
+from skidpad.core.maths.constants import G
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.grip import (

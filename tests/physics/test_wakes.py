@@ -9,7 +9,7 @@ import pytest
 
 from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.core.geometry import Pose
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 from skidpad.core.states import ActorStates, VehicleCommand
 from skidpad.physics.types import traffic_types, vehicle_type
 from skidpad.physics.wakes import FRONTAL_LEAST, displacing, fill_air

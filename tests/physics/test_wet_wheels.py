@@ -6,9 +6,9 @@ from math import atan, pi
 import numpy as np
 import pytest
 
-from skidpad.core.constants import G
 from skidpad.core.geometry import Pose
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
+from skidpad.core.maths.constants import G
 from skidpad.physics.fleet import Fleet
 from skidpad.physics.grip import (
     CLEARED,

@@ -10,7 +10,7 @@ from skidpad.campaign.driving.run_setup import stage_of, wind_of
 from skidpad.campaign.runs.run import run
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
-from skidpad.core.settings import Settings
+from skidpad.core.settings.parts import Settings
 from skidpad.core.setup import Wind
 from skidpad.core.states import VehicleCommand
 from skidpad.physics.fleet import Fleet

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from skidpad.core.surface import SurfacePatch
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.recording.run.surfaces import read_run_surface
 from skidpad.report.elements.replay import UNIT, replay, replay_run
 from skidpad.roads.bundled import load_map

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from skidpad.core.geometry import wrap_angle
-from skidpad.core.lefthanded import pose_from_carla
+from skidpad.core.maths.lefthanded import pose_from_carla
 from skidpad.roads.bundled import FOLDER, load_map
 from skidpad.roads.queries import LanePoint, RoadMap
 

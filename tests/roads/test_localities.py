@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from skidpad.core.environment.localities import Locality, RoadKind, kind_of_limit
 from skidpad.core.geometry import mps_from_kmh
-from skidpad.core.localities import Locality, RoadKind, kind_of_limit
 from skidpad.roads.bundled import load_map
 from skidpad.roads.localities import Localities
 

@@ -5,7 +5,7 @@ from math import acos, sin
 import numpy as np
 import pytest
 
-from skidpad.core.constants import G
+from skidpad.core.maths.constants import G
 from skidpad.search.bound import (
     Motion,
     Path,

@@ -13,10 +13,10 @@ from skidpad.campaign.runs.stored import read_run
 from skidpad.campaign.workers.pool import keep_workers
 from skidpad.campaign.workers.worker import Finished
 from skidpad.cli.main import app
-from skidpad.core.disturbance import SOURCE, actor_of_draw
 from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.maths.space import Space
 from skidpad.core.run import run_from_plain
-from skidpad.core.space import Space
+from skidpad.core.traffic.disturbance import SOURCE, actor_of_draw
 from skidpad.recording.campaign.risks import SPLITTING, Risk, read_risk_found
 from skidpad.recording.campaign.searches import (
     CHOICES,

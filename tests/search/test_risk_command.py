@@ -6,7 +6,7 @@ from typer.testing import CliRunner
 
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError, OutputError
-from skidpad.core.space import Normal, Uniform, Variable
+from skidpad.core.maths.space import Normal, Uniform, Variable
 from skidpad.recording.campaign.risks import RISK_RUNS, SCALES, read_risk, read_risk_found
 from skidpad.recording.campaign.searches import Trial, read_trials
 from skidpad.search.exposure import read_exposure

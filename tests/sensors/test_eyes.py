@@ -8,9 +8,9 @@ from numpy.testing import assert_array_equal
 
 from skidpad.core.geometry import Pose
 from skidpad.core.setup import ActorSetup, Setup
-from skidpad.core.sight import RoadLook
 from skidpad.core.specs import EyesSpec
 from skidpad.core.states import ActorStates, ActorTable
+from skidpad.core.traffic.sight import RoadLook
 from skidpad.core.vocabulary import ActorKind, LightState
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import preset

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from skidpad.core.lidar_effects import LidarFog
+from skidpad.core.environment.lidar_effects import LidarFog
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.core.weather import Weather
 from skidpad.physics.camera import wetted_share

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from skidpad.core.lefthanded import pose_from_carla
+from skidpad.core.maths.lefthanded import pose_from_carla
 from skidpad.core.specs import CameraSpec, RadarSpec
 from skidpad.sensors.published_sensors import CaptureSize, mounts_outside, twelve_sensors
 

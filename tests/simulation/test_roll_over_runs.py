@@ -9,7 +9,7 @@ import pytest
 
 from skidpad.campaign.driving.run_setup import Stage, stage_of
 from skidpad.campaign.runs.run import outcome_of
-from skidpad.core.settings import Settings
+from skidpad.core.settings.parts import Settings
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import Outcome
 from skidpad.evidence.grip.scores import grip_metrics

@@ -8,7 +8,7 @@ import pytest
 from skidpad.campaign.driving.loop import Sink
 from skidpad.campaign.runs.run import run
 from skidpad.core.errors import ConfigError
-from skidpad.core.registry import Source
+from skidpad.core.objects.registry import Source
 from skidpad.core.run import AdasDriver, Function, run_from_plain
 from skidpad.core.specs import PointSensorSpec
 from skidpad.core.vocabulary import Outcome

@@ -10,8 +10,8 @@ import pytest
 
 from skidpad.core.errors import ConfigError, FileError, StackError
 from skidpad.core.frames import CameraImage, LidarPoints, RadarPoints, SensorFrame
-from skidpad.core.geodesy import EARTH_RADIUS
 from skidpad.core.geometry import Pose
+from skidpad.core.maths.geodesy import EARTH_RADIUS
 from skidpad.core.states import EgoEstimate
 from skidpad.roads.bundled import load_map
 from skidpad.stack.agents import load_agent

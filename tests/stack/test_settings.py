@@ -12,7 +12,7 @@ from skidpad.cli.main import app, main
 from skidpad.core.errors import ConfigError, FileError, StackError
 from skidpad.core.geometry import Pose
 from skidpad.core.run import Function
-from skidpad.core.settings import (
+from skidpad.core.settings.parts import (
     NAMES,
     PART_OF,
     PROFILES,
@@ -22,8 +22,8 @@ from skidpad.core.settings import (
     load_profile,
     parse_assignments,
 )
+from skidpad.core.settings.stack import Lookahead
 from skidpad.core.specs import LidarSpec, PointSensorSpec, RadarSpec
-from skidpad.core.stack_settings import Lookahead
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.vocabulary import GripModel
 from skidpad.stack.adas import AdasConfig

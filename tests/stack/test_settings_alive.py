@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from skidpad.campaign.driving.run_setup import recovery_settings, stage_of
 from skidpad.campaign.recipes.matrix import metric_settings
 from skidpad.campaign.runs.run import run
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.geometry import Pose
 from skidpad.core.run import RunSpec
-from skidpad.core.settings import NAMES, Settings
+from skidpad.core.settings.parts import NAMES, Settings
 from skidpad.core.setup import DT
 from skidpad.core.specs import LidarSpec
 from skidpad.core.states import ContactEvent, VehicleCommand
-from skidpad.core.surface import SurfacePatch
 from skidpad.core.vocabulary import Control, SemanticClass, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.evidence.drive.prepared import prepare

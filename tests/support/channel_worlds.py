@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from skidpad.core.channels import ChannelFrame, TruthFrame
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 
 CAR = np.array([[2.25, 0.9], [-2.25, 0.9], [-2.25, -0.9], [2.25, -0.9]])
 STEP = 0.1

@@ -6,7 +6,7 @@ from typing import Any
 
 from numba.core.dispatcher import Dispatcher
 
-from skidpad.core.refcounts import (
+from skidpad.core.kernels.refcounts import (
     COUNTING,
     FUNCTION,
     is_runtime,

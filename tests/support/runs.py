@@ -10,7 +10,7 @@ from msgspec import structs
 from skidpad.campaign.cells.grip import template
 from skidpad.campaign.channels.routes import driven_routes
 from skidpad.core.run import AdasDriver, ChannelCrew, Roads, RunSpec, Scenario
-from skidpad.core.settings import Settings, load_profile
+from skidpad.core.settings.parts import Settings, load_profile
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import find_weather

@@ -10,7 +10,7 @@ import numpy as np
 
 from skidpad.core.frames import CameraImage, RadarPoints, Segments, SensorFrame
 from skidpad.core.geometry import Pose, wrap_angle
-from skidpad.core.jit import Held, hold
+from skidpad.core.kernels.jit import Held, hold
 from skidpad.core.specs import CameraSpec, Modality, RadarSpec
 from skidpad.core.states import EgoEstimate
 from skidpad.core.vocabulary import LightState, SemanticClass, Supervision

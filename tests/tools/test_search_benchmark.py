@@ -3,7 +3,7 @@
 import pytest
 
 import search_benchmark as bench
-from skidpad.core.space import Choice, Space, Uniform, Variable
+from skidpad.core.maths.space import Choice, Space, Uniform, Variable
 from skidpad.recording.campaign.searches import Trial
 
 SPACE = Space((Variable("x", Uniform(0.0, 10.0)), Variable("who", Choice(("car", "van")))))

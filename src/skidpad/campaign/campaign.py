@@ -22,8 +22,8 @@ from skidpad.campaign.recipes.recipe import Driven, M, Recipe, T, Task, cell_of
 from skidpad.campaign.user_files import keep_files
 from skidpad.campaign.workers.worker import Finished, Job, Runner
 from skidpad.core.errors import ConfigError, require_range
+from skidpad.core.text.wording import count_text
 from skidpad.core.vocabulary import Outcome
-from skidpad.core.wording import count_text
 from skidpad.evidence.statistics import clopper_pearson
 from skidpad.recording.campaign.ledger import (
     DAMAGED,

@@ -21,7 +21,7 @@ from skidpad.core.run import (
     Friction,
 )
 from skidpad.core.run import Scenario as Course
-from skidpad.core.settings import load_profile
+from skidpad.core.settings.parts import load_profile
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import GripModel

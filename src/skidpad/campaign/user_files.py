@@ -12,8 +12,8 @@ from pathlib import Path
 from msgspec import structs
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.jit import user_cache
-from skidpad.core.reading import is_file
+from skidpad.core.files.reading import is_file
+from skidpad.core.kernels.jit import user_cache
 from skidpad.core.run import Edges, Roads, Route, RunSpec
 from skidpad.recording.files import write_bytes
 from skidpad.roads.bundled import KEPT, bundled_maps, kept_name, load_map, map_file

@@ -40,7 +40,7 @@ from skidpad.cli.scenarios.play import play, play_folder
 from skidpad.cli.scenarios.risk import risk
 from skidpad.cli.scenarios.search import search
 from skidpad.core.errors import InputError, SkidpadError
-from skidpad.core.told import clean
+from skidpad.core.text.told import clean
 
 LONGEST = 100_000  # characters of what is wrong
 

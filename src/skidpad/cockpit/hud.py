@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from skidpad.campaign.driving.loop import Moment
 from skidpad.campaign.takeover.desk import Desk
-from skidpad.core.constants import G
 from skidpad.core.geometry import kmh_from_mps
 from skidpad.core.inputs import Beam
+from skidpad.core.maths.constants import G
 from skidpad.core.vocabulary import Supervision, Tier
 from skidpad.stack.perception.radar import velocity_limit
 

@@ -9,7 +9,7 @@ from skidpad.cockpit.channel_source import ChannelSource, weather_of
 from skidpad.cockpit.replay import RecordedRun
 from skidpad.cockpit.source import Source
 from skidpad.core.errors import ConfigError
-from skidpad.core.names import path_part
+from skidpad.core.files.names import path_part
 from skidpad.core.run import ActorMode, Passenger, RunSpec, Scenario
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.recording.hazards.records import TEXT_FILE, HazardRecord, read_hazards

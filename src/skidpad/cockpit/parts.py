@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from skidpad.core.registry import Registry
+from skidpad.core.objects.registry import Registry
 from skidpad.core.run import AdasDriver, RunSpec, Scenario
 from skidpad.core.simulator import BACKENDS
 from skidpad.physics.presets import WEATHERS

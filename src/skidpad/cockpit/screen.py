@@ -17,11 +17,11 @@ from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.marks import LightAhead, Marks, marks_of, patch_marks
 from skidpad.cockpit.studio import FOR_PEOPLE, MAIN, Looks, Studio, View, plane
 from skidpad.cockpit.words import Link
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Outside
 from skidpad.core.setup import DT
 from skidpad.core.states import ActorTable
-from skidpad.core.surface import SurfacePatch
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.surface_outlines import outline_patches
 from skidpad.sensors.finish.extras import Extra

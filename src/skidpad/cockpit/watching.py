@@ -16,7 +16,7 @@ import msgspec
 from skidpad.campaign.recipes.recipe import cell_of
 from skidpad.cockpit.serving import has_screen
 from skidpad.core.errors import FileError, InputError
-from skidpad.core.names import inside
+from skidpad.core.files.names import inside
 from skidpad.core.vocabulary import ENDED, Outcome
 from skidpad.evidence.statistics import clopper_pearson
 from skidpad.pages.server import Place, Server

@@ -1,1 +1,1 @@
-"""Core: the words that all houses share. It imports no other house."""
+"""Core: the words that all packages share. It imports no other package of Skidpad."""

@@ -17,7 +17,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from skidpad.core.told import clean
+from skidpad.core.text.told import clean
 
 
 class SkidpadError(Exception):

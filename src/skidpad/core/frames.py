@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats32
-from skidpad.core.slots import fill_slots
+from skidpad.core.objects.slots import fill_slots
 from skidpad.core.states import ContactEvent, EgoEstimate, LaneInvasion
 from skidpad.core.vocabulary import LightState, Supervision
 

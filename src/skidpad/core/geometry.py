@@ -8,7 +8,7 @@ from math import atan2, cos, pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.slots import fill_slots
+from skidpad.core.objects.slots import fill_slots
 
 Array = NDArray[np.float64]
 

@@ -14,13 +14,13 @@ from typing import Annotated, Any
 import msgspec
 from msgspec import Meta, Struct
 
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import ConfigError, FileError, require_range
-from skidpad.core.names import path_part, slug
-from skidpad.core.setting import Plain
-from skidpad.core.settings import Settings, load_profile
+from skidpad.core.files.names import path_part, slug
+from skidpad.core.settings.parts import Settings, load_profile
+from skidpad.core.settings.setting import Plain
 from skidpad.core.simulator import BackendChoice, BackendKind
-from skidpad.core.surface import SurfacePatch
-from skidpad.core.told import on_a_line
+from skidpad.core.text.told import on_a_line
 from skidpad.core.vocabulary import (
     Bodywork,
     Govern,

@@ -10,8 +10,7 @@ from skidpad.core.channels import ChannelView
 from skidpad.core.errors import StackError
 from skidpad.core.frames import CameraImage, GnssFix, ImuReading, LidarPoints, SensorFrame
 from skidpad.core.geometry import Pose
-from skidpad.core.registry import Registry, load_factory
-from skidpad.core.sight import DriverView
+from skidpad.core.objects.registry import Registry, load_factory
 from skidpad.core.specs import (
     AIR_THERMOMETER,
     GNSS,
@@ -24,6 +23,7 @@ from skidpad.core.specs import (
     LidarSpec,
     PointSensorSpec,
 )
+from skidpad.core.traffic.sight import DriverView
 
 
 class AnySpec(Protocol):

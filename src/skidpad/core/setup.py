@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from skidpad.core.environment.lidar_effects import LidarEffects
+from skidpad.core.environment.surface import SurfacePatch
+from skidpad.core.environment.tyres import REFERENCE
 from skidpad.core.geometry import Pose
-from skidpad.core.lidar_effects import LidarEffects
-from skidpad.core.slots import fill_slots
+from skidpad.core.objects.slots import fill_slots
 from skidpad.core.specs import SensorSpec
 from skidpad.core.states import VehicleCommand
-from skidpad.core.surface import SurfacePatch
-from skidpad.core.tyres import REFERENCE
 from skidpad.core.vocabulary import (
     AntiLock,
     Bodywork,

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import msgspec
 from msgspec import Meta, Struct
 
-from skidpad.core.registry import Registry, load_factory
+from skidpad.core.objects.registry import Registry, load_factory
 
 
 class BackendKind:

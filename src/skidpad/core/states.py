@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
 from skidpad.core.geometry import Pose
-from skidpad.core.slots import fill_slots
+from skidpad.core.objects.slots import fill_slots
 from skidpad.core.vocabulary import DetectionStatus, LightSource, LightState, Tier
 
 

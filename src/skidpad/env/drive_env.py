@@ -19,7 +19,7 @@ from skidpad.campaign.runs.checkpoints import RunCheckpoint
 from skidpad.campaign.runs.run import OpenRun, Run
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.run import Roads, RunSpec, StackDriver
-from skidpad.core.settings import load_profile
+from skidpad.core.settings.parts import load_profile
 from skidpad.core.vocabulary import (
     GripModel,
     RelocationReason,

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 from math import isfinite, nan
 from typing import Any
 
-from skidpad.core.constants import G
 from skidpad.core.errors import require_range
 from skidpad.core.frames import SensorFrame
+from skidpad.core.maths.constants import G
 from skidpad.core.sensor_types import read_sensor
 from skidpad.core.setup import DT
 from skidpad.core.specs import (

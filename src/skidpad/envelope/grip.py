@@ -12,7 +12,7 @@ from collections import deque
 from dataclasses import dataclass
 from math import cos, exp, sqrt
 
-from skidpad.core.constants import G
+from skidpad.core.maths.constants import G
 from skidpad.envelope.belief import CAUTION, COLD_C, GripBelief, prior_of, quantile
 from skidpad.envelope.signals import BRAKE_BAR, CarSignals
 

@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from math import radians
 from typing import NamedTuple
 
-from skidpad.core.constants import G
-from skidpad.core.randomness import stream
+from skidpad.core.maths.constants import G
+from skidpad.core.maths.randomness import stream
 from skidpad.core.states import EgoEstimate, VehicleCommand
 
 MILLI_G = G / 1000.0

@@ -17,7 +17,7 @@ import polars as pl
 
 from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError
-from skidpad.core.wording import count_text
+from skidpad.core.text.wording import count_text
 from skidpad.evidence.comparisons import Flaw, parse_comparison
 from skidpad.evidence.contrasts import NOT_RUN
 from skidpad.evidence.statistics import (

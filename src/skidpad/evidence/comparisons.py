@@ -8,7 +8,7 @@ from collections.abc import Callable
 from enum import Enum
 
 from skidpad.core.errors import ConfigError, require_choice
-from skidpad.core.told import describe_value
+from skidpad.core.text.told import describe_value
 
 OPERATORS: dict[str, Callable[[float, float], bool]] = {
     ">=": operator.ge,

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from math import inf
 
-from skidpad.core.wording import count_text
+from skidpad.core.text.wording import count_text
 from skidpad.evidence.comparisons import parse_comparison
 from skidpad.evidence.pairs import Pair, pairs
 from skidpad.recording.run.log import RunLog

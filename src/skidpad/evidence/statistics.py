@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from skidpad.core.arrays import Floats
 from skidpad.core.errors import require_range
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.evidence.limits import CONFIDENCE, count_limits, mean_widths, skew_limits
 
 UNITS_FROM = 8  # runs, seeds, segments or vehicles, below which no limits are given

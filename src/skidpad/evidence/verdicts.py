@@ -16,7 +16,7 @@ from math import ceil
 
 import polars as pl
 
-from skidpad.core.wording import count_text
+from skidpad.core.text.wording import count_text
 from skidpad.evidence.contrasts import Contrast, Criterion, drop_unfinished
 from skidpad.evidence.statistics import EVER_SIGNIFICANT, holm, interval_text, p_text
 

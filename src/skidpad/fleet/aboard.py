@@ -18,7 +18,7 @@ import httpx
 import msgspec
 
 from skidpad.core.errors import BackendError, FileError
-from skidpad.core.told import on_a_line
+from skidpad.core.text.told import on_a_line
 from skidpad.fleet.alerting.keeping import AlertText
 from skidpad.fleet.alerting.receiver import Receiver, Verdict
 from skidpad.fleet.rounds import Rounds

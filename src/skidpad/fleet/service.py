@@ -11,8 +11,8 @@ from threading import Lock
 
 from sqlalchemy import Engine
 
+from skidpad.core.environment.localities import Locate
 from skidpad.core.errors import OutputError
-from skidpad.core.localities import Locate
 from skidpad.fleet.alerting.dispatcher import Dispatcher
 from skidpad.fleet.alerting.hub import Hub
 from skidpad.fleet.alerting.orders import Signer

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from skidpad.core.errors import FileError, OutputError
-from skidpad.core.told import on_a_line
+from skidpad.core.text.told import on_a_line
 from skidpad.fleet.identity import digest
 from skidpad.fleet.words import Kind
 from skidpad.recording.files import write_bytes

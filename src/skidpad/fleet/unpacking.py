@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 
-from skidpad.core.told import on_a_line
+from skidpad.core.text.told import on_a_line
 from skidpad.fleet.words import Limits, Refused
 
 GZIP = 16 + zlib.MAX_WBITS  # window bits by which zlib reads gzip and nothing else

@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from skidpad.core.reading import decode_json, read_bytes
+from skidpad.core.files.reading import decode_json, read_bytes
 from skidpad.live.settings import Flow
 from skidpad.recording.files import write_bytes
 

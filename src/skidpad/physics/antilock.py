@@ -13,7 +13,7 @@ ours (assumptions).
 from __future__ import annotations
 
 from skidpad.core.arrays import Floats
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 
 # Columns of what the control remembers of a vehicle; the first three hold FL, FR, RL, RR
 PRESSURE, RIM, PHASE = 0, 4, 8  # share of the torque asked for, m/s, one of the phases

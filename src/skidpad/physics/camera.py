@@ -17,7 +17,7 @@ from math import exp, hypot, log2
 import numpy as np
 
 from skidpad.core.errors import require_range
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 from skidpad.core.weather import Weather
 from skidpad.physics.droplets import drop_extinction, rain_drops
 from skidpad.physics.optics import transmission

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from skidpad.core.arrays import Floats, Ints
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics.overlap import Boxes, box_box, box_segment, clipped_length, corners_room
 from skidpad.physics.segments import STRAIGHT, Segments, candidates

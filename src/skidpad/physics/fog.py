@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from skidpad.core.lidar_effects import LidarFog
+from skidpad.core.environment.lidar_effects import LidarFog
 from skidpad.physics.optics import LidarAir
 
 

@@ -20,10 +20,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.environment.tyres import REFERENCE, Tyres, find_tyres
 from skidpad.core.errors import ConfigError
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.setup import Setup
-from skidpad.core.tyres import REFERENCE, Tyres, find_tyres
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 

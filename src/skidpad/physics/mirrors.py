@@ -14,7 +14,7 @@ from cmath import exp, sqrt
 from math import exp as real_exp
 from math import pi
 
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 
 LIGHT = 299_792_458.0  # m/s
 EPSILON_0 = 8.8541878128e-12  # F/m, CODATA 2018

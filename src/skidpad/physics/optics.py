@@ -10,7 +10,7 @@ from math import exp, inf, log, log10, radians, sin, sqrt
 from typing import NamedTuple
 
 from skidpad.core.inputs import Beam
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 from skidpad.core.weather import Weather
 from skidpad.physics.droplets import (
     FOG_BACKSCATTER,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from skidpad.core.arrays import Floats
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 
 Overlap = tuple[bool, float, float, float, float, float]  # touching, x, y, nx, ny, depth
 

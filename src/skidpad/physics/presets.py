@@ -11,8 +11,8 @@ from typing import Any
 import msgspec
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.reading import convert_plain, decode_yaml, read_bytes
-from skidpad.core.registry import Registry
+from skidpad.core.files.reading import convert_plain, decode_yaml, read_bytes
+from skidpad.core.objects.registry import Registry
 from skidpad.core.weather import Weather
 
 MATRIX, GRIP = "matrix", "grip"

@@ -22,8 +22,8 @@ from math import cos, pi, sin
 import numpy as np
 
 from skidpad.core.arrays import Floats
-from skidpad.core.constants import G
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
+from skidpad.core.maths.constants import G
 from skidpad.physics.antilock import MEMORY as FIRST
 from skidpad.physics.types import VehicleType
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats, Ints
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 
 CELL = 20.0  # m, a few car lengths
 CELLS_MAX = 250_000  # larger maps get larger cells

@@ -16,8 +16,8 @@ from __future__ import annotations
 from math import sqrt
 
 from skidpad.core.arrays import Floats
-from skidpad.core.constants import G
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
+from skidpad.core.maths.constants import G
 from skidpad.physics.rollover import MEMORY as FIRST
 from skidpad.physics.stability import (
     A_YAW_CUT,

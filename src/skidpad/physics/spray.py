@@ -13,7 +13,7 @@ what that one leaves, which is in the shares.
 
 from __future__ import annotations
 
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 
 TRACK = 0.115  # of the body's width, one tyre
 V_FIRST, V_FULL, SHARE_FULL = (

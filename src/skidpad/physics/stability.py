@@ -16,8 +16,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from skidpad.core.constants import G
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
+from skidpad.core.maths.constants import G
 
 V_LEAST = 20.0 / 3.6  # m/s
 RATE_SHARE = 0.85  # of mu g / v, most yaw rate that is wanted

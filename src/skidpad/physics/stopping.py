@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.constants import G
+from skidpad.core.environment.tyres import REFERENCE, find_tyres
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, mps_from_kmh
-from skidpad.core.tyres import REFERENCE, find_tyres
+from skidpad.core.maths.constants import G
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.fleet import Fleet

@@ -9,9 +9,9 @@ from math import radians
 
 import msgspec
 
-from skidpad.core.constants import G
+from skidpad.core.environment.tyres import find_tyres
 from skidpad.core.errors import ConfigError, require_choice, require_range
-from skidpad.core.tyres import find_tyres
+from skidpad.core.maths.constants import G
 from skidpad.core.vocabulary import ActorKind
 
 TIRE_FRICTION_REFERENCE = 3.5  # the blueprints' own tire_friction, at which mu is mu_ref (B-033)

@@ -13,7 +13,7 @@ Chrono, Sedan_Pac02Tire.tir).
 
 from __future__ import annotations
 
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 
 SLIDE_SHARE = 0.88  # sliding to peak force; our assumption
 FALL_OFF = 1.0 - SLIDE_SHARE

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
-from skidpad.core.constants import G
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
+from skidpad.core.maths.constants import G
 from skidpad.core.states import ActorStates
 from skidpad.physics.antilock import PRESSURE, regulate
 from skidpad.physics.params import STIFFNESS, WATER, VehicleParams, WheelStates

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from skidpad.core.arrays import Floats, Ints
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics.types import VehicleType
 

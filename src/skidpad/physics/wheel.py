@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import sqrt
 from typing import NamedTuple
 
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 from skidpad.physics.tyre import (
     STIFFNESS_ALONG,
     V_SLIP_MIN,

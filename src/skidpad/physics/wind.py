@@ -21,7 +21,7 @@ from math import cos, exp, sin, sqrt
 import numpy as np
 
 from skidpad.core.arrays import Floats
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.core.setup import Wind
 from skidpad.physics.types import VehicleType
 

@@ -16,7 +16,7 @@ import numpy as np
 import polars as pl
 
 from skidpad.core.errors import FileError, OutputError
-from skidpad.core.reading import UNUSABLE, is_file, read_bytes, unusable
+from skidpad.core.files.reading import UNUSABLE, is_file, read_bytes, unusable
 
 T = TypeVar("T")
 

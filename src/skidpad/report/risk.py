@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from math import ceil, log
 from pathlib import Path
 
-from skidpad.core.disturbance import actor_of_draw, name_draw, parse_disturbance
-from skidpad.core.wording import count_text
+from skidpad.core.text.wording import count_text
+from skidpad.core.traffic.disturbance import actor_of_draw, name_draw, parse_disturbance
 from skidpad.recording.campaign.risks import (
     RISK_RUNS,
     SCALES,

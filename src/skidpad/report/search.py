@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import ks_2samp
 
-from skidpad.core.space import Choice, Normal, Variable
-from skidpad.core.wording import count_text
+from skidpad.core.maths.space import Choice, Normal, Variable
+from skidpad.core.text.wording import count_text
 from skidpad.recording.campaign.searches import (
     Findings,
     Search,

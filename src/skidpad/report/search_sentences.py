@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from skidpad.core.run import AdasDriver, DriverSpec
-from skidpad.core.wording import count_text
+from skidpad.core.text.wording import count_text
 from skidpad.recording.campaign.searches import Change, Group, Hazard, Trial
 
 

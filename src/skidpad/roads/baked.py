@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.errors import FileError
-from skidpad.core.reading import UNUSABLE, read_arrays, read_bytes, unusable
+from skidpad.core.files.reading import UNUSABLE, read_arrays, read_bytes, unusable
 from skidpad.core.setup import LanePosition
-from skidpad.core.told import describe_value
+from skidpad.core.text.told import describe_value
 from skidpad.roads.checked import EXTENT, check_arrays
 from skidpad.roads.lanes import LaneSamples, LaneTable, SignalTable
 from skidpad.roads.roadside import (

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 
 from msgspec import structs
 
+from skidpad.core.environment.surface import SurfacePatch, place_in_file
 from skidpad.core.errors import ConfigError
-from skidpad.core.surface import SurfacePatch, place_in_file
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.roadside import Bridge
 

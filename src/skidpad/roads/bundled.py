@@ -6,7 +6,7 @@ from functools import lru_cache
 from glob import escape
 from pathlib import Path
 
-from skidpad.core.reading import read_bytes
+from skidpad.core.files.reading import read_bytes
 from skidpad.roads.baked import BakedMap, load_baked
 from skidpad.roads.map_files import FOLDER, KEPT, bundled_maps, kept_name, map_file, map_name
 from skidpad.roads.queries import RoadMap

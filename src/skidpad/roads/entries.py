@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import Held, kernel
+from skidpad.core.kernels.jit import Held, kernel
 from skidpad.roads import kernels
 from skidpad.roads.kernels import LaneArrays
 

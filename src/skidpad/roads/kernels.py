@@ -9,7 +9,7 @@ from math import atan2, ceil, floor, inf, nan, pi, sqrt
 from typing import NamedTuple
 
 from skidpad.core.arrays import Floats, Ints32
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 
 REACH = 20.0  # m, beyond this there is no lane
 Z_WEIGHT = 2.0  # heights count double, so that a road 8 m above is 16 m away

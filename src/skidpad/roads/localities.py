@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from skidpad.core.localities import Locality, RoadKind, kind_of_limit
+from skidpad.core.environment.localities import Locality, RoadKind, kind_of_limit
 from skidpad.roads.queries import RoadMap
 
 NEAR = 20.0  # m beyond which a point is on no road

@@ -10,10 +10,10 @@ from hashlib import sha256
 from pathlib import Path
 
 from skidpad.core.errors import ConfigError, FileError
-from skidpad.core.names import path_part
-from skidpad.core.reading import is_file
-from skidpad.core.registry import Registry
-from skidpad.core.told import describe_value
+from skidpad.core.files.names import path_part
+from skidpad.core.files.reading import is_file
+from skidpad.core.objects.registry import Registry
+from skidpad.core.text.told import describe_value
 
 FOLDER = Path(__file__).parent / "maps"
 KEPT = "maps"  # in a campaign's folder: maps/<content>/<name>.xodr
@@ -88,7 +88,7 @@ def _write_made_map(map: str) -> Path:
 
     ConfigError for a setting too many or missing, and where the package's code fails.
     """
-    from skidpad.core.jit import user_cache  # numba comes with it
+    from skidpad.core.kernels.jit import user_cache  # numba comes with it
 
     name, _, setting = map.partition(":")
     source = MAPS.get(name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isfinite, radians
 
 from skidpad.core.errors import ConfigError, MissingExtra
-from skidpad.core.told import describe_value
+from skidpad.core.text.told import describe_value
 
 EARTH_RADIUS = 6_378_137.0  # m, equator of WGS 84, for maps without a projection
 # What places on the ground depend on. Heights (geoid grids, vunits) are the map's own, and files are

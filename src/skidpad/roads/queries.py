@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
-from skidpad.core.jit import Held, hold
+from skidpad.core.kernels.jit import Held, hold
+from skidpad.core.objects.slots import fill_slots
 from skidpad.core.setup import LanePosition
-from skidpad.core.slots import fill_slots
 from skidpad.roads import entries, kernels
 from skidpad.roads.baked import BakedMap
 from skidpad.roads.edge import RoadEdge

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from skidpad.core.constants import G
+from skidpad.core.maths.constants import G
 from skidpad.roads.lanes import LaneKind, SignalKind
 from skidpad.roads.queries import RoadMap
 

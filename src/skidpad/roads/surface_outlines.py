@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from skidpad.core.arrays import Floats
-from skidpad.core.surface import PATH_OFFSET, PATH_WIDTH, SurfacePatch
+from skidpad.core.environment.surface import PATH_OFFSET, PATH_WIDTH, SurfacePatch
 from skidpad.roads.bridges import spread_over_bridges
 from skidpad.roads.queries import RoadMap
 

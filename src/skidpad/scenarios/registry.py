@@ -12,9 +12,9 @@ from math import inf, isfinite
 from typing import Any
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.registry import Registry
+from skidpad.core.objects.registry import Registry
 from skidpad.core.states import VehicleCommand
-from skidpad.core.told import describe_value
+from skidpad.core.text.told import describe_value
 from skidpad.scenarios.reading.document import Node
 from skidpad.scenarios.reading.findings import Finding, Kind
 from skidpad.scenarios.scene import Scene

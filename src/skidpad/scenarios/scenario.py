@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from skidpad.core.errors import ConfigError, FileError, NoLaneError
-from skidpad.core.reading import is_file
+from skidpad.core.files.reading import is_file
 from skidpad.recording.run.staging import FileCriterion
 from skidpad.roads.bundled import bundled_maps, load_map
 from skidpad.roads.map_files import is_made_map, map_file

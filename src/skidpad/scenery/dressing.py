@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from skidpad.core.geometry import footprint
-from skidpad.core.randomness import stream, stream_key
+from skidpad.core.maths.randomness import stream, stream_key
 from skidpad.core.vocabulary import Scenery, SemanticClass
 from skidpad.roads.lanes import LaneKind, LaneSamples, LaneTable, Marking, SignalKind, SignalTable
 from skidpad.roads.queries import RoadMap

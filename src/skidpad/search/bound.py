@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Flags, Floats
-from skidpad.core.constants import G
+from skidpad.core.maths.constants import G
 from skidpad.evidence.encounters import overlap_along
 
 Beyond = Callable[[Floats, Floats, Floats], Floats]  # x, y, z: m beyond the road's edge, 0 on it

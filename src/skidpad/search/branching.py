@@ -16,11 +16,11 @@ from msgspec import structs
 from skidpad.campaign.runs.checkpoints import RunCheckpoint
 from skidpad.campaign.runs.run import OpenRun
 from skidpad.core.arrays import Floats
-from skidpad.core.disturbance import actor_of_draw
 from skidpad.core.errors import InputError
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
+from skidpad.core.maths.space import Space, Value
 from skidpad.core.setup import DT
-from skidpad.core.space import Space, Value
+from skidpad.core.traffic.disturbance import actor_of_draw
 from skidpad.core.vocabulary import Outcome
 from skidpad.recording.campaign.risks import Repetition, Risk
 from skidpad.recording.campaign.searches import Trial

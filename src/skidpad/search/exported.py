@@ -9,7 +9,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from skidpad.core.errors import FileError
-from skidpad.core.space import Uniform, Variable
+from skidpad.core.maths.space import Uniform, Variable
 from skidpad.scenarios.reading.entities import GHOST
 
 Element = ElementTree.Element

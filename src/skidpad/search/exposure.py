@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.reading import decode_yaml, read_bytes
-from skidpad.core.space import Variable
-from skidpad.core.told import describe_value
+from skidpad.core.files.reading import decode_yaml, read_bytes
+from skidpad.core.maths.space import Variable
+from skidpad.core.text.told import describe_value
 from skidpad.recording.campaign.risks import Rate
 from skidpad.search.space import parse_variable
 

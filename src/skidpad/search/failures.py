@@ -13,7 +13,7 @@ from msgspec import structs
 
 from skidpad.campaign.runs.play import run_to
 from skidpad.campaign.workers.worker import Runner
-from skidpad.core.space import Space
+from skidpad.core.maths.space import Space
 from skidpad.recording.campaign.searches import (
     CHOICES,
     FOUND,

@@ -7,7 +7,7 @@ from math import sqrt
 from pathlib import Path
 from xml.etree import ElementTree
 
-from skidpad.core.space import Choice, Law, Normal, Space, Uniform, Variable
+from skidpad.core.maths.space import Choice, Law, Normal, Space, Uniform, Variable
 from skidpad.recording.campaign.searches import Trial
 from skidpad.recording.files import write_bytes
 from skidpad.scenarios.reading.distributions import read_weights, scenario_of_choices

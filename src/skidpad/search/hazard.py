@@ -18,10 +18,10 @@ from msgspec import structs
 
 from skidpad.campaign.runs.run import run
 from skidpad.core.errors import ConfigError, FileError
-from skidpad.core.reading import read_bytes
+from skidpad.core.files.reading import read_bytes
+from skidpad.core.maths.space import Choice, Space, Variable
 from skidpad.core.run import Passenger, RunSpec, Scenario
-from skidpad.core.space import Choice, Space, Variable
-from skidpad.core.told import on_a_line
+from skidpad.core.text.told import on_a_line
 from skidpad.recording.campaign.searches import Group, Hazard, Search, Trial
 from skidpad.recording.files import write_bytes
 from skidpad.recording.hazards.records import (

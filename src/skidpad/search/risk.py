@@ -16,7 +16,7 @@ from scipy.special import ndtr
 from skidpad.campaign.workers.worker import Job, Runner
 from skidpad.core.arrays import Floats
 from skidpad.core.errors import BackendError
-from skidpad.core.space import Choice, Variable
+from skidpad.core.maths.space import Choice, Variable
 from skidpad.recording.campaign.risks import (
     RISK_FOUND,
     RISK_RUNS,

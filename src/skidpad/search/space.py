@@ -9,11 +9,17 @@ from math import ceil
 
 from msgspec import structs
 
-from skidpad.core.disturbance import KNOT_S, PREFIX, actor_of_draw, name_draw, parse_disturbance
 from skidpad.core.errors import ConfigError, require_choice
+from skidpad.core.maths.space import Choice, Law, Normal, Space, Uniform, Value, Variable
 from skidpad.core.run import RunSpec, Scenario
-from skidpad.core.space import Choice, Law, Normal, Space, Uniform, Value, Variable
-from skidpad.core.told import describe_value
+from skidpad.core.text.told import describe_value
+from skidpad.core.traffic.disturbance import (
+    KNOT_S,
+    PREFIX,
+    actor_of_draw,
+    name_draw,
+    parse_disturbance,
+)
 from skidpad.core.weather import RANGES, Weather
 from skidpad.physics.presets import find_weather
 

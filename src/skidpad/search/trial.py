@@ -11,8 +11,8 @@ from msgspec import structs
 from skidpad.campaign.runs.run import Run, run
 from skidpad.core.errors import InputError
 from skidpad.core.geometry import Pose, kmh_from_mps
+from skidpad.core.maths.space import Space
 from skidpad.core.run import REFERENCE, ReferenceDriver, RunSpec
-from skidpad.core.space import Space
 from skidpad.core.vocabulary import Outcome
 from skidpad.evidence.drive.severity import Contact
 from skidpad.recording.campaign.searches import FRONT, Trial

@@ -8,10 +8,10 @@ from math import cos, pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.constants import G
 from skidpad.core.frames import GnssFix, ImuReading
-from skidpad.core.geodesy import geolocation
 from skidpad.core.geometry import Pose
+from skidpad.core.maths.constants import G
+from skidpad.core.maths.geodesy import geolocation
 from skidpad.core.states import ActorStates
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from skidpad.core.jit import inner_kernel
-from skidpad.core.splitmix import GOLDEN, scrambled, unit
+from skidpad.core.kernels.jit import inner_kernel
+from skidpad.core.kernels.splitmix import GOLDEN, scrambled, unit
 
 _TICK = np.uint64(0xD1342543DE82EF95)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import floor
 
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.core.specs import PointSensorSpec
 from skidpad.physics.grip import rain_rate
 from skidpad.sensors.requested import SensorHost

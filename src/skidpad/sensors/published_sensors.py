@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from skidpad.core.lefthanded import pose_from_carla
+from skidpad.core.maths.lefthanded import pose_from_carla
 from skidpad.core.specs import CameraSpec, Modality, PointSensorSpec, RadarSpec, SensorSpec
 
 

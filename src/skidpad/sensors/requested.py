@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from skidpad.core.channels import ChannelView
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.frames import CameraImage, GnssFix, ImuReading, LidarPoints
-from skidpad.core.randomness import stream_key
+from skidpad.core.maths.randomness import stream_key
 from skidpad.core.sensor_types import Measure, find_sensor_type
 from skidpad.core.setup import Setup
-from skidpad.core.sight import DriverView
 from skidpad.core.specs import (
     CameraSpec,
     ChannelSpec,
@@ -27,6 +26,7 @@ from skidpad.core.specs import (
     SensorSpec,
 )
 from skidpad.core.states import ActorStates, ActorTable
+from skidpad.core.traffic.sight import DriverView
 from skidpad.core.vocabulary import LidarModel, LightState, RangeModel
 from skidpad.physics.fog import with_fog
 from skidpad.physics.grip import rain_rate, road_surface

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
 from skidpad.core.geometry import Pose
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.core.setup import ActorCommand, ActorSetup
 from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import Control, LightState

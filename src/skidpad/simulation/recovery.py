@@ -15,8 +15,8 @@ import numpy as np
 
 from skidpad.core.errors import require_range
 from skidpad.core.geometry import Pose, mps_from_kmh
-from skidpad.core.jit import Held, hold, kernel
-from skidpad.core.slots import fill_slots
+from skidpad.core.kernels.jit import Held, hold, kernel
+from skidpad.core.objects.slots import fill_slots
 from skidpad.core.states import ActorStates, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import (
     ActorKind,

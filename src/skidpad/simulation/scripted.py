@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 from msgspec import Struct
 
-from skidpad.core.constants import G
 from skidpad.core.errors import ConfigError
-from skidpad.core.jit import Held, hold, kernel
+from skidpad.core.kernels.jit import Held, hold, kernel
+from skidpad.core.maths.constants import G
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import ActorKind
 from skidpad.physics.types import VehicleType, vehicle_type, vehicle_types

@@ -11,10 +11,10 @@ from skidpad.core.errors import require_choice, require_range
 from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import kmh_from_mps
 from skidpad.core.run import Function
-from skidpad.core.settings import load_profile
+from skidpad.core.settings.parts import load_profile
+from skidpad.core.settings.stack import BranchChoice, CapScope, ResumeEnd, StackSettings
 from skidpad.core.setup import DT
 from skidpad.core.specs import SensorSpec
-from skidpad.core.stack_settings import BranchChoice, CapScope, ResumeEnd, StackSettings
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.vocabulary import DetectionStatus, LightState, Supervision, Tier
 from skidpad.roads.queries import RoadMap

@@ -16,12 +16,12 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.depthcode import bgra_from_inverse_depth
 from skidpad.core.errors import ConfigError, StackError
 from skidpad.core.frames import LidarPoints, SensorFrame
-from skidpad.core.geodesy import geolocation
 from skidpad.core.geometry import Pose
-from skidpad.core.lefthanded import (
+from skidpad.core.kernels.depthcode import bgra_from_inverse_depth
+from skidpad.core.maths.geodesy import geolocation
+from skidpad.core.maths.lefthanded import (
     mirror_value,
     pose_from_carla,
     pose_to_carla,

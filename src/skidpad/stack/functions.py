@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Protocol
 
 from skidpad.core.errors import ConfigError, StackError
 from skidpad.core.frames import SensorFrame
-from skidpad.core.registry import Registry
+from skidpad.core.objects.registry import Registry
 from skidpad.core.run import Function
 from skidpad.core.specs import SensorSpec
 from skidpad.core.states import VehicleCommand
-from skidpad.core.told import describe_value
+from skidpad.core.text.told import describe_value
 
 if TYPE_CHECKING:  # kernels come with it
     from skidpad.roads.queries import RoadMap

@@ -23,7 +23,7 @@ from skidpad.core.run import Function
 from skidpad.core.sensor_types import SENSORS, find_sensor_type
 from skidpad.core.specs import PointSensorSpec, SensorSpec
 from skidpad.core.states import StackReport, VehicleCommand
-from skidpad.core.told import clean, describe_value
+from skidpad.core.text.told import clean, describe_value
 from skidpad.stack.interface import Stack
 
 if TYPE_CHECKING:  # kernels come with it, and a name that is wrong is said before they load

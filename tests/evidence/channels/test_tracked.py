@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from skidpad.core.channels import Cycle
-from skidpad.core.constants import G
 from skidpad.core.errors import ConfigError
+from skidpad.core.maths.constants import G
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.choices import Profile
 from skidpad.evidence.channels.hazards import Signal

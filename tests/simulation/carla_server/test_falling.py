@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from skidpad.core.constants import G
 from skidpad.core.geometry import Pose
+from skidpad.core.maths.constants import G
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.methods import motion
 from skidpad.simulation.carla_server.options import ServerOptions

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from skidpad.core.constants import G
 from skidpad.core.geometry import Pose
+from skidpad.core.maths.constants import G
 from skidpad.physics.types import vehicle_type
 from skidpad.simulation.carla_server.actors.catalogue import load_catalogue
 from skidpad.simulation.carla_server.episode import Wanted

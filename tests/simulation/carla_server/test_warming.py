@@ -6,7 +6,7 @@ import numba
 import pytest
 
 from skidpad.core.geometry import Pose
-from skidpad.core.jit import is_kept
+from skidpad.core.kernels.jit import is_kept
 from skidpad.simulation.carla_server import warming
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.options import ServerOptions

@@ -10,11 +10,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.geometry import Pose
 from skidpad.core.setup import ActorCommand, ActorSetup, Setup, TrafficSetup
 from skidpad.core.states import VehicleCommand
-from skidpad.core.surface import SurfacePatch
 from skidpad.core.vocabulary import Control, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.physics.types import EGO_TYPE

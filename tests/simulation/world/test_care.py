@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from skidpad.campaign.bench.traffic import measure
 from skidpad.campaign.bench.traffic_options import TrafficBench
-from skidpad.core.constants import G
+from skidpad.core.maths.constants import G
 from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.states import ActorStates
 from skidpad.core.vocabulary import GripModel

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.setup import ActorSetup, LanePosition, Setup, TrafficSetup
 from skidpad.core.states import VehicleCommand
-from skidpad.core.surface import SurfacePatch
 from skidpad.core.vocabulary import Control
 from skidpad.core.weather import Weather
 from skidpad.physics.grip import Road

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from skidpad.core.environment.surface import SurfacePatch
+from skidpad.core.environment.tyres import find_tyres
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.geometry import Pose
 from skidpad.core.setup import ActorSetup, LanePosition, Setup
-from skidpad.core.surface import SurfacePatch
-from skidpad.core.tyres import find_tyres
 from skidpad.core.weather import Weather
 from skidpad.physics.grip import RoadSurface, physical_params, ratio_at, road_surface
 from skidpad.roads.bundled import FOLDER

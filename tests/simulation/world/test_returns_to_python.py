@@ -8,8 +8,8 @@ import pytest
 from msgspec import structs
 
 from skidpad.campaign.driving.run_setup import stage_of
-from skidpad.core.settings import load_profile
-from skidpad.core.surface import SurfacePatch
+from skidpad.core.environment.surface import SurfacePatch
+from skidpad.core.settings.parts import load_profile
 from skidpad.core.weather import Weather
 from skidpad.simulation.world.stage import build_world
 from support.runs import adas_run

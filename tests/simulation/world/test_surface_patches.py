@@ -8,9 +8,9 @@ import pytest
 from shapely.geometry import Point, Polygon
 
 from skidpad.campaign.driving.surfaces import read_surface
+from skidpad.core.environment.surface import SurfacePatch, present_patches
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.states import ActorStates
-from skidpad.core.surface import SurfacePatch, present_patches
 from skidpad.core.vocabulary import GripModel
 from skidpad.physics.grip import Road, grip_params, mu_at, physical_params, road_surface
 from skidpad.physics.presets import find_weather

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from skidpad.core.geometry import Pose
-from skidpad.core.settings import Settings
-from skidpad.core.stack_settings import CapScope, Lookahead, ResumeEnd, StackSettings
+from skidpad.core.settings.parts import Settings
+from skidpad.core.settings.stack import CapScope, Lookahead, ResumeEnd, StackSettings
 from skidpad.core.vocabulary import Tier
 from skidpad.stack.adas import AdasStack, ResumeProtocol, SpeedCaps
 from skidpad.stack.configurations import functions_of

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from skidpad.core.settings import Settings
-from skidpad.core.stack_settings import StackSettings
+from skidpad.core.settings.parts import Settings
+from skidpad.core.settings.stack import StackSettings
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.vocabulary import Tier
 from skidpad.stack.adas import AdasConfig, AdasStack

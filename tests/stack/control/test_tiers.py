@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from skidpad.core.stack_settings import StackSettings
+from skidpad.core.settings.stack import StackSettings
 from skidpad.core.vocabulary import Tier
 from skidpad.stack.configurations import functions_of
 from skidpad.stack.control.pid import DISTANCE_GAINS, SPEED_GAINS, Pid

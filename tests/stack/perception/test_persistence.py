@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from skidpad.core.stack_settings import RadarCloseCheck
+from skidpad.core.settings.stack import RadarCloseCheck
 from skidpad.core.vocabulary import DetectionStatus, Tier
 from skidpad.stack.adas import AdasStack
 from skidpad.stack.perception.fusion import MedianFilter

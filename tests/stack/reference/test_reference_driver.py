@@ -24,8 +24,8 @@ from reference_driver import (
 from skidpad.core.frames import RadarPoints, SensorFrame
 from skidpad.core.geometry import Pose
 from skidpad.core.setup import ActorCommand
-from skidpad.core.sight import DriverView, RoadLook, SeenActors
 from skidpad.core.states import EgoEstimate, VehicleCommand
+from skidpad.core.traffic.sight import DriverView, RoadLook, SeenActors
 from skidpad.core.vocabulary import LightState, Supervision
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.world.traffic.idm import Character, idm

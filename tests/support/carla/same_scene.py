@@ -12,7 +12,7 @@ import numpy as np
 
 from skidpad.core.frames import RadarPoints
 from skidpad.core.geometry import Pose
-from skidpad.core.lefthanded import pose_from_carla, pose_to_carla
+from skidpad.core.maths.lefthanded import pose_from_carla, pose_to_carla
 from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import Control, SensorLevel

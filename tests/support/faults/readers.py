@@ -278,7 +278,7 @@ def tell_story(path: Path) -> object:
 
 
 def words(path: Path) -> object:
-    from skidpad.core.settings import parse_assignments
+    from skidpad.core.settings.parts import parse_assignments
     from skidpad.evidence.compare import parse_rule
 
     kind, _, text = path.read_bytes().decode("utf-8", "replace").partition(" ")

@@ -14,7 +14,7 @@ from skidpad.campaign.runs.run import OpenRun
 from skidpad.campaign.runs.state_files import StateFiles
 from skidpad.campaign.stepping import Scenario
 from skidpad.core.run import Roads, RunSpec
-from skidpad.core.settings import load_profile
+from skidpad.core.settings.parts import load_profile
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.physics.presets import find_weather
 

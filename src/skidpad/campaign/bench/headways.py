@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from skidpad.core.space import STANDARD, Normal
+from skidpad.core.maths.space import STANDARD, Normal
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 QUANTILE_TOLERANCE = 0.15  # of the field's quantile (issue: at most 15 %)

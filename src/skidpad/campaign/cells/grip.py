@@ -13,7 +13,7 @@ from skidpad.campaign.cells.matrix import FIRST_SEED
 from skidpad.campaign.driving.drivers import STACK, find_driver
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import Friction, RunSpec, Scenario
-from skidpad.core.settings import load_profile
+from skidpad.core.settings.parts import load_profile
 from skidpad.core.vocabulary import GripModel, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.scenarios.variation import CUT_IN, CutIn, drawn_parameters, drawn_skill

@@ -18,7 +18,7 @@ from skidpad.core.run import (
     RunSpec,
     check_limits,
 )
-from skidpad.core.told import describe_value
+from skidpad.core.text.told import describe_value
 from skidpad.core.weather import RANGES, Weather
 from skidpad.stack.configurations import (
     CONFIGURATIONS,

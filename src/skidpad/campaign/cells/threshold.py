@@ -25,7 +25,7 @@ from skidpad.core.run import (
     RunSpec,
     Scenario,
 )
-from skidpad.core.told import describe_value
+from skidpad.core.text.told import describe_value
 from skidpad.core.vocabulary import GripModel, SensorLevel
 from skidpad.physics.grip import statistical_ratio
 from skidpad.physics.presets import preset

@@ -10,7 +10,7 @@ import numpy as np
 from skidpad.campaign.driving.run_setup import ego_model, setup_of
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.core.run import ChannelCrew, Route, RunSpec
 from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
 from skidpad.core.vocabulary import Control, Stratum, TrafficStart

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
+from skidpad.core.environment.surface import FRICTION, WATER_MM, SurfacePatch
 from skidpad.core.errors import ConfigError, FileError, MissingExtra, require_range
-from skidpad.core.surface import FRICTION, WATER_MM, SurfacePatch
-from skidpad.core.told import on_a_line
+from skidpad.core.text.told import on_a_line
 from skidpad.physics.grip import MU_REF
 
 ALONG, ACROSS = 2.0, 0.05  # m, between sections and between points of one

@@ -7,7 +7,7 @@ from math import inf, isfinite
 from typing import Any
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.sight import RoadLook
+from skidpad.core.traffic.sight import RoadLook
 from skidpad.scenarios.scene import Scene
 from skidpad.scenarios.traffic import V_UNKNOWN, lead_of
 from skidpad.stack.reference.caution import bend_speed, manner, speed_factor, too_fast

@@ -21,7 +21,7 @@ from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import Pose, kmh_from_mps, mps_from_kmh
 from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.states import ActorStates, ActorTable, EgoEstimate, VehicleCommand, WorldTruth
-from skidpad.core.told import describe_value
+from skidpad.core.text.told import describe_value
 from skidpad.core.vocabulary import RangeModel
 from skidpad.core.weather import Weather
 from skidpad.envelope.govern import EnvelopeSettings, govern

@@ -18,8 +18,8 @@ from typing import Protocol
 
 from skidpad.core.errors import StackError
 from skidpad.core.frames import SensorFrame
+from skidpad.core.objects.slots import fill_slots
 from skidpad.core.setup import ActorCommand
-from skidpad.core.slots import fill_slots
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import Supervision
 from skidpad.roads.journeys import Journey

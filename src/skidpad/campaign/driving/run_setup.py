@@ -20,10 +20,10 @@ from skidpad.campaign.driving.loop import Arrival, Script, Supervising, Timer, U
 from skidpad.campaign.driving.sharing import find_shared
 from skidpad.campaign.driving.starts import start_of
 from skidpad.campaign.user_files import road_file
+from skidpad.core.environment.lidar_effects import LidarEffects
 from skidpad.core.errors import ConfigError, FileError, StackError
 from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import Pose, kmh_from_mps
-from skidpad.core.lidar_effects import LidarEffects
 from skidpad.core.run import (
     ActorMode,
     AdasDriver,
@@ -37,11 +37,11 @@ from skidpad.core.run import (
     Scenario,
     StackDriver,
 )
-from skidpad.core.settings import NightRain, Relocation, TrafficSettings
+from skidpad.core.settings.parts import NightRain, Relocation, TrafficSettings
 from skidpad.core.setup import ActorSetup, CameraOptics, Setup, TrafficSetup, Wind
 from skidpad.core.simulator import BackendKind
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand
-from skidpad.core.told import describe_value
+from skidpad.core.text.told import describe_value
 from skidpad.core.vocabulary import Control, Outcome
 from skidpad.physics.types import EGO_TYPE, vehicle_type
 from skidpad.physics.wind import wind_of_intensity

@@ -9,8 +9,8 @@ import numpy as np
 from PIL import Image
 
 from skidpad.campaign.driving.loop import Moment, Sink
+from skidpad.core.files.names import path_part, slug
 from skidpad.core.frames import SensorFrame
-from skidpad.core.names import path_part, slug
 from skidpad.core.vocabulary import RelocationReason
 from skidpad.recording.campaign.folder import SNAPSHOTS
 from skidpad.recording.files import write_atomically

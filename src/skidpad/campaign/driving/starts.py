@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from skidpad.core.errors import ConfigError, NoLaneError
-from skidpad.core.lefthanded import lanes_left_from_carla, vector_from_carla
+from skidpad.core.maths.lefthanded import lanes_left_from_carla, vector_from_carla
 from skidpad.core.setup import LanePosition
 from skidpad.roads.queries import LanePoint, RoadMap
 

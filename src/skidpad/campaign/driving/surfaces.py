@@ -8,10 +8,10 @@ from typing import Any, Literal, TypeVar
 import msgspec
 
 from skidpad.campaign.driving.crg import read_crg
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import ConfigError
-from skidpad.core.reading import decode_yaml, read_bytes
-from skidpad.core.surface import SurfacePatch
-from skidpad.core.told import describe_value, on_a_line
+from skidpad.core.files.reading import decode_yaml, read_bytes
+from skidpad.core.text.told import describe_value, on_a_line
 
 S = TypeVar("S")
 

@@ -13,7 +13,7 @@ from skidpad.campaign.runs.folder import Stopwatch, fresh_folder, last_line, wri
 from skidpad.campaign.user_files import road_file, with_kept_map
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import AdasDriver, Function, Roads, RunSpec
-from skidpad.core.settings import LaneTruth
+from skidpad.core.settings.parts import LaneTruth
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Outcome, SensorLevel
 from skidpad.core.weather import Weather

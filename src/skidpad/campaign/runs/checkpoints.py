@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from lxml import etree
 
-from skidpad.core.checkpoint import Checkpoint
 from skidpad.core.errors import CheckpointError
+from skidpad.core.objects.checkpoint import Checkpoint
 from skidpad.physics.segments import Segments
 from skidpad.roads.kernels import LaneArrays
 from skidpad.roads.queries import RoadMap

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from skidpad.core.names import inside
+from skidpad.core.files.names import inside
 from skidpad.evidence.pairs import Pair, pairs, pairs_of_others
 from skidpad.recording.campaign.folder import RUNS
 from skidpad.recording.campaign.results import Timing

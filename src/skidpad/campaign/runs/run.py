@@ -36,11 +36,11 @@ from skidpad.core.run import (
     RunSpec,
     StackDriver,
 )
-from skidpad.core.setting import Plain
-from skidpad.core.settings import load_profile
+from skidpad.core.settings.parts import load_profile
+from skidpad.core.settings.setting import Plain
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.states import ActorTable
-from skidpad.core.told import clean
+from skidpad.core.text.told import clean
 from skidpad.core.vocabulary import Outcome, SensorLevel, TrafficStart
 from skidpad.core.weather import Weather
 from skidpad.evidence.drive.background import UNSEEN

@@ -1,8 +1,8 @@
 """Checkpoints as files: a run goes on from one in another process, with the hash of a run that was not cut.
 
 A file holds the state after a tick and the place in the log, not the ticks before it: those stand in the
-run's folder. What it may contain is data only (`core/statefile.py`). The first line names the format, a
-header says of which run, version and machine the file is, and how many bytes of which hash follow.
+run's folder. What it may contain is data only (`core/objects/statefile.py`). The first line names the format,
+a header says of which run, version and machine the file is, and how many bytes of which hash follow.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ import msgspec
 
 from skidpad.campaign.runs.checkpoints import FIXED
 from skidpad.core.errors import CheckpointError
-from skidpad.core.reading import read_bytes
+from skidpad.core.files.reading import read_bytes
+from skidpad.core.objects.statefile import Ground
 from skidpad.core.run import RunSpec, Scenario
 from skidpad.core.simulator import BackendKind
-from skidpad.core.statefile import Ground
 from skidpad.recording.files import write_bytes
 from skidpad.recording.fingerprint import fingerprint
 

@@ -7,9 +7,9 @@ from typing import Any
 
 from skidpad.campaign.runs.folder import CONFIG
 from skidpad.core.errors import ConfigError, FileError
-from skidpad.core.reading import UNUSABLE, decode_yaml, read_bytes
+from skidpad.core.files.reading import UNUSABLE, decode_yaml, read_bytes
 from skidpad.core.run import RunSpec, run_from_plain
-from skidpad.core.told import describe_value
+from skidpad.core.text.told import describe_value
 from skidpad.recording.channels.drives import read_record
 
 

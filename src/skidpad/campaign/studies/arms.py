@@ -10,7 +10,7 @@ from msgspec import structs
 
 from skidpad.campaign.studies.stacks import NOISE
 from skidpad.core.run import AdasDriver, RunSpec, StackDriver
-from skidpad.core.settings import load_profile
+from skidpad.core.settings.parts import load_profile
 from skidpad.core.vocabulary import Clearance, SensorLevel
 from skidpad.physics.presets import find_weather
 from skidpad.stack.configurations import functions_of

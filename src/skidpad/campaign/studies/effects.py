@@ -14,10 +14,10 @@ from skidpad.campaign.recipes.matrix import roads_of, warm_up
 from skidpad.campaign.runs.run import run
 from skidpad.campaign.workers.pool import local
 from skidpad.campaign.workers.worker import Job
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import SkidpadError
 from skidpad.core.run import CameraDriver, RunSpec
-from skidpad.core.settings import load_profile
-from skidpad.core.surface import SurfacePatch
+from skidpad.core.settings.parts import load_profile
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.evidence.drive.metrics import run_metrics
 from skidpad.evidence.statistics import Comparison, compare_pairs

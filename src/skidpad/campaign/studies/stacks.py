@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from skidpad.core.frames import RadarPoints, Segments, SensorFrame
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.core.specs import SensorSpec
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.vocabulary import Tier

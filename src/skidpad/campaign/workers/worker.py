@@ -17,7 +17,7 @@ from typing import Any
 
 from skidpad.campaign.driving.sharing import share_setups
 from skidpad.core.errors import SkidpadError
-from skidpad.core.told import clean, describe_value
+from skidpad.core.text.told import clean, describe_value
 from skidpad.core.vocabulary import Outcome
 
 LONGEST_STORY = 20_000  # characters of a traceback

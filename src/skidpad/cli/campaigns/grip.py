@@ -87,7 +87,7 @@ def grip(
 
 def answer_text(rows: pl.DataFrame) -> str:
     """Returns what weather's grip changed: collisions without and with it, and the worst cell."""
-    from skidpad.core.wording import count_text
+    from skidpad.core.text.wording import count_text
 
     lines = []
     for friction, title in ((Friction.ORIGINAL, "on dry grip"), (Friction.REDUCED, "with weather")):

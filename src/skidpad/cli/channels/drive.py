@@ -80,7 +80,7 @@ def totals(folder: Path) -> str:
     """Writes the pages of monitored drives; returns what driven segments came to, and the next command."""
     import polars as pl
 
-    from skidpad.core.wording import count_text
+    from skidpad.core.text.wording import count_text
     from skidpad.live.outcome import LINK
     from skidpad.recording.campaign.results import read_results
 
@@ -134,7 +134,7 @@ def outcomes(
             f"no driven segments below {', '.join(map(str, folders))}; give folders that `skidpad "
             "channels drive` wrote to"
         )
-    from skidpad.core.wording import count_text
+    from skidpad.core.text.wording import count_text
     from skidpad.evidence.channels.redundancy import compare_drivers
     from skidpad.evidence.statistics import rate_text
 

@@ -143,7 +143,7 @@ def judge_one(task: _Task) -> Segment:
 
     import numpy as np
 
-    from skidpad.core.reading import is_file
+    from skidpad.core.files.reading import is_file
     from skidpad.evidence.channels.identifier.model import load_model
     from skidpad.evidence.channels.judging.kept import segment_bytes, segment_from
     from skidpad.evidence.channels.judging.learned import with_model

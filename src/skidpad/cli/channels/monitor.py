@@ -203,7 +203,7 @@ def _events(found: Watched, rule: HazardType | AnyIndicator) -> int:
 
 def _print(found: Watched, out: Path) -> None:
     """Prints what a monitor found, what it lost, and where to look next."""
-    from skidpad.core.wording import count_text
+    from skidpad.core.text.wording import count_text
 
     summary = found.summary
     typer.echo(

@@ -166,7 +166,7 @@ def end(
     import time
 
     from skidpad.core.errors import require_choice
-    from skidpad.core.wording import count_text
+    from skidpad.core.text.wording import count_text
 
     with fleet_extra():
         from skidpad.fleet.store import accounts

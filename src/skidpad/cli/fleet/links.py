@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import httpx
     from sqlalchemy import Connection
 
-    from skidpad.core.localities import Locality, Locate
+    from skidpad.core.environment.localities import Locality, Locate
     from skidpad.fleet.alerting.relays import Relay
     from skidpad.fleet.broker import Broker
     from skidpad.fleet.service import Places

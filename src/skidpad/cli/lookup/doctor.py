@@ -13,7 +13,7 @@ from rich.console import Console
 
 import skidpad
 from skidpad.core.errors import install_command
-from skidpad.core.jit import kernel_cache
+from skidpad.core.kernels.jit import kernel_cache
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from skidpad.core.registry import Registry
+    from skidpad.core.objects.registry import Registry
 
 OF_FLEET = "relays"
 

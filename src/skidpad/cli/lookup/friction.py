@@ -58,8 +58,8 @@ def friction(
 
     Example: skidpad friction --preset rain_60
     """
-    from skidpad.core.settings import parse_assignments
-    from skidpad.core.tyres import find_tyres
+    from skidpad.core.environment.tyres import find_tyres
+    from skidpad.core.settings.parts import parse_assignments
     from skidpad.core.vocabulary import GripModel
     from skidpad.core.weather import Weather
     from skidpad.physics.presets import all_presets, find_weather

@@ -25,7 +25,7 @@ def _default(context: typer.Context) -> None:
 @profiles.command("list")
 def list_profiles() -> None:
     """Name the profiles, with the number of settings that differ from `recommended`."""
-    from skidpad.core.settings import PROFILES, differences, load_profile
+    from skidpad.core.settings.parts import PROFILES, differences, load_profile
 
     recommended = load_profile("recommended")
     for name in PROFILES:
@@ -53,7 +53,7 @@ def show(name: str) -> None:
     """Show every setting of a profile with its source."""
     from textwrap import wrap
 
-    from skidpad.core.settings import PART_OF, find_setting, load_profile
+    from skidpad.core.settings.parts import PART_OF, find_setting, load_profile
 
     for setting, value in load_profile(name).to_plain().items():
         about = find_setting(setting)
@@ -66,7 +66,7 @@ def show(name: str) -> None:
 @profiles.command()
 def diff(a: str, b: str) -> None:
     """List the settings in which two profiles differ."""
-    from skidpad.core.settings import differences, load_profile
+    from skidpad.core.settings.parts import differences, load_profile
 
     rows = differences(load_profile(a), load_profile(b))
     if not rows:

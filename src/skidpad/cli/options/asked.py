@@ -9,6 +9,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.run import (
     DriverSpec,
@@ -16,7 +17,6 @@ from skidpad.core.run import (
     Roads,
     RunSpec,
 )
-from skidpad.core.surface import SurfacePatch
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 
@@ -189,7 +189,7 @@ class Tuned(Struct, frozen=True):
         """
         from msgspec import structs
 
-        from skidpad.core.settings import load_profile, parse_assignments
+        from skidpad.core.settings.parts import load_profile, parse_assignments
 
         values = parse_assignments(self.set)
         values |= parse_assignments(f"{k}={v}" for k, v in more.items() if v is not None)

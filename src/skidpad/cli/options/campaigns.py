@@ -70,7 +70,7 @@ class CampaignOptions(Driving, frozen=True, kw_only=True):
         """
         from dataclasses import replace
 
-        from skidpad.core.wording import count_text
+        from skidpad.core.text.wording import count_text
 
         campaign = replace(campaign, until_halfwidth=self.until_halfwidth)
         identities = {".": campaign.identity()} | {n: c.identity() for n, c in parts.items()}
@@ -152,7 +152,7 @@ class Estimate(Struct, frozen=True, kw_only=True):
 
         name: text before the sentence, as it stands; "" for none.
         """
-        from skidpad.core.wording import count_text
+        from skidpad.core.text.wording import count_text
 
         found, workers = campaign.estimate(), 1 if campaign.alone else self.workers
         typer.echo(

@@ -7,8 +7,8 @@ import sys
 from pathlib import Path
 
 from skidpad.core.errors import BackendError, ConfigError
-from skidpad.core.names import path_part
-from skidpad.core.reading import is_file
+from skidpad.core.files.names import path_part
+from skidpad.core.files.reading import is_file
 from skidpad.core.simulator import BACKENDS, BackendChoice, BackendKind
 from skidpad.roads.map_files import bundled_maps, is_made_map
 
@@ -41,7 +41,7 @@ def map_of(map: str, choice: BackendChoice) -> str:
     named = map in bundled_maps() or is_made_map(map) or is_file(Path(map)) or Path(map).suffix
     if choice.backend != BackendKind.CARLA or named:
         return map
-    from skidpad.core.jit import user_cache
+    from skidpad.core.kernels.jit import user_cache
 
     folder = user_cache() / "carla-maps"
     # In a process of its own: the wheel's threads can end their process at its exit.

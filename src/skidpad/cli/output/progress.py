@@ -13,7 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from skidpad.campaign.campaign import BATCH, Campaign
 from skidpad.campaign.recipes.recipe import cell_of
-from skidpad.core.wording import count_text
+from skidpad.core.text.wording import count_text
 from skidpad.recording.campaign.ledger import Entry
 
 console = Console(stderr=True)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from skidpad.campaign.workers.worker import Runner
     from skidpad.cli.options.asked import EgoStack, PlayCross, Tuned
-    from skidpad.core.space import Space, Variable
+    from skidpad.core.maths.space import Space, Variable
 
 VariedFile = Annotated[
     Path,
@@ -84,7 +84,7 @@ def vary_scenario(
         ConfigError: nothing varies, a law cannot be read, or several weathers or grips are asked for.
         FileError: the file is missing, cannot be played, or declares no parameter of a name that varies.
     """
-    from skidpad.core.space import Space
+    from skidpad.core.maths.space import Space
     from skidpad.search.space import check_space, disturbance_variables, parse_variable
 
     file, of_file = _read_varied(file)

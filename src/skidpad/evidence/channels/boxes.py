@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.evidence.channels.paths import sample_path, sample_plan
 
 HORIZON = 4.0  # s, also the time to collision without risk (C-094)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from skidpad.core.arrays import Floats
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.evidence.channels.boxes import HORIZON, STEP
 
 PET_SAFE = 2.0  # s, the post-encroachment time without risk (C-094)

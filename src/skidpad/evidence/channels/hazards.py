@@ -16,7 +16,7 @@ import numpy as np
 
 from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError
-from skidpad.core.reading import decode_yaml, read_bytes
+from skidpad.core.files.reading import decode_yaml, read_bytes
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.choices import Form, Profile
 from skidpad.evidence.channels.indicators.catalogue import Indicator

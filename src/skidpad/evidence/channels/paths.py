@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from skidpad.core.arrays import Floats, Ints
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 
 
 @inner_kernel

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.evidence.channels.boxes import HORIZON, STEP, Movers, ego_movers, world_movers
 from skidpad.evidence.channels.conflicts import PET_SAFE, encroachment, first_overlap
 from skidpad.evidence.channels.frames import usable

@@ -8,8 +8,8 @@ from functools import partial
 from math import isfinite
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.registry import Registry
-from skidpad.core.told import describe_value
+from skidpad.core.objects.registry import Registry
+from skidpad.core.text.told import describe_value
 from skidpad.evidence.drive.collisions import find_crashes
 from skidpad.evidence.drive.metrics import highway_roads, summarise
 from skidpad.evidence.drive.prepared import Drive, MetricSettings, prepare

@@ -9,7 +9,7 @@ from math import cos
 import numpy as np
 
 from skidpad.core.geometry import kmh_from_mps
-from skidpad.core.wording import count_text
+from skidpad.core.text.wording import count_text
 from skidpad.evidence.drive.prepared import Drive
 from skidpad.recording.run.staging import FileCriterion
 

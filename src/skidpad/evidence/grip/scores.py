@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
 from skidpad.core.geometry import kmh_from_mps
-from skidpad.core.lefthanded import mirror_value
+from skidpad.core.maths.lefthanded import mirror_value
 from skidpad.core.states import ContactEvent
 from skidpad.core.vocabulary import ENDED, ActorKind, Outcome
 from skidpad.recording.campaign.grip import GripMetrics

@@ -15,7 +15,7 @@ import polars as pl
 from dtaidistance import dtw
 
 from skidpad.core.arrays import Floats
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.core.setup import DT
 from skidpad.evidence.contrasts import NOT_RUN
 from skidpad.evidence.limits import CONFIDENCE

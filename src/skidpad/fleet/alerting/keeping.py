@@ -11,7 +11,7 @@ import msgspec
 from msgspec import Meta
 from sqlalchemy import Connection, select
 
-from skidpad.core.told import on_a_line
+from skidpad.core.text.told import on_a_line
 from skidpad.fleet.identity import digest, new_id
 from skidpad.fleet.store.events import Event, add_event, events_of
 from skidpad.fleet.store.rights import visible

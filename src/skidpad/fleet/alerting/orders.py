@@ -19,7 +19,7 @@ from sqlalchemy import Connection, select
 from sqlalchemy.exc import IntegrityError
 
 from skidpad.core.errors import FileError
-from skidpad.core.told import on_a_line
+from skidpad.core.text.told import on_a_line
 from skidpad.fleet.alerting.keeping import alert_of
 from skidpad.fleet.identity import new_id
 from skidpad.fleet.store.events import add_event, events_of

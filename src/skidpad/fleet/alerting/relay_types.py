@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.registry import Registry
+from skidpad.core.objects.registry import Registry
 from skidpad.fleet.alerting.relays import Mqtt, Relay, Webhook
 from skidpad.fleet.broker import Broker
 

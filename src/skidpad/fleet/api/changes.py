@@ -11,7 +11,7 @@ from fastapi import APIRouter, Depends, Request, Response
 from msgspec import Meta
 from starlette.concurrency import run_in_threadpool
 
-from skidpad.core.told import on_a_line
+from skidpad.core.text.told import on_a_line
 from skidpad.fleet.api.guard import Needs, fleet_of
 from skidpad.fleet.api.vehicle import read_body
 from skidpad.fleet.loop.changes import Proposal, payload_of, propose, re_evaluate

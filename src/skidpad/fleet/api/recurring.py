@@ -8,8 +8,8 @@ import msgspec
 from fastapi import APIRouter, Depends, Query, Request
 from starlette.concurrency import run_in_threadpool
 
-from skidpad.core.localities import RoadKind
-from skidpad.core.told import on_a_line
+from skidpad.core.environment.localities import RoadKind
+from skidpad.core.text.told import on_a_line
 from skidpad.fleet.api.guard import Needs, fleet_of
 from skidpad.fleet.api.vehicle import read_body
 from skidpad.fleet.insight.triage import Standing, State, set_standing, subject_key

@@ -7,8 +7,8 @@ from importlib.resources import files
 
 import msgspec
 
-from skidpad.core.reading import decode_yaml
-from skidpad.core.wording import count_text
+from skidpad.core.files.reading import decode_yaml
+from skidpad.core.text.wording import count_text
 
 
 class Precision(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

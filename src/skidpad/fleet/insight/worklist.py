@@ -11,7 +11,7 @@ from typing import Any
 
 from sqlalchemy import Connection, func, select
 
-from skidpad.core.localities import Locality, Locate, RoadKind
+from skidpad.core.environment.localities import Locality, Locate, RoadKind
 from skidpad.fleet.insight.precision import Precision, measured_precision
 from skidpad.fleet.insight.triage import Standing, State, read_standings, reopen
 from skidpad.fleet.store.rights import visible

@@ -10,8 +10,8 @@ from urllib.parse import urlencode
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 
+from skidpad.core.environment.localities import RoadKind
 from skidpad.core.errors import SkidpadError
-from skidpad.core.localities import RoadKind
 from skidpad.fleet.api.recurring import TriageText, work_list
 from skidpad.fleet.insight.triage import SETTABLE, State
 from skidpad.fleet.insight.worklist import NOTABLE_FROM, SEVERE_FROM, Severity, Work, WorkFilter

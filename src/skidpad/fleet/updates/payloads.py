@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from skidpad.core.errors import InputError
-from skidpad.core.told import on_a_line
+from skidpad.core.text.told import on_a_line
 from skidpad.evidence.channels.choices import Identify
 from skidpad.evidence.channels.hazards import default_form, load_only_rules
 from skidpad.evidence.channels.identifier.model import load_model

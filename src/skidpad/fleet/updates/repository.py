@@ -11,7 +11,7 @@ from tuf.api.exceptions import RepositoryError
 from tuf.api.metadata import Metadata, MetaFile, Root, Snapshot, Targets, Timestamp
 
 from skidpad.core.errors import FileError, OutputError
-from skidpad.core.told import on_a_line
+from skidpad.core.text.told import on_a_line
 from skidpad.fleet.updates.signing import instant, load_key
 from skidpad.fleet.words import Refused, absent
 from skidpad.recording.files import write_bytes

@@ -16,7 +16,7 @@ from securesystemslib.signer import CryptoSigner
 from tuf.api.metadata import Metadata, Root, TargetFile, Targets
 
 from skidpad.core.errors import ConfigError, FileError, OutputError
-from skidpad.core.told import on_a_line
+from skidpad.core.text.told import on_a_line
 from skidpad.recording.files import write_secret
 
 KEYS, THRESHOLD = 3, 2

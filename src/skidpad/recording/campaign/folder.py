@@ -10,7 +10,7 @@ from typing import Any, Generic
 import polars as pl
 
 from skidpad.core.errors import FileError
-from skidpad.core.names import inside
+from skidpad.core.files.names import inside
 from skidpad.recording.campaign.ledger import (
     E,
     common_configuration,

@@ -10,7 +10,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from skidpad.core.errors import FileError
-from skidpad.core.names import inside
+from skidpad.core.files.names import inside
 from skidpad.recording.campaign.ledger import Entry
 from skidpad.recording.campaign.results import Columns, metric
 from skidpad.recording.files import read_parquet, require_columns, write_parquet

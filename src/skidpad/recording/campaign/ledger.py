@@ -18,9 +18,9 @@ from zlib import crc32
 import msgspec
 
 from skidpad.core.errors import FileError, OutputError
-from skidpad.core.names import inside
-from skidpad.core.reading import decode_json, read_bytes
-from skidpad.core.told import clean
+from skidpad.core.files.names import inside
+from skidpad.core.files.reading import decode_json, read_bytes
+from skidpad.core.text.told import clean
 from skidpad.core.vocabulary import Outcome
 from skidpad.recording.campaign.added_metrics import AddedMetric
 from skidpad.recording.campaign.results import Timing

@@ -7,10 +7,10 @@ from typing import Any
 
 from msgspec import Struct
 
-from skidpad.core.disturbance import actor_of_draw
-from skidpad.core.reading import decode_json, read_bytes
+from skidpad.core.files.reading import decode_json, read_bytes
+from skidpad.core.maths.space import Space
 from skidpad.core.run import RunSpec, run_from_plain
-from skidpad.core.space import Space
+from skidpad.core.traffic.disturbance import actor_of_draw
 from skidpad.recording.campaign.searches import LARGEST, read_stored
 
 RISK, RISK_RUNS, RISK_FOUND = "risk.json", "runs.jsonl", "probability.json"

@@ -9,9 +9,9 @@ from typing import Any, TypeVar
 from msgspec import Struct
 
 from skidpad.core.errors import FileError
-from skidpad.core.reading import decode_json, read_bytes
+from skidpad.core.files.reading import decode_json, read_bytes
+from skidpad.core.maths.space import Space, Value
 from skidpad.core.run import RunSpec, run_from_plain
-from skidpad.core.space import Space, Value
 
 SEARCH, TRIALS = "search.json", "trials.jsonl"
 FOUND, FAILURES, CHOICES = "found.json", "failures", "failures.xosc"

@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 
-from skidpad.core.reading import UNUSABLE
+from skidpad.core.files.reading import UNUSABLE
 from skidpad.recording.campaign.ledger import Entry
 from skidpad.recording.campaign.results import Columns
 

@@ -10,7 +10,7 @@ from typing import Any
 import polars as pl
 
 from skidpad.core.errors import FileError
-from skidpad.core.reading import decode_json, read_bytes
+from skidpad.core.files.reading import decode_json, read_bytes
 from skidpad.recording.files import read_parquet, require_columns, write_bytes, write_parquet
 
 SUMMARY = "monitor.json"

@@ -27,8 +27,8 @@ import numpy as np
 from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame
 from skidpad.core.errors import ConfigError, FileError, MissingExtra
-from skidpad.core.reading import decode_yaml, read_bytes
-from skidpad.core.told import on_a_line
+from skidpad.core.files.reading import decode_yaml, read_bytes
+from skidpad.core.text.told import on_a_line
 from skidpad.recording.channels.mcap_files import Losses, Message
 from skidpad.recording.formats.ros_objects import OBJECT_READERS, RosObjects, empty_objects, yaw_of
 

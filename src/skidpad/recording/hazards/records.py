@@ -14,8 +14,8 @@ from typing import Any
 
 from skidpad.core.channels import Cycle
 from skidpad.core.errors import FileError, OutputError
-from skidpad.core.reading import UNUSABLE, decode_json, read_bytes, unusable
-from skidpad.core.told import on_a_line
+from skidpad.core.files.reading import UNUSABLE, decode_json, read_bytes, unusable
+from skidpad.core.text.told import on_a_line
 from skidpad.core.vocabulary import HazardType
 from skidpad.recording.hazards.text import HEADER, encode_worlds
 from skidpad.recording.hazards.text_reader import decode_worlds

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import msgspec
 
-from skidpad.core.reading import decode_json, read_bytes
+from skidpad.core.files.reading import decode_json, read_bytes
 from skidpad.recording.files import write_bytes
 
 SEARCHES = "searches.json"

@@ -9,8 +9,8 @@ from typing import Any
 
 import msgspec
 
+from skidpad.core.files.reading import UNUSABLE, unusable
 from skidpad.core.geometry import Pose
-from skidpad.core.reading import UNUSABLE, unusable
 from skidpad.core.states import ContactEvent, LaneInvasion, TrafficContact
 from skidpad.core.vocabulary import LightState, RelocationReason
 

@@ -10,7 +10,7 @@ import msgspec
 
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.inputs import Input, Timed
-from skidpad.core.told import on_a_line
+from skidpad.core.text.told import on_a_line
 
 INPUTS = "inputs.jsonl"
 

@@ -12,7 +12,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from skidpad.core.errors import FileError
-from skidpad.core.reading import UNUSABLE, decode_json, read_bytes, unusable
+from skidpad.core.files.reading import UNUSABLE, decode_json, read_bytes, unusable
 from skidpad.core.states import ActorTable, ContactEvent
 from skidpad.core.vocabulary import DetectionStatus, LightSource, LightState, Supervision, Tier
 from skidpad.recording.files import content_hash, read_parquet, write_bytes, write_parquet

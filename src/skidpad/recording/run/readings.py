@@ -12,7 +12,7 @@ from pathlib import Path
 import msgspec
 import polars as pl
 
-from skidpad.core.reading import decode_json
+from skidpad.core.files.reading import decode_json
 from skidpad.recording.files import read_parquet, require_columns, write_parquet
 
 READINGS = "readings.parquet"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from skidpad.core.reading import convert_plain, decode_yaml, read_bytes
-from skidpad.core.surface import SurfacePatch, present_patches
+from skidpad.core.environment.surface import SurfacePatch, present_patches
+from skidpad.core.files.reading import convert_plain, decode_yaml, read_bytes
 from skidpad.core.weather import Weather
 
 CONFIG = "config.yaml"  # of a run's folder

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.frames import SensorFrame
-from skidpad.core.jit import Held, hold, kernel
+from skidpad.core.kernels.jit import Held, hold, kernel
 from skidpad.core.states import ActorStates, ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import LightState, Supervision
 from skidpad.recording.run.events import (

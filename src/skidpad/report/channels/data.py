@@ -13,7 +13,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
-from skidpad.core.reading import convert_plain
+from skidpad.core.files.reading import convert_plain
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.indicators.catalogue import (
     AnyIndicator,

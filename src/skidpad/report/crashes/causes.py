@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import isfinite
 
-from skidpad.core.constants import G
 from skidpad.core.geometry import kmh_from_mps
+from skidpad.core.maths.constants import G
 from skidpad.core.vocabulary import DetectionStatus
 from skidpad.evidence.drive.collisions import Crash, CrashKind, Striker
 from skidpad.evidence.drive.story import Arrival, Moment, Sighting, Story

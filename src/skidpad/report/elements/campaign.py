@@ -11,7 +11,7 @@ import msgspec
 import polars as pl
 
 from skidpad import __version__
-from skidpad.core.wording import count_text
+from skidpad.core.text.wording import count_text
 from skidpad.evidence.contrasts import NOT_RUN
 from skidpad.recording.campaign.folder import CampaignFolder
 from skidpad.recording.campaign.ledger import E

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
-from skidpad.core.surface import SurfacePatch
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.recording.run.log import RunLog
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import RoadMap

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
-from skidpad.core.wording import count_text
+from skidpad.core.text.wording import count_text
 from skidpad.evidence.statistics import seeds_for_verdict
 from skidpad.evidence.verdicts import Judgement
 from skidpad.evidence.verdicts import Verdict as Outcome

@@ -8,7 +8,7 @@ import numpy as np
 
 from skidpad.core.arrays import Floats
 from skidpad.core.setup import DT
-from skidpad.core.wording import count_text
+from skidpad.core.text.wording import count_text
 from skidpad.evidence.grip.study import ORIGINAL, REDUCED, CellSeries, Pair
 from skidpad.report.elements.figures import Chart, Curve, curves
 from skidpad.report.elements.page import Block, Figure

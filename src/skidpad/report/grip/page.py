@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from skidpad.core.wording import count_text
+from skidpad.core.text.wording import count_text
 from skidpad.evidence.grip.findings import FINDINGS
 from skidpad.evidence.grip.study import ORIGINAL, REDUCED, Share, completion, completion_p
 from skidpad.evidence.verdicts import Judgement, judge

@@ -11,7 +11,7 @@ from pathlib import Path
 import polars as pl
 
 from skidpad.core.errors import FileError
-from skidpad.core.wording import count_text
+from skidpad.core.text.wording import count_text
 from skidpad.evidence.grip.threshold import JUDGED, Situation, situations
 from skidpad.evidence.verdicts import Judgement, Verdict
 from skidpad.recording.campaign.folder import CampaignFolder

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import polars as pl
 
-from skidpad.core.wording import capitalize_first, count_text, list_text
+from skidpad.core.text.wording import capitalize_first, count_text, list_text
 from skidpad.evidence.statistics import UNITS_FROM, Interval, Rate, p_text, seeds_for_verdict
 from skidpad.evidence.verdicts import Judgement
 from skidpad.report.crashes.cards import Found

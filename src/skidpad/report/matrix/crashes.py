@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import polars as pl
 
-from skidpad.core.names import slug
-from skidpad.core.wording import count_text
+from skidpad.core.files.names import slug
+from skidpad.core.text.wording import count_text
 from skidpad.evidence.contrasts import drive_hash
 from skidpad.evidence.drive.collisions import find_crashes
 from skidpad.evidence.drive.prepared import prepare

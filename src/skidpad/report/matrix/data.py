@@ -9,7 +9,7 @@ from pathlib import Path
 
 import polars as pl
 
-from skidpad.core.wording import capitalize_first, count_text, list_text
+from skidpad.core.text.wording import capitalize_first, count_text, list_text
 from skidpad.evidence.statistics import Rate, event_rate
 from skidpad.recording.campaign.folder import CampaignFolder
 from skidpad.recording.campaign.matrix import MATRIX, MatrixEntry, Metrics

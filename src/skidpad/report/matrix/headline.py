@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from skidpad.core.wording import count_text
+from skidpad.core.text.wording import count_text
 from skidpad.evidence.statistics import ASSUMED, Interval, Rate, median_time
 from skidpad.recording.campaign.quantities import name_of
 from skidpad.report.elements.page import Block, Cell, Number, Numbers, Table, Text

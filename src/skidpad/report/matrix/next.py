@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import polars as pl
 
-from skidpad.core.wording import capitalize_first, count_text
+from skidpad.core.text.wording import capitalize_first, count_text
 from skidpad.evidence.verdicts import Judgement, Verdict
 from skidpad.report.crashes.cards import Found, headline, severity
 from skidpad.report.elements.figures import Series, stacked_bars

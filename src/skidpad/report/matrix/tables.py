@@ -8,7 +8,7 @@ from functools import partial
 
 import polars as pl
 
-from skidpad.core.wording import count_text
+from skidpad.core.text.wording import count_text
 from skidpad.evidence.contrasts import per_seed
 from skidpad.evidence.statistics import (
     ASSUMED,

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from skidpad.core.geometry import kmh_from_mps
-from skidpad.core.wording import count_text
+from skidpad.core.text.wording import count_text
 from skidpad.evidence.encounters import DISTANCE, TIME
 from skidpad.evidence.play_verdicts import Counterpart, PlayVerdict
 from skidpad.recording.run.log_files import read_log

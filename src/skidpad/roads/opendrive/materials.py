@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from skidpad.core.errors import FileError
-from skidpad.core.reading import read_bytes
+from skidpad.core.files.reading import read_bytes
 from skidpad.roads.map_files import map_file
 from skidpad.roads.opendrive.document import SIZE_MAX, Node, Reader, parse_root
 

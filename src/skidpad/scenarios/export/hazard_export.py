@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 from scenariogeneration import xodr
 
 from skidpad.core.errors import ConfigError, InputError
-from skidpad.core.names import path_part
+from skidpad.core.files.names import path_part
 from skidpad.recording.hazards.records import HazardRecord
 from skidpad.scenarios.export.tracks import Track, tracks
 from skidpad.scenarios.export.version import OscVersion

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from skidpad.core.errors import InputError
-from skidpad.core.names import path_part
+from skidpad.core.files.names import path_part
 from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind
 from skidpad.recording.files import write_bytes
 from skidpad.recording.run.log import RunLog

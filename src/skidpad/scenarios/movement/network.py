@@ -10,7 +10,7 @@ import numpy as np
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, wrap_angle
-from skidpad.core.slots import fill_slots
+from skidpad.core.objects.slots import fill_slots
 from skidpad.roads.bundled import map_file
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.opendrive.document import RoadRecord, parse

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from skidpad.core.disturbance import KNOT_S, SHARE, Disturbance, parse_disturbance
 from skidpad.core.errors import ConfigError
-from skidpad.core.randomness import stream, stream_key
+from skidpad.core.maths.randomness import stream, stream_key
+from skidpad.core.traffic.disturbance import KNOT_S, SHARE, Disturbance, parse_disturbance
 from skidpad.scenarios.movement.motion import Guide
 from skidpad.scenarios.scenario import Scenario
 from skidpad.scenarios.scene import Actor

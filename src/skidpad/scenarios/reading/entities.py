@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from math import inf
 
-from skidpad.core.told import describe_value
-from skidpad.core.tyres import REFERENCE, known_tyres
+from skidpad.core.environment.tyres import REFERENCE, known_tyres
+from skidpad.core.text.told import describe_value
 from skidpad.core.vocabulary import ActorKind
 from skidpad.scenarios.reading.catalogs import Catalogs
 from skidpad.scenarios.reading.document import Node

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.core.vocabulary import SemanticClass
 
 NEAREST, FARTHEST = 8.0, 40.0  # m from the ego

@@ -9,7 +9,7 @@ import numpy as np
 
 from skidpad.core.arrays import Floats
 from skidpad.core.errors import require_range
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

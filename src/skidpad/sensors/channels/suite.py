@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelView
 from skidpad.core.errors import require_range
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind, LightState, SemanticClass
 from skidpad.core.weather import Weather

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from skidpad.core.jit import inner_kernel, kernel
-from skidpad.core.randomness import stream
+from skidpad.core.kernels.jit import inner_kernel, kernel
+from skidpad.core.maths.randomness import stream
 from skidpad.core.weather import Weather
 from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.pictures.packing import pack, unpack

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.sensors.raster.view import View
 
 _EVEN, _OPAQUE, _ONE = np.uint32(0xFEFEFEFE), np.uint32(0xFF000000), np.uint32(1)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 from skidpad.core.weather import Weather
 from skidpad.physics.camera import share_left
 from skidpad.physics.optics import fog_extinction

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.physics.optics import Air, air_depth
 from skidpad.sensors.finish.lamps import Sources
 from skidpad.sensors.pictures.packing import pack, unpack

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.sensors.raster.view import View
 
 MOST = 96  # points on screen: 16 corners, and where their 120 edges pass the near plane

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.geometry import Pose
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.physics.optics import air_depth
 from skidpad.sensors.finish.glow import add_light

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind
 from skidpad.roads.roadside import Box, Shape

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
-from skidpad.core.jit import kernel
-from skidpad.core.randomness import stream
+from skidpad.core.kernels.jit import kernel
+from skidpad.core.maths.randomness import stream
 from skidpad.core.weather import Weather
 from skidpad.sensors.finish.glow import add_light
 from skidpad.sensors.pictures.lighting import Lighting

@@ -8,7 +8,7 @@ import numpy as np
 
 from skidpad.core.arrays import Floats, Ints
 from skidpad.core.geometry import Pose
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 from skidpad.core.states import ActorStates
 from skidpad.roads.roadside import Roadside
 

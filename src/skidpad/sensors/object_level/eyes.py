@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Flags, Floats
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 from skidpad.core.setup import Setup
-from skidpad.core.sight import DriverView, RoadLook, SeenActors
 from skidpad.core.specs import EyesSpec
 from skidpad.core.states import ActorStates, ActorTable
+from skidpad.core.traffic.sight import DriverView, RoadLook, SeenActors
 from skidpad.core.vocabulary import ActorKind, LightState, RangeModel
 from skidpad.core.weather import Weather
 from skidpad.physics.optics import label_range, sight

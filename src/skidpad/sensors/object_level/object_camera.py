@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats, Ints
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 from skidpad.core.states import ActorStates
 from skidpad.sensors.object_level.boxes import Boxes, Mount, boxes_in_view, place
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.frames import RadarPoints, Segments
 from skidpad.core.inputs import Beam
-from skidpad.core.jit import Held, hold, kernel
+from skidpad.core.kernels.jit import Held, hold, kernel
 from skidpad.core.specs import CameraSpec, Modality, RadarSpec, SensorSpec
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind

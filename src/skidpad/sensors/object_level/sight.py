@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats, Ints32
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.sensors.object_level.boxes import Boxes
 
 BEARINGS = 720  # of half a degree: a pedestrian at 60 m still fills one

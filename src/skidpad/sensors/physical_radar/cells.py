@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from skidpad.core.arrays import Floats, Ints
-from skidpad.core.jit import inner_kernel
-from skidpad.core.splitmix import GOLDEN
+from skidpad.core.kernels.jit import inner_kernel
+from skidpad.core.kernels.splitmix import GOLDEN
 from skidpad.sensors.noise import uniform
 
 BITS = 14

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics.mirrors import two_ray_gain
 from skidpad.sensors.noise import uniform

@@ -11,7 +11,7 @@ from math import exp, log
 
 import numpy as np
 
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 from skidpad.core.states import ActorStates
 from skidpad.sensors.noise import uniform
 from skidpad.sensors.object_level.boxes import walls_in_view

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 from skidpad.physics.mirrors import RAIL_SHARE, WALL_ROUGHNESS, fresnel_across, smooth_share
 from skidpad.roads.roadside import Barrier, BarrierKind, Box, Roadside, Shape
 from skidpad.sensors.object_level.boxes import (

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.frames import RadarObjects, RadarPoints, RadarTracks
-from skidpad.core.jit import Held, hold, inner_kernel, kernel
-from skidpad.core.randomness import stream_key
+from skidpad.core.kernels.jit import Held, hold, inner_kernel, kernel
+from skidpad.core.maths.randomness import stream_key
 from skidpad.core.setup import DT
 from skidpad.core.specs import RadarSpec
 from skidpad.core.states import ActorStates, ActorTable

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats, Ints
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 from skidpad.sensors.physical_radar.lists import (
     ALTITUDE,
     AZIMUTH,

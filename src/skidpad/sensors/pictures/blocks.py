@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats32
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.sensors.pictures.packing import pack
 from skidpad.sensors.raster.view import View
 from skidpad.sensors.scene.materials import MATERIALS

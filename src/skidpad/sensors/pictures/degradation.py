@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
-from skidpad.core.randomness import stream, stream_key
+from skidpad.core.kernels.jit import kernel
+from skidpad.core.maths.randomness import stream, stream_key
 from skidpad.core.weather import Weather
 from skidpad.sensors.noise import mixed, uniform
 from skidpad.sensors.pictures.packing import pack, rounded, unpack

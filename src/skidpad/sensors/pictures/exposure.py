@@ -14,7 +14,7 @@ from math import log2, pi
 
 import numpy as np
 
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 from skidpad.core.weather import Weather
 from skidpad.physics.camera import (
     SATURATION,

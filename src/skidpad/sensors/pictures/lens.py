@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats32
-from skidpad.core.jit import kernel
-from skidpad.core.randomness import stream_key
+from skidpad.core.kernels.jit import kernel
+from skidpad.core.maths.randomness import stream_key
 from skidpad.core.specs import CameraSpec
 from skidpad.physics.camera import SPREAD
 from skidpad.physics.droplets import Drops, rain_drops

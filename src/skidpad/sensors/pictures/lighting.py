@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.inputs import Beam
-from skidpad.core.lefthanded import mirror_value
+from skidpad.core.maths.lefthanded import mirror_value
 from skidpad.core.weather import Weather
 from skidpad.physics.optics import Air, air_of, extinction
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.frames import CameraImage
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.core.weather import Weather
 
 Image = NDArray[np.uint8]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 
 _BYTE, _G, _B = np.uint32(255), np.uint32(8), np.uint32(16)
 _OPAQUE = np.uint32(0xFF000000)

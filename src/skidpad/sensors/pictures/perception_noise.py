@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.errors import require_range
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.core.vocabulary import SemanticClass
 
 

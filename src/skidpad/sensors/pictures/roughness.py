@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from skidpad.core.arrays import Floats, Floats32
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 from skidpad.sensors.pictures.blocks import BLOCK, LANES, ONE, ZERO, B, G, R, U, W, end_of_run
 from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.raster.view import View

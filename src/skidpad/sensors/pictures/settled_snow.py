@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats32
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 from skidpad.sensors.pictures.blocks import GX, GY, ONE, ZERO, B, G, R, U, W, end_of_run
 
 NOTHING_SETTLES = np.zeros(0, dtype=np.float32)

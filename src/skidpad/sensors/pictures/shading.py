@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats32
 from skidpad.core.geometry import Pose
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.states import ActorTable
 from skidpad.physics.camera import share_left
 from skidpad.sensors.pictures.blocks import (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from skidpad.core.arrays import Floats32
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 from skidpad.sensors.pictures.blocks import ONE, ZERO, B, G, R, U, W
 from skidpad.sensors.pictures.lighting import Lighting
 

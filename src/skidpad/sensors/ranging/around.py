@@ -9,7 +9,7 @@ import numpy as np
 
 from skidpad.core.arrays import Floats, Ints
 from skidpad.core.geometry import Pose
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 from skidpad.sensors.raster.live_scene import LiveScene
 from skidpad.sensors.raster.rays import Hits, make_hits, make_rays
 from skidpad.sensors.raster.view import View, world_to_camera

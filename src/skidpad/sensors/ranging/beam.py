@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skidpad.core.jit import inner_kernel
-from skidpad.core.randomness import stream_key
+from skidpad.core.kernels.jit import inner_kernel
+from skidpad.core.maths.randomness import stream_key
 from skidpad.core.specs import RadarSpec
 from skidpad.sensors.noise import uniform
 

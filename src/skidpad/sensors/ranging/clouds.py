@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
 from skidpad.core.geometry import Pose
-from skidpad.core.jit import inner_kernel, kernel
-from skidpad.core.splitmix import GOLDEN, scrambled, unit
+from skidpad.core.kernels.jit import inner_kernel, kernel
+from skidpad.core.kernels.splitmix import GOLDEN, scrambled, unit
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind
 from skidpad.physics.droplets import FOG_BACKSCATTER

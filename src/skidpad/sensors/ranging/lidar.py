@@ -17,7 +17,7 @@ from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import LidarPoints
 from skidpad.core.geometry import Pose
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 from skidpad.core.specs import LidarSpec
 from skidpad.core.states import ActorStates
 from skidpad.sensors.ranging.around import (

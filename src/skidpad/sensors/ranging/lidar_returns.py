@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from scipy.stats import beta, norm
 
 from skidpad.core.arrays import Floats
-from skidpad.core.jit import inner_kernel, kernel
-from skidpad.core.splitmix import GOLDEN, scrambled, unit
+from skidpad.core.kernels.jit import inner_kernel, kernel
+from skidpad.core.kernels.splitmix import GOLDEN, scrambled, unit
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.physics.droplets import SMALLEST_MM, Drops
 from skidpad.physics.optics import LidarAir

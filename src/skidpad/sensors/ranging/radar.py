@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from skidpad.core.arrays import Floats
 from skidpad.core.frames import RadarPoints
 from skidpad.core.geometry import Pose
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 from skidpad.core.specs import RadarSpec
 from skidpad.sensors.ranging.beam import Beam, direction
 from skidpad.sensors.raster.live_scene import LiveScene

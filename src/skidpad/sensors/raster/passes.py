@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 from skidpad.core.specs import CameraSpec
 from skidpad.sensors.raster.rasteriser import BACKGROUND
 from skidpad.sensors.raster.view import View

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 from skidpad.sensors.raster.view import NEAR, View
 
 LEFT, RIGHT, UP, DOWN, BEHIND = 1, 2, 4, 8, 16  # planes of the frustum, as bits

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats, Ints32
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.sensors.raster.projection import (
     BEHIND,

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from skidpad.core.arrays import Floats, Ints32
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind
 from skidpad.sensors.bodywork.body import Limb

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.randomness import stream_key
+from skidpad.core.maths.randomness import stream_key
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.lanes import LaneKind, LaneSamples, LaneTable, Marking
 from skidpad.sensors.scene.materials import TRACKS, Material

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from skidpad.core.arrays import Floats, Ints32
-from skidpad.core.randomness import stream_key
+from skidpad.core.maths.randomness import stream_key
 from skidpad.core.vocabulary import LightState, SemanticClass
 from skidpad.roads.lanes import LaneSamples, LaneTable
 from skidpad.roads.roadside import Roadside, Shape

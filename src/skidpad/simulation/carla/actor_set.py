@@ -8,7 +8,7 @@ from typing import Any
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
-from skidpad.core.lefthanded import mirror_value
+from skidpad.core.maths.lefthanded import mirror_value
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import ActorStates, VehicleCommand
 from skidpad.roads.queries import RoadMap

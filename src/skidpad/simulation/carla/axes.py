@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from skidpad.core.geometry import Pose
-from skidpad.core.lefthanded import pose_from_carla, pose_to_carla, vector_from_carla
+from skidpad.core.maths.lefthanded import pose_from_carla, pose_to_carla, vector_from_carla
 
 
 def to_transform(carla: Any, pose: Pose) -> Any:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Bytes, Floats32
 from skidpad.core.frames import LidarPoints, RadarPoints
-from skidpad.core.jit import kernel
-from skidpad.core.lefthanded import angles_to_carla, vectors_to_carla
+from skidpad.core.kernels.jit import kernel
+from skidpad.core.maths.lefthanded import angles_to_carla, vectors_to_carla
 from skidpad.core.specs import CameraSpec
 from skidpad.core.vocabulary import SemanticClass
 

@@ -9,7 +9,7 @@ from math import hypot
 from typing import Any
 
 from skidpad.core.arrays import Floats
-from skidpad.core.lefthanded import vector_from_carla
+from skidpad.core.maths.lefthanded import vector_from_carla
 from skidpad.core.states import ActorStates, ContactEvent, LaneInvasion
 from skidpad.roads.lanes import Marking
 from skidpad.roads.queries import RoadMap

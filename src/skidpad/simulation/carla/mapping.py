@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from skidpad.core.errors import BackendError
-from skidpad.core.names import path_part
+from skidpad.core.files.names import path_part
 from skidpad.simulation.carla.connection import connect, speaking
 from skidpad.simulation.carla.options import CarlaOptions
 from skidpad.simulation.carla.scene import served_name

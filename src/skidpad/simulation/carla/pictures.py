@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.depthcode import inverse_depth_from_bgra
 from skidpad.core.errors import BackendError
 from skidpad.core.frames import CameraImage
+from skidpad.core.kernels.depthcode import inverse_depth_from_bgra
 from skidpad.core.setup import Setup
 from skidpad.core.specs import CameraSpec, Modality
 from skidpad.core.vocabulary import RangeModel

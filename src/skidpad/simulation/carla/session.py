@@ -13,7 +13,7 @@ import numpy as np
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import Pose
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.core.setup import ActorCommand, Setup
 from skidpad.core.states import ActorStates, EgoEstimate, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import LightState, TrafficStart

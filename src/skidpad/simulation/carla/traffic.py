@@ -6,7 +6,7 @@ from typing import Any
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.core.setup import TrafficSetup
 from skidpad.roads.queries import LanePoint, RoadMap
 from skidpad.simulation.carla import blueprints

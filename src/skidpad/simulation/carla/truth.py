@@ -10,7 +10,7 @@ import numpy as np
 
 from skidpad.core.arrays import Floats
 from skidpad.core.geometry import Pose, wrap_angle
-from skidpad.core.lefthanded import mirror_value, turn_from_carla
+from skidpad.core.maths.lefthanded import mirror_value, turn_from_carla
 from skidpad.core.states import ActorStates, VehicleCommand
 from skidpad.simulation.carla.actor_rows import ActorRow
 from skidpad.simulation.carla.axes import from_transform, from_vector

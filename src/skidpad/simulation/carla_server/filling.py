@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Flags
 from skidpad.core.geometry import kmh_from_mps
-from skidpad.core.lefthanded import (
+from skidpad.core.maths.lefthanded import (
     poses_to_carla,
     turns_to_carla,
     vector_from_carla,

@@ -14,7 +14,7 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 
 from skidpad.core.geometry import Pose
-from skidpad.core.jit import is_kept, kernel_cache
+from skidpad.core.kernels.jit import is_kept, kernel_cache
 from skidpad.sensors.raster import rays
 from skidpad.simulation.carla_server.actors.catalogue import Family
 from skidpad.simulation.carla_server.actors.registry import Attachment

@@ -13,7 +13,7 @@ from skidpad.core.errors import BackendError
 from skidpad.core.frames import Frame, SensorFrame
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Outside
-from skidpad.core.randomness import stream, stream_key
+from skidpad.core.maths.randomness import stream, stream_key
 from skidpad.core.setup import ActorCommand, Setup
 from skidpad.core.states import EgoEstimate, VehicleCommand, WorldTruth
 from skidpad.physics.fleet import shown_gear

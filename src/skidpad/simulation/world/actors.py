@@ -10,7 +10,7 @@ from msgspec import structs
 
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.geometry import Pose
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.core.setup import (
     RESERVE_NAME,
     VEHICLES_MAX,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from skidpad.core.jit import Held, kernel
+from skidpad.core.kernels.jit import Held, kernel
 from skidpad.simulation.world.step import Arena
 
 Felt = tuple[

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from skidpad.core.arrays import Floats, Ints
-from skidpad.core.jit import Held, inner_kernel, kernel
+from skidpad.core.kernels.jit import Held, inner_kernel, kernel
 from skidpad.roads.kernels import (
     WIDTH,
     LaneArrays,

@@ -14,7 +14,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.core.vocabulary import LightState
 from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import RoadMap

@@ -6,9 +6,9 @@ from math import cos, isnan, sin, sqrt
 from typing import NamedTuple
 
 from skidpad.core.arrays import Floats, Ints
-from skidpad.core.jit import Held, inner_kernel, kernel
+from skidpad.core.environment.surface import PATH_OFFSET, PATH_WIDTH
+from skidpad.core.kernels.jit import Held, inner_kernel, kernel
 from skidpad.core.states import ActorStates
-from skidpad.core.surface import PATH_OFFSET, PATH_WIDTH
 from skidpad.physics.grip import grip_of_row, mu_at, stiffness_at
 from skidpad.roads.kernels import (
     REACH,

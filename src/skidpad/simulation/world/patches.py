@@ -10,11 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
+from skidpad.core.environment.surface import (
+    PATH_OFFSET,
+    SurfacePatch,
+    place_in_file,
+    present_patches,
+)
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
-from skidpad.core.jit import hold
+from skidpad.core.kernels.jit import hold
 from skidpad.core.states import ActorStates
-from skidpad.core.surface import PATH_OFFSET, SurfacePatch, place_in_file, present_patches
 from skidpad.physics.drying import dried_film
 from skidpad.physics.grip import GripParams, Road, road_surface
 from skidpad.physics.slush import slush_grip

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Flags, Floats
-from skidpad.core.randomness import stream_key
+from skidpad.core.maths.randomness import stream_key
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind
 from skidpad.physics.contact import Bodies, bodies

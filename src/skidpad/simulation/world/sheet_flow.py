@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
-from skidpad.core.surface import SurfacePatch
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.weather import Weather
 from skidpad.physics.grip import rain_rate, road_surface, runoff_film
 from skidpad.roads.cross_slopes import CrossSlopes, cross_slopes

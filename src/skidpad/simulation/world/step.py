@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Flags, Floats
-from skidpad.core.jit import Held, inner_kernel, kernel
+from skidpad.core.kernels.jit import Held, inner_kernel, kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics.contact import Bodies, ContactLaw, Contacts, resolve_contacts
 from skidpad.physics.grip import grip_of_row, mu_at, stiffness_at, water_drag

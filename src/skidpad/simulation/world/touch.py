@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 from skidpad.core.states import ContactEvent, LaneInvasion, TrafficContact
 from skidpad.physics.contact import Contacts
 from skidpad.roads.kernels import WIDTH, LaneArrays

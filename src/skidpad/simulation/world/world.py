@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, wrap_angle
-from skidpad.core.jit import hold
+from skidpad.core.kernels.jit import hold
 from skidpad.core.setup import DT, ActorCommand, Wind
 from skidpad.core.states import LaneInvasion, VehicleCommand
 from skidpad.core.vocabulary import AntiLock, StabilityControl

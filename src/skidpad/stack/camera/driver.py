@@ -21,9 +21,9 @@ from skidpad.core.errors import require_choice, require_range
 from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import kmh_from_mps
 from skidpad.core.run import Function
+from skidpad.core.settings.stack import StackSettings
 from skidpad.core.setup import DT
 from skidpad.core.specs import SensorSpec
-from skidpad.core.stack_settings import StackSettings
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.camera.codes import AHEAD, Label, mosaic

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame, ChannelView
 from skidpad.core.geometry import footprint
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import LightState, SemanticClass
 from skidpad.roads.kernels import LaneArrays, advance_point, project_point

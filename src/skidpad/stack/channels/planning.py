@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from skidpad.core.arrays import Floats
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.stack.channels.route import PathPoints, locate
 
 ROLL_STEP = 0.25  # s

@@ -11,7 +11,7 @@ import numpy as np
 from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import mps_from_kmh
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import RoadMap
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelView
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.stack.channels.settings import ChannelSettings
 
 GATE = 2.5  # m: a car at 40 m/s may accelerate by 6 m/s^2 for 0.5 s unseen, and errs by 3 sigma

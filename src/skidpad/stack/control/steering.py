@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from skidpad.core.geometry import Pose, kmh_from_mps
 from skidpad.core.run import Function
-from skidpad.core.stack_settings import Lookahead, StackSettings
+from skidpad.core.settings.stack import Lookahead, StackSettings
 from skidpad.roads.queries import LanePoint
 from skidpad.stack.configurations import Functions
 

@@ -9,7 +9,7 @@ from math import sqrt
 from typing import NamedTuple, Protocol
 
 from skidpad.core.run import Function
-from skidpad.core.stack_settings import (
+from skidpad.core.settings.stack import (
     CruiseLaw,
     Follower,
     LightBraking,

@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 from skidpad.core.frames import SensorFrame
 from skidpad.core.run import Function
-from skidpad.core.specs import SensorSpec
-from skidpad.core.stack_settings import (
+from skidpad.core.settings.stack import (
     RadarCandidates,
     RadarCorridor,
     RoofCorridor,
     StackSettings,
     Targets,
 )
+from skidpad.core.specs import SensorSpec
 from skidpad.core.vocabulary import DetectionStatus
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.configurations import Functions

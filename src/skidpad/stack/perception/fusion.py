@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import CameraImage, SensorFrame, image_rows
-from skidpad.core.jit import hold
+from skidpad.core.kernels.jit import hold
 from skidpad.core.specs import CameraSpec, Modality, SensorSpec
 from skidpad.stack.perception import corridor
 from skidpad.stack.perception.corridor import VEHICLES, Corridor, Labels

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.frames import CameraImage, image_rows, pack
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.specs import CameraSpec, SensorSpec
 from skidpad.core.vocabulary import LightState
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from skidpad.core.stack_settings import RadarCloseCheck
+from skidpad.core.settings.stack import RadarCloseCheck
 from skidpad.core.vocabulary import DetectionStatus
 from skidpad.stack.perception.radar import RadarReading
 from skidpad.stack.timing import ticks_to_reach, ticks_within

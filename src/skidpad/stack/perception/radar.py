@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.frames import RadarPoints
 from skidpad.core.geometry import Pose
-from skidpad.core.jit import Held, inner_kernel, kernel
+from skidpad.core.kernels.jit import Held, inner_kernel, kernel
 from skidpad.roads.kernels import LaneArrays, neighbour_s, project_kernel
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.perception.lane_view import MAX_SHIFTS, LaneView

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
-from skidpad.core.constants import G
-from skidpad.core.sight import RoadLook
+from skidpad.core.maths.constants import G
+from skidpad.core.traffic.sight import RoadLook
 from skidpad.stack.reference.following import Manner
 from skidpad.stack.reference.person import Person
 

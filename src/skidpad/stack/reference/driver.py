@@ -18,9 +18,9 @@ from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import mps_from_kmh
 from skidpad.core.sensor_types import read_sensor
 from skidpad.core.setup import DT
-from skidpad.core.sight import DriverView, SeenActors
 from skidpad.core.specs import EyesSpec, SensorSpec
 from skidpad.core.states import StackReport, VehicleCommand
+from skidpad.core.traffic.sight import DriverView, SeenActors
 from skidpad.core.vocabulary import LightState, Supervision, Tier
 from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import RoadMap

@@ -7,7 +7,7 @@ from math import cos, sin, sqrt
 import numpy as np
 
 from skidpad.core.geometry import wrap_angle
-from skidpad.core.sight import SeenActors
+from skidpad.core.traffic.sight import SeenActors
 from skidpad.roads.queries import LanePoint, RoadMap
 from skidpad.stack.channels.route import STEP, PathPoints
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import exp
 
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 
 # Johansson and Rumar (1965), report 26, Uppsala: from a signal to the brake when it comes as a
 # surprise; median 0.9 s, 25 % of drivers above 1.2 s. A log-normal through both.

@@ -10,8 +10,8 @@ import numpy as np
 
 from skidpad.core.arrays import Floats
 from skidpad.core.geometry import Pose
-from skidpad.core.jit import kernel
-from skidpad.core.sight import SeenActors
+from skidpad.core.kernels.jit import kernel
+from skidpad.core.traffic.sight import SeenActors
 from skidpad.roads.queries import LanePoint, RoadMap
 from skidpad.stack.channels.route import STEP, PathPoints, RoutePath, locate, route_path
 

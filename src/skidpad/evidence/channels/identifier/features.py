@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 from skidpad.evidence.channels.hazards import Signal, SignalReadings
 from skidpad.evidence.channels.indicators.catalogue import (
     CHANNEL_INDICATORS,

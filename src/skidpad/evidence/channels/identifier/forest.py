@@ -8,7 +8,7 @@ import numpy as np
 
 from skidpad.core.arrays import Floats, Ints
 from skidpad.core.errors import FileError
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 
 
 class Forest(NamedTuple):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError, FileError
-from skidpad.core.reading import UNUSABLE, read_arrays, read_bytes, unusable
+from skidpad.core.files.reading import UNUSABLE, read_arrays, read_bytes, unusable
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.identifier.features import (
     FEATURE_NAMES,

@@ -16,8 +16,8 @@ from typing import Any
 import msgspec
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.reading import decode_yaml, read_bytes
-from skidpad.core.registry import Registry
+from skidpad.core.files.reading import decode_yaml, read_bytes
+from skidpad.core.objects.registry import Registry
 
 
 class Scope(str, Enum):

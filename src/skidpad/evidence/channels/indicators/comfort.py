@@ -7,7 +7,7 @@ from math import exp, tanh
 import numpy as np
 
 from skidpad.core.arrays import Floats
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 
 STEEPNESS = 0.2  # per m/s^2 and per m/s^3 (C-045)
 MIN_POINTS = 4  # three differences give one jerk (C-041)

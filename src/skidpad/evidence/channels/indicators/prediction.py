@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from skidpad.core.arrays import Floats, Ints
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 from skidpad.evidence.channels.indicators.similarity import pair_points
 
 WAYPOINT_DECAY = 0.95  # per way-point (C-070)

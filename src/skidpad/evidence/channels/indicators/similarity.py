@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from skidpad.core.arrays import Floats, Ints
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 
 VARIANCE_WINDOW = 5  # samples (C-052)
 PAIRING_DISTANCE = 4.0  # m (C-054)

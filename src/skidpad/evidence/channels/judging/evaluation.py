@@ -13,7 +13,7 @@ import polars as pl
 
 from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError, FileError
-from skidpad.core.told import on_a_line
+from skidpad.core.text.told import on_a_line
 from skidpad.core.vocabulary import HazardType, Stratum
 from skidpad.evidence.channels.choices import Profile
 from skidpad.evidence.channels.hazards import SCORED_HAZARDS

@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 
 from skidpad.core.errors import FileError
-from skidpad.core.reading import UNUSABLE, read_arrays
+from skidpad.core.files.reading import UNUSABLE, read_arrays
 from skidpad.evidence.channels.judging.segments import Segment
 
 ARRAYS = ("t", "rows", "motion", "times")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from skidpad.core.constants import G
 from skidpad.core.errors import require_range
+from skidpad.core.maths.constants import G
 
 GRIPS = (0.05, 1.5)  # between wet ice and racing tyres
 NOMINAL_GRIP = 0.9  # of a dry road (`mu_ref` of decision M-1)

@@ -16,7 +16,7 @@ import numpy as np
 
 from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame
-from skidpad.core.constants import G
+from skidpad.core.maths.constants import G
 from skidpad.evidence.channels.tracked.distance import GRIPS
 
 WINDOW = 0.8  # s over which an acceleration is measured

@@ -11,7 +11,7 @@ import msgspec
 import polars as pl
 
 from skidpad import __version__
-from skidpad.core.reading import convert_plain, decode_json, read_bytes
+from skidpad.core.files.reading import convert_plain, decode_json, read_bytes
 from skidpad.evidence.channels.findings import FINDINGS
 from skidpad.evidence.channels.judging.reference import NAME as REFERENCE
 from skidpad.evidence.channels.judging.segments import TOLD

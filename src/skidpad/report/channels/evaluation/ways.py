@@ -10,7 +10,7 @@ import numpy as np
 
 from skidpad.core.arrays import Floats
 from skidpad.core.errors import SkidpadError
-from skidpad.core.wording import count_text
+from skidpad.core.text.wording import count_text
 from skidpad.recording.channels.drives import read_records
 from skidpad.report.elements.figures import Chart, Curve, curves
 from skidpad.report.elements.page import Block, Figure, Text

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import polars as pl
 
 from skidpad.core.errors import FileError
-from skidpad.core.wording import count_text
+from skidpad.core.text.wording import count_text
 from skidpad.recording.campaign.folder import CampaignFolder
 from skidpad.recording.campaign.matrix import PIXELS, MatrixEntry
 from skidpad.report.elements.figures import POINTS, Chart, Curve, curves

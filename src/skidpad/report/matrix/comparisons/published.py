@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 
-from skidpad.core.wording import list_text
+from skidpad.core.text.wording import list_text
 from skidpad.report.elements.figures import Series, grouped_bars, panel
 from skidpad.report.elements.page import Block, Figure, Text
 from skidpad.report.elements.tables import Column, Format, Quantity, table

@@ -7,7 +7,7 @@ from functools import partial
 
 import polars as pl
 
-from skidpad.core.wording import count_text
+from skidpad.core.text.wording import count_text
 from skidpad.evidence.contrasts import paired_runs, per_seed
 from skidpad.evidence.statistics import EVER_SIGNIFICANT, compare_pairs, holm, p_text
 from skidpad.report.elements.page import Block, Cell, Text

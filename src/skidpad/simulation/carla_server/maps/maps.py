@@ -9,8 +9,8 @@ from pathlib import Path
 from shapely.errors import ShapelyError
 
 from skidpad.core.errors import ConfigError, SkidpadError
-from skidpad.core.geodesy import client_geolocation
 from skidpad.core.geometry import Pose
+from skidpad.core.maths.geodesy import client_geolocation
 from skidpad.core.vocabulary import Scenery
 from skidpad.roads.bundled import bundled_maps, load_map, map_file
 from skidpad.roads.lanes import LaneKind

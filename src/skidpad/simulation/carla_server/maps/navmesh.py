@@ -13,7 +13,7 @@ import struct
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.lefthanded import vectors_to_carla
+from skidpad.core.maths.lefthanded import vectors_to_carla
 from skidpad.roads.walkable import CORNERS, WalkMesh
 
 SET_MAGIC, SET_VERSION = 0x4D534554, 1  # "MSET"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from skidpad.core.constants import G
+from skidpad.core.maths.constants import G
 from skidpad.simulation.carla_server.actors.catalogue import Family
 from skidpad.simulation.carla_server.protocol import wire
 from skidpad.simulation.carla_server.protocol.rpc import Shape, Table

@@ -13,7 +13,7 @@ from typing import Any
 import msgpack
 
 from skidpad.core.errors import BackendError
-from skidpad.core.told import on_a_line
+from skidpad.core.text.told import on_a_line
 
 MAX_MESSAGE = 32 * 1024 * 1024  # bytes; the largest real one is an OpenDRIVE text
 MAX_ITEMS = 100_000  # in one array; the largest real one is a batch of commands

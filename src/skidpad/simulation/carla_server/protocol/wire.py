@@ -11,7 +11,7 @@ from typing import Any
 
 from skidpad.core.errors import BackendError
 from skidpad.core.geometry import Pose
-from skidpad.core.lefthanded import (
+from skidpad.core.maths.lefthanded import (
     mirror_value,
     pose_from_carla,
     pose_to_carla,

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.depthcode import bgra_from_inverse_depth
 from skidpad.core.geometry import Pose
+from skidpad.core.kernels.depthcode import bgra_from_inverse_depth
 from skidpad.core.specs import CameraSpec, Modality
 from skidpad.sensors.raster.passes import Pass
 from skidpad.sensors.raster.rasteriser import AUTO_LEVEL

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from skidpad.core.frames import ImuReading
-from skidpad.core.lefthanded import turn_from_carla, vector_from_carla
+from skidpad.core.maths.lefthanded import turn_from_carla, vector_from_carla
 from skidpad.sensors import inertial
 from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.clock import Clock

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
-from skidpad.core.jit import inner_kernel, kernel
-from skidpad.core.lefthanded import vectors_to_carla
+from skidpad.core.kernels.jit import inner_kernel, kernel
+from skidpad.core.maths.lefthanded import vectors_to_carla
 from skidpad.sensors.raster.view import View
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.sensing.images import Camera

@@ -12,7 +12,7 @@ from math import cos, pi, sin, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 from skidpad.sensors.raster.view import View
 
 RADIUS = 1.0  # m

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Bytes
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 
 
 def bgra_from_rgb(packed: NDArray[np.uint32], out: Bytes) -> None:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
 from skidpad.core.geometry import Pose
-from skidpad.core.lefthanded import angles_to_carla, vectors_to_carla
-from skidpad.core.randomness import stream_key
+from skidpad.core.maths.lefthanded import angles_to_carla, vectors_to_carla
+from skidpad.core.maths.randomness import stream_key
 from skidpad.core.specs import RadarSpec
 from skidpad.sensors.ranging.around import STEEPEST_DEG, Fan, RayHits, look_around
 from skidpad.sensors.ranging.beam import Beam

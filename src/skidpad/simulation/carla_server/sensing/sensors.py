@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from time import sleep
 
 from skidpad.core.geometry import Pose
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.simulation.carla_server import snapshot
 from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.clock import Clock

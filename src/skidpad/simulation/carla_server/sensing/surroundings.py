@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.constants import G
 from skidpad.core.geometry import Pose
+from skidpad.core.maths.constants import G
 from skidpad.core.states import ActorStates
 from skidpad.core.states import ActorTable as Bodies
 from skidpad.core.vocabulary import Bodywork

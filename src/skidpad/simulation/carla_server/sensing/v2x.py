@@ -9,7 +9,7 @@ from math import cos, degrees, sin
 import numpy as np
 
 from skidpad.core.geometry import Pose
-from skidpad.core.lefthanded import turn_from_carla, vector_from_carla
+from skidpad.core.maths.lefthanded import turn_from_carla, vector_from_carla
 from skidpad.sensors import inertial
 from skidpad.simulation.carla_server.actors.catalogue import Family
 from skidpad.simulation.carla_server.actors.registry import Actor

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from skidpad.core.constants import G
+from skidpad.core.maths.constants import G
 from skidpad.core.vocabulary import ActorKind
 from skidpad.physics.types import VehicleType
 from skidpad.physics.wind import AIR_DENSITY

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from skidpad.core.constants import G
+from skidpad.core.maths.constants import G
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.carla_server.actors.catalogue import Family
 from skidpad.simulation.carla_server.actors.registry import Actor, ActorTable

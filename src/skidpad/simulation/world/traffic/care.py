@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skidpad.core.constants import G
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
+from skidpad.core.maths.constants import G
 from skidpad.core.setup import Setup
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather

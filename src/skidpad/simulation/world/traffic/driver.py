@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from skidpad.core.arrays import Floats, Ints32
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 from skidpad.simulation.world.traffic import occupancy as occ_
 from skidpad.simulation.world.traffic.care import (
     braking,

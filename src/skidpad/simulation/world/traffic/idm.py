@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 
 T_HEADWAY = 1.5  # s
 GAP_MIN = 2.0  # m

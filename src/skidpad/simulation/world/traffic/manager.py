@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
-from skidpad.core.constants import G
 from skidpad.core.geometry import Pose, mps_from_kmh
-from skidpad.core.randomness import stream, stream_key
+from skidpad.core.maths.constants import G
+from skidpad.core.maths.randomness import stream, stream_key
 from skidpad.core.setup import TrafficSetup
 from skidpad.core.states import ActorStates
 from skidpad.core.vocabulary import ActorKind, TrafficStart

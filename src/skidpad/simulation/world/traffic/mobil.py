@@ -6,7 +6,7 @@ models, eqs. 2 and 4, symmetric rules; politeness from their table 1.
 
 from __future__ import annotations
 
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 
 POLITENESS = 0.3
 B_SAFE = 2.0  # m/s^2, the hardest braking imposed on the new follower; theirs is 4

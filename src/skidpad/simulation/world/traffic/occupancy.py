@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from skidpad.core.arrays import Floats, Ints32
-from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.traffic.network import Network
 

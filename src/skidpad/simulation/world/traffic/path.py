@@ -7,8 +7,8 @@ from math import cos, pi, sin
 import numpy as np
 
 from skidpad.core.arrays import Ints32
-from skidpad.core.jit import inner_kernel, kernel
-from skidpad.core.splitmix import GOLDEN, scrambled, unit
+from skidpad.core.kernels.jit import inner_kernel, kernel
+from skidpad.core.kernels.splitmix import GOLDEN, scrambled, unit
 from skidpad.simulation.world.traffic.network import Network
 
 PATH = 12  # lanes remembered ahead, the present one first

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError, require_choice
-from skidpad.core.lefthanded import lanes_left_from_carla
-from skidpad.core.randomness import stream
+from skidpad.core.maths.lefthanded import lanes_left_from_carla
+from skidpad.core.maths.randomness import stream
 from skidpad.core.setup import VEHICLES_MAX, TrafficSetup
 from skidpad.roads.queries import LanePoint, RoadMap
 

@@ -11,7 +11,7 @@ from math import cos, sin, sqrt
 
 import numpy as np
 
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 from skidpad.simulation.world.traffic.care import (
     bend_speed_sq,
     drive_limit,

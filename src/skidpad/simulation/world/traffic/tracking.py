@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import atan, cos, sin
 
-from skidpad.core.constants import G
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
+from skidpad.core.maths.constants import G
 from skidpad.physics.vehicle import V_CLUTCH, steer_share
 from skidpad.simulation.world.traffic.care import change_pace, steering_limit, traction_limit
 from skidpad.simulation.world.traffic.path import PATH

@@ -15,7 +15,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.randomness import stream
+from skidpad.core.maths.randomness import stream
 from skidpad.core.vocabulary import Headways, Stratum
 
 # Taieb-Maimon and Shinar (2001), Human Factors 43(1): at 50 to 100 km/h drivers follow at 0.98 s when

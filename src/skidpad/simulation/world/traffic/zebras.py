@@ -6,7 +6,7 @@ from math import cos, sin
 
 import numpy as np
 
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.traffic.care import reach
 from skidpad.simulation.world.traffic.path import PATH

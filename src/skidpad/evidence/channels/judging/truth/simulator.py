@@ -11,7 +11,7 @@ from shapely import affinity
 
 from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame, Cycle, TruthFrame
-from skidpad.core.constants import G
+from skidpad.core.maths.constants import G
 from skidpad.core.vocabulary import HazardType, SemanticClass
 from skidpad.evidence.channels.judging.truth.marks import (
     Mark,

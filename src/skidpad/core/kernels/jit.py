@@ -24,11 +24,11 @@ from numba.core.caching import IndexDataCacheFile
 from numba.core.registry import CPUDispatcher
 from numba.experimental import structref
 
-from skidpad.core.refcounts import LeanCompiler
+from skidpad.core.kernels.refcounts import LeanCompiler
 
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
-PACKAGE = Path(__file__).resolve().parents[1]
+PACKAGE = Path(__file__).resolve().parents[2]
 KEPT_CACHES = 4  # of one file
 KERNEL = re.compile(rb"@(inner_)?kernel\b")
 IMPORT = re.compile(r"^ *from (\w+(?:\.\w+)*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)

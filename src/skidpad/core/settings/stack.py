@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from skidpad.core.setting import SettingsPart, setting_field
+from skidpad.core.settings.setting import SettingsPart, setting_field
 
 
 class RoofCorridor(str, Enum):

@@ -15,7 +15,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Generic, Protocol, TypeVar
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.told import describe_value
+from skidpad.core.text.told import describe_value
 
 T = TypeVar("T")
 

@@ -39,9 +39,11 @@ class Tyres(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 @cache
 def known_tyres() -> dict[str, Tyres]:
     """Returns the tyres by name, each kind with each tread depth, kinds sorted."""
-    from skidpad.core.reading import decode_yaml  # YAML comes with it, which --help does not need
+    from skidpad.core.files.reading import (
+        decode_yaml,  # YAML comes with it, which --help does not need
+    )
 
-    where = resources.files("skidpad.core").joinpath("tyres.yaml")
+    where = resources.files(__package__).joinpath("tyres.yaml")
     kinds = decode_yaml(where.read_bytes(), "tyres.yaml", dict[str, Tyres])
     return {
         f"{name}{suffix}": structs.replace(kind, tread_mm=tread)

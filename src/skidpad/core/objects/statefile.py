@@ -25,7 +25,8 @@ import msgspec
 import numpy as np
 from numpy.lib.format import descr_to_dtype, dtype_to_descr
 
-from skidpad.core.checkpoint import (
+from skidpad.core.errors import CheckpointError
+from skidpad.core.objects.checkpoint import (
     Copiers,
     copiers_of,
     put_array,
@@ -35,7 +36,6 @@ from skidpad.core.checkpoint import (
     put_object,
     slots_of,
 )
-from skidpad.core.errors import CheckpointError
 
 Plain = Any  # what msgpack holds: None, numbers, texts, bytes, lists of them
 PACKAGE = __name__.partition(".")[0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from skidpad.core.jit import inner_kernel
+from skidpad.core.kernels.jit import inner_kernel
 
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _MIX_A = np.uint64(0xBF58476D1CE4E5B9)

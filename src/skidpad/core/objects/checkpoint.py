@@ -32,7 +32,7 @@ import msgspec
 import numpy as np
 
 from skidpad.core.errors import CheckpointError
-from skidpad.core.jit import Held
+from skidpad.core.kernels.jit import Held
 
 UNCHANGING = (
     int, float, complex, str, bytes, type(None), Enum, type, ModuleType, BuiltinFunctionType,

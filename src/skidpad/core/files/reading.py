@@ -19,7 +19,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError, FileError
-from skidpad.core.told import clean, on_a_line
+from skidpad.core.text.told import clean, on_a_line
 
 TEXT_MAX = 16 * 1024**2  # bytes of a YAML or JSON file
 DEPTH_MAX = 60  # of nested collections

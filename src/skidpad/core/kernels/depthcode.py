@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.kernels.jit import kernel
 
 RANGE: Final = 1000.0  # m, full scale; there is nothing nearer
 STEPS: Final = 256.0**3 - 1.0  # of the code

@@ -13,7 +13,7 @@ from math import exp, sqrt
 from msgspec import Struct
 
 from skidpad.core.errors import ConfigError, require_range
-from skidpad.core.told import describe_value
+from skidpad.core.text.told import describe_value
 
 # What drivers do beyond the Intelligent Driver Model, pooled over cars of the highD data: a Gaussian
 # process of 0.207 m/s^2 with a squared-exponential kernel of length 1.342 s (Zhang and Sun 2024,

@@ -2,7 +2,7 @@
 
 The names of all settings are unique over the parts, so that a profile is one flat file and `--set`
 one syntax. Each settles a place where the sources contradict themselves or leave something open
-(M-14); what is not here has one reading only. Declared once each: `skidpad.core.setting`.
+(M-14); what is not here has one reading only. Declared once each: `skidpad.core.settings.setting`.
 """
 
 from __future__ import annotations
@@ -16,11 +16,17 @@ from typing import Any
 
 import msgspec
 
+from skidpad.core.environment.lidar_effects import LidarFog
+from skidpad.core.environment.tyres import REFERENCE, known_tyres
 from skidpad.core.errors import ConfigError, require_choice
-from skidpad.core.lidar_effects import LidarFog
-from skidpad.core.setting import Plain, SettingField, SettingsPart, describe_settings, setting_field
-from skidpad.core.stack_settings import StackSettings
-from skidpad.core.tyres import REFERENCE, known_tyres
+from skidpad.core.settings.setting import (
+    Plain,
+    SettingField,
+    SettingsPart,
+    describe_settings,
+    setting_field,
+)
+from skidpad.core.settings.stack import StackSettings
 from skidpad.core.vocabulary import (
     AntiLock,
     Clearance,
@@ -307,7 +313,7 @@ def load_profile(name: str, values: Mapping[str, object] | None = None) -> Setti
 @cache
 def _read_profile(name: str) -> Settings:
     """Returns the settings of a bundled profile, read from its YAML file once."""
-    text = (files("skidpad.core") / "profiles" / f"{name}.yaml").read_text(encoding="utf-8")
+    text = (files(__package__) / "profiles" / f"{name}.yaml").read_text(encoding="utf-8")
     return Settings(profile=name).with_values(msgspec.yaml.decode(text, type=dict[str, Any]))
 
 

@@ -5,7 +5,7 @@
         mu_ref: float = setting_field(0.9, "M-1", "friction of a dry road", low=0.05, high=3.0)
 
 That line is the only place where a setting is declared. Profiles, `--set`, `skidpad profiles`,
-`skidpad.drive`, config.yaml and the page of settings read it from there (`skidpad.core.settings`).
+`skidpad.drive`, config.yaml and the page of settings read it from there (`skidpad.core.settings.parts`).
 """
 
 from __future__ import annotations

@@ -1,0 +1,1 @@
+"""Files of others as plain values, and names that become parts of paths."""

@@ -1,0 +1,1 @@
+"""Constants, conversions of axes and places, random streams, and spaces of values."""

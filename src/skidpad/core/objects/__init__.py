@@ -1,0 +1,1 @@
+"""How objects are made, registered, copied and written as state."""

@@ -1,0 +1,1 @@
+"""Texts for people: words around numbers, and foreign texts that can be printed."""

@@ -21,6 +21,7 @@ from skidpad.evidence.compare import (
 )
 from skidpad.evidence.statistics import holm, sign_tests
 from skidpad.recording.campaign.matrix import MATRIX, Metrics, RunKey
+from skidpad.recording.campaign.results import definitions_of
 
 
 def rows(extra=0, seeds=range(1, 9), outcome="completed"):
@@ -78,6 +79,24 @@ def test_a_rule_that_cannot_be_read_says_how_to_write_one():
         parse_rule("fatal_collisions increases")
     with pytest.raises(ConfigError, match="unknown column 'colour'"):
         parse_rule("colour > 1")
+
+
+def test_a_misspelt_column_names_the_nearest_few_and_how_to_list_all(tmp_path):
+    for name in "ab":
+        MATRIX.write(tmp_path / name, rows())
+    call = ["compare", str(tmp_path / "a"), str(tmp_path / "b"), "--fail-if"]
+    with pytest.raises(ConfigError) as found:
+        CliRunner().invoke(app, [*call, "intervention > 0"], catch_exceptions=False)
+    known = [name for name, _, _ in definitions_of(Metrics)]
+    said = str(found.value)
+    assert said.startswith("unknown column 'intervention'; did you mean 'interventions'")
+    assert said.endswith(f"? All {len(known)} are listed by: skidpad compare --columns")
+    assert 1 <= sum(f"'{name}'" in said for name in known) <= 3
+    with pytest.raises(ConfigError, match="'xyz'; all \\d+ are listed by: skidpad compare"):
+        parse_rule("xyz > 0")
+    listed = CliRunner().invoke(app, ["compare", "--columns"])
+    assert listed.exit_code == 0
+    assert [line.split()[0] for line in listed.stdout.splitlines()[1:]] == known
 
 
 def test_the_command_fails_on_a_regression_and_writes_junit(tmp_path):

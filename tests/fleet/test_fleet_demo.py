@@ -107,6 +107,9 @@ def test_the_command_opens_it_and_says_where(tmp_path):
         [*command, "--out", str(tmp_path / "fleet")], capture_output=True, text=True, check=False
     )
     assert again.returncode == 2, "a folder that holds something is not touched"
+    for folder in ("fleet", "fleet-2"):  # without --out: a folder of its own each time
+        subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
+        assert (tmp_path / "out" / folder / "data").is_dir()
 
 
 LOADED = """

@@ -74,7 +74,7 @@ def a_story(crash: Crash | None = None, **changes: object) -> Story:
     values = {
         "crash": crash or a_crash(), "arrival": None, "arrived": None, "first": None, "news": (),
         "worst": None, "braked": None, "slowed": None, "pushed_by": None, "pusher": "",
-        "followed": (), "put_back": None,
+        "others": (), "put_back": None,
     }  # fmt: skip
     return Story(**(values | changes))  # type: ignore[arg-type]
 
@@ -212,7 +212,7 @@ def test_one_timeline_in_order_of_time_with_mismatches_marked() -> None:
     story = a_story(
         arrival=Arrival.CUT_IN, arrived=CAME, first=SEEN, news=(SEEN, PHANTOM), worst=PHANTOM,
         braked=Moment(0.5, 20.0, 25.0), slowed=Moment(4.0, 40.0, 30.0),
-        followed=((0.7, contact(12.0, None)),), put_back=2.5,
+        others=((0.7, contact(12.0, None)),), put_back=2.5,
     )  # fmt: skip
     events = timeline(story)
     assert [(e.time, e.is_wrong) for e in events] == [

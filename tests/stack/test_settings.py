@@ -100,7 +100,10 @@ def test_assignments(text, name, value):
     ("text", "says"),
     [
         ("mu_ref", r"--set takes name=value, got 'mu_ref'"),
-        ("grib=none", r"unknown setting 'grib'; choose one of: grip, "),
+        (
+            "grib=none",
+            r"unknown setting 'grib'; did you mean 'grip'.* listed by: skidpad profiles show",
+        ),
         ("grip=ice", r"unknown grip 'ice'; choose one of: none, statistical, physical"),
         ("camera=maybe", r"setting camera must be on or off, got 'maybe'"),
         (

@@ -15,9 +15,12 @@ SkidpadError
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
+from difflib import get_close_matches
 from pathlib import Path
 
 from skidpad.core.text.told import clean
+from skidpad.core.text.wording import list_text
 
 
 class SkidpadError(Exception):
@@ -85,8 +88,24 @@ def require_range(field: str, value: float, low: float, high: float) -> float:
     return value
 
 
-def require_choice(field: str, value: str, allowed: list[str] | tuple[str, ...]) -> str:
-    """Returns `value` if it is one of `allowed`; else raises ConfigError that lists them."""
+def require_choice(
+    field: str, value: str, allowed: list[str] | tuple[str, ...], list_command: str = ""
+) -> str:
+    """Returns `value` if it is one of `allowed`; else raises ConfigError that lists them.
+
+    list_command: the command that lists them where they are too many for a sentence, which then
+    names the nearest alone.
+    """
     if value not in allowed:
-        raise ConfigError(f"unknown {field} {value!r}; choose one of: {', '.join(allowed)}")
+        raise ConfigError(describe_unknown(field, value, allowed, list_command))
     return value
+
+
+def describe_unknown(field: str, value: str, allowed: Sequence[str], list_command: str = "") -> str:
+    """Returns the sentence on a name that is none of `allowed`, as `require_choice` raises it."""
+    near = get_close_matches(value, allowed, n=3)
+    hint = f"; did you mean {list_text([repr(name) for name in near], 'or')}?" if near else ""
+    if list_command:
+        listed = f"{hint} All" if near else "; all"
+        return f"unknown {field} {value!r}{listed} {len(allowed)} are listed by: {list_command}"
+    return f"unknown {field} {value!r}; choose one of: {', '.join(allowed)}{hint}"

@@ -18,7 +18,7 @@ import polars as pl
 from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError
 from skidpad.core.text.wording import count_text
-from skidpad.evidence.comparisons import Flaw, parse_comparison
+from skidpad.evidence.comparisons import LIST_COLUMNS, Flaw, parse_comparison
 from skidpad.evidence.contrasts import NOT_RUN
 from skidpad.evidence.statistics import (
     EVER_SIGNIFICANT,
@@ -170,7 +170,7 @@ def parse_rule(text: str) -> Rule:
 
     The comparison is one of > >= < <=; ConfigError for any other form or an unknown column.
     """
-    return Rule(text, *parse_comparison("--fail-if", text, columns()))
+    return Rule(text, *parse_comparison("--fail-if", text, columns(), LIST_COLUMNS))
 
 
 def columns() -> list[str]:

@@ -16,20 +16,24 @@ OPERATORS: dict[str, Callable[[float, float], bool]] = {
     ">": operator.gt,
     "<": operator.lt,
 }
+LIST_COLUMNS = "skidpad compare --columns"  # the command that lists what a rule can be about
 RULE = re.compile(r"^\s*(\w+)\s*(>=|<=|>|<)\s*([-+]?[0-9.]+(?:e[-+]?\d+)?)\s*$")
 
 
 def parse_comparison(
-    option: str, text: str, known: list[str] | tuple[str, ...]
+    option: str, text: str, known: list[str] | tuple[str, ...], list_command: str = ""
 ) -> tuple[str, Callable[[float, float], bool], float]:
-    """Returns a name among `known`, a comparison and a number; ConfigError says what `option` takes."""
+    """Returns a name among `known`, a comparison and a number; ConfigError says what `option` takes.
+
+    list_command: the command that lists `known`, as in `require_choice`.
+    """
     match = RULE.match(text)
     if not match:
         raise ConfigError(
             f"{option} takes COLUMN > NUMBER (or >=, <, <=), got {describe_value(text, 200)}"
         )
     column, sign, number = match.groups()
-    require_choice("column", column, known)
+    require_choice("column", column, known, list_command)
     try:
         limit = float(number)
     except ValueError:

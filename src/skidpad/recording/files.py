@@ -9,6 +9,7 @@ import os
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from io import BytesIO, StringIO
+from itertools import count
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -61,6 +62,12 @@ def require_free(folder: Path) -> Path:
     if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
         raise OutputError(f"{folder} exists already and is not empty; choose another --out")
     return folder
+
+
+def next_free(folder: Path) -> Path:
+    """Returns `folder`, or the first of folder-2, folder-3, ... where nothing is yet."""
+    names = (folder if n == 1 else folder.with_name(f"{folder.name}-{n}") for n in count(1))
+    return next(path for path in names if not path.exists())
 
 
 def write_secret(path: Path, content: bytes) -> None:

@@ -9,9 +9,11 @@ import pytest
 
 from skidpad.core.states import ContactEvent
 from skidpad.core.vocabulary import ActorKind, RelocationReason, Supervision
+from skidpad.evidence.drive.collisions import CrashKind, find_crashes, shown_crashes
 from skidpad.evidence.drive.metrics import run_metrics, weather_metrics
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.evidence.drive.severity import Contact, Measure, Severity, graded_contacts
+from skidpad.evidence.drive.story import tell_story
 from skidpad.recording.campaign.matrix import Metrics
 from skidpad.recording.run.events import Relocation
 from skidpad.recording.run.log import RunLog
@@ -223,3 +225,50 @@ def test_the_weather_that_saw_the_first_reset_has_the_intervention() -> None:
     clear, rain = found["clear-noon"], found["rain-noon"]
     assert (clear.first_intervention_s, clear.undisturbed_s) == (None, pytest.approx(6 * DT))
     assert rain.first_intervention_s == rain.undisturbed_s == pytest.approx(6 * DT)
+
+
+def two_at_once(car_kmh: float, rail_kmh: float = 0.0, kind: ActorKind = ActorKind.CAR) -> RunLog:
+    """A guardrail with the larger impulse at tick 10, a road user two ticks later, then a recovery.
+
+    rail_kmh: what the ego loses at the guardrail; car_kmh: what the road user gains.
+    """
+
+    def rows(k: int) -> list[dict[str, float]]:
+        return [
+            {"x": 50.0, "vx": 20.0 - (k >= TICK) * rail_kmh / KMH},
+            {"x": 54.0, "vx": (k >= TICK + 2) * car_kmh / KMH},
+        ]
+
+    rail = ContactEvent(TICK, -1, "guardrail", 9000.0, 1.0, 0.0, 0.0)
+    table = actor_table(2)
+    table.kind[1] = kind
+    return drive(
+        40,
+        rows,
+        contacts=[rail, touch(tick=TICK + 2)],
+        table=table,
+        supervision=lambda k: BRAKE if TICK + 3 <= k < TICK + 10 else FREE,
+    )
+
+
+@pytest.mark.req("T-4")
+@pytest.mark.parametrize(
+    ("log", "kind", "severity"),
+    [
+        (two_at_once(30.0), CrashKind.VEHICLE, Severity.HEAVY),
+        (two_at_once(3.0, rail_kmh=30.0), CrashKind.STATIC, Severity.HEAVY),
+        (two_at_once(1.0, 30.0, ActorKind.PEDESTRIAN), CrashKind.VEHICLE, Severity.MEDIUM),
+    ],
+    ids=["harder car", "harder guardrail", "a person"],
+)
+def test_a_card_shows_the_contact_that_decides_the_class_and_counts_stay(
+    log: RunLog, kind: CrashKind, severity: Severity
+) -> None:
+    found = prepare(log, straight_map())
+    (shown,), (counted,) = shown_crashes(found), find_crashes(found)
+    assert (shown.kind, shown.contact and shown.contact.severity) == (kind, severity)
+    others = [c for _, c in tell_story(found, shown).others]
+    assert sorted([*others, shown.contact], key=lambda c: c.tick) == list(graded_contacts(found))
+    assert counted.kind is CrashKind.STATIC, "the larger impulse is counted, as published"
+    m = metrics(log)
+    assert (m.interventions, m.collisions_static, m.collisions_vehicle) == (1, 1, 0)

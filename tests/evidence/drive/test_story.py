@@ -275,5 +275,5 @@ def test_a_touch_before_a_departure_is_told_and_what_followed_it() -> None:
     s = tell_story(found, crash)
     assert s.pushed_by is not None
     assert (s.pushed_by.before, s.pusher) == (pytest.approx(1.0), "car 1")
-    assert [round(after, 2) for after, _ in s.followed] == [0.5]
+    assert [round(after, 2) for after, _ in s.others] == [0.5]
     assert s.put_back == pytest.approx(55 * DT)

@@ -357,7 +357,9 @@ def certificate(
 
 @fleet.command()
 def demo(
-    out: Annotated[Path, typer.Option(help="A new folder for everything that the demo makes.")],
+    out: Annotated[
+        Path | None, typer.Option(help="A new folder of the demo; default: out/fleet, numbered.")
+    ] = None,
     vehicles: Annotated[int, typer.Option(min=3, max=1000, help="How many vehicles.")] = 50,
     seconds: Annotated[float, typer.Option(min=5.0, max=600.0, help="Of each drive.")] = 25.0,
     workers: Annotated[int, typer.Option(min=1, max=256, help="Drives at once.")] = 2,
@@ -368,28 +370,29 @@ def demo(
     ] = False,
 ) -> None:
     """Vehicles drive, report, and get a good and a bad update; ends with the dashboard's address."""
-    from skidpad.recording.files import require_free
+    from skidpad.recording.files import next_free, require_free
 
     with fleet_extra():
         from skidpad.cli.fleet.demo import Demo, enrol_fleet, open_recorded, play, pool, serving
+    folder = next_free(Path("out/fleet")) if out is None else require_free(out)
     if recorded:
-        with open_recorded(require_free(out), port, typer.echo):
-            _stay(stay)
+        with open_recorded(folder, port, typer.echo):
+            _stay(stay, folder)
         return
-    maker, operator, cars = enrol_fleet(require_free(out), vehicles)
-    with serving(out / "data", port) as address, pool(workers) as drives:
-        story = Demo(out, address, maker, cars, seconds, drives, typer.echo)
+    maker, operator, cars = enrol_fleet(folder, vehicles)
+    with serving(folder / "data", port) as address, pool(workers) as drives:
+        story = Demo(folder, address, maker, cars, seconds, drives, typer.echo)
         for one in play(story):
             typer.echo(f"{one['payload']}: {one['ended']}")
         for who, token in (("manufacturer", maker), ("operator", operator)):
             path = story.call(token, "POST", "/api/v1/session").json()["path"]
             typer.echo(f"dashboard of the {who}: {address}{path}")
-        _stay(stay)
+        _stay(stay, folder)
 
 
-def _stay(stay: bool) -> None:
-    """Waits until Ctrl-C, or not at all where `stay` is False."""
+def _stay(stay: bool, folder: Path) -> None:
+    """Waits until Ctrl-C, or not at all where `stay` is False; says where the fleet stays."""
     if stay:
-        typer.echo("Ctrl-C ends it")
+        typer.echo(f"Ctrl-C ends it; the fleet stays in {folder}")
         with suppress(KeyboardInterrupt):
             threading.Event().wait()

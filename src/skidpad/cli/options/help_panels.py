@@ -37,7 +37,7 @@ COMMANDS: dict[str, dict[str, str]] = {
         "hazards": "hazards list out/monitored",
         "safety-case": "safety-case out/monitored",
         "view": "view drive.mcap",
-        "fleet": "fleet demo --out out/fleet",
+        "fleet": "fleet demo --recorded",
     },
     "Look something up": {
         "friction": "friction --preset rain_60",

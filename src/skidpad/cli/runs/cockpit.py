@@ -131,7 +131,7 @@ def drive(
     from skidpad.cockpit.parts import list_parts
     from skidpad.cockpit.producer import Producer
     from skidpad.cockpit.serving import serve
-    from skidpad.recording.files import require_free
+    from skidpad.recording.files import next_free, require_free
     from skidpad.simulation.carla.options import Optimisation
 
     require_place(spec)
@@ -285,11 +285,3 @@ def place_of(pages: Pages) -> Place:
     from skidpad.pages.server import Place
 
     return Place(host=pages.page_host, port=pages.page_port)
-
-
-def next_free(folder: Path) -> Path:
-    """Returns `folder`, or the first of folder-2, folder-3, ... where nothing is yet."""
-    from itertools import count
-
-    names = (folder if n == 1 else folder.with_name(f"{folder.name}-{n}") for n in count(1))
-    return next(path for path in names if not path.exists())

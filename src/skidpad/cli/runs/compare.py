@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from skidpad.evidence.comparisons import Flaw, parse_comparison
+from skidpad.evidence.comparisons import LIST_COLUMNS, Flaw, parse_comparison
 
 if TYPE_CHECKING:
     import polars as pl
@@ -37,6 +37,23 @@ SHOWN = (
 )
 
 
+def _list_columns(wanted: bool) -> None:
+    """Prints every column that a rule can be about, with its meaning, and ends the command."""
+    if not wanted:
+        return
+    from rich.table import Table
+
+    from skidpad.cli.output.tables import table_console
+    from skidpad.recording.campaign.matrix import Metrics
+    from skidpad.recording.campaign.results import definitions_of
+
+    table = Table("column", "meaning", box=None, pad_edge=False)
+    for name, meaning, _ in definitions_of(Metrics):
+        table.add_row(name, meaning)
+    table_console().print(table, markup=False)
+    raise typer.Exit
+
+
 def compare(
     a: Annotated[Path, typer.Argument(help="The campaign before, or one run's folder.")],
     b: Annotated[Path, typer.Argument(help="The campaign after, or one run's folder.")],
@@ -56,6 +73,12 @@ def compare(
         list[Flaw] | None,
         typer.Option(help="Data that --fail-if would not pass; may be repeated."),
     ] = None,
+    _columns: Annotated[
+        bool,
+        typer.Option(
+            "--columns", callback=_list_columns, is_eager=True, help="List all columns and exit."
+        ),
+    ] = False,
 ) -> None:
     """Pair two campaigns by configuration, weather and seed; exit 1 on a regression.
 
@@ -109,7 +132,7 @@ def _read_rules(texts: list[str]) -> list[Rule]:
     from skidpad.recording.campaign.results import definitions_of
 
     columns = [name for name, _, _ in definitions_of(Metrics)]
-    read = [(text, parse_comparison("--fail-if", text, columns)) for text in texts]
+    read = [(t, parse_comparison("--fail-if", t, columns, LIST_COLUMNS)) for t in texts]
     from skidpad.evidence.compare import Rule
 
     return [Rule(text, *parts) for text, parts in read]

@@ -14,7 +14,7 @@ from skidpad.cli.output.tables import table_console
 from skidpad.core.errors import FileError
 from skidpad.core.simulator import BackendKind
 from skidpad.core.vocabulary import ActorKind
-from skidpad.evidence.drive.collisions import find_crashes
+from skidpad.evidence.drive.collisions import shown_crashes
 from skidpad.evidence.drive.metrics import run_metrics, weather_metrics
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.evidence.drive.severity import graded_contacts
@@ -85,7 +85,7 @@ def show(run: Path) -> None:
         table.add_row(added.name, _text(added.value), *rest, f"{added.title}, {added.units}")
     console.print(table)
     drive = prepare(log, road_map)
-    for crash in find_crashes(drive):
+    for crash in shown_crashes(drive):
         story = tell_story(drive, crash)
         console.print(f"\n[bold]{crash.t:.2f} s: {headline(crash)}[/]")
         console.print(f"  {write_cause(story)}")

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from functools import cache, partial
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from typing import Generic, Protocol, TypeVar
 
-from skidpad.core.errors import ConfigError
+from skidpad.core.errors import ConfigError, describe_unknown
 from skidpad.core.text.told import describe_value
 
 T = TypeVar("T")
@@ -97,11 +96,7 @@ class Registry(Generic[E]):
         """Returns the entry; for an unknown name ConfigError lists those that exist, and the nearest."""
         source = self.sources().get(name)
         if source is None:
-            near = get_close_matches(name, self.names(), n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise ConfigError(
-                f"unknown {self.noun} {name!r}; choose one of: {', '.join(self.names())}{hint}"
-            )
+            raise ConfigError(describe_unknown(self.noun, name, self.names()))
         return source.load()
 
     def entries(self) -> tuple[E, ...]:

@@ -280,8 +280,8 @@ NAMES = tuple(PART_OF)
 
 
 def find_setting(name: str) -> SettingField:
-    """Returns the setting of this name; ConfigError that lists all names for an unknown one."""
-    require_choice("setting", name, NAMES)
+    """Returns the setting of this name; ConfigError with the nearest names for an unknown one."""
+    require_choice("setting", name, NAMES, "skidpad profiles show recommended")
     return describe_settings(PARTS[PART_OF[name]])[name]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
@@ -86,9 +87,32 @@ def recovery_rows(log: RunLog) -> list[int]:
 
 
 def find_crashes(drive: Drive) -> tuple[Crash, ...]:
-    """Returns all fatal events of a drive in order: recoveries, wrong ways, departures (A-247, R-6)."""
+    """Returns all fatal events of a drive in order: recoveries, wrong ways, departures (A-247, R-6).
+
+    They are what tables count: of several contacts before a recovery, that of the largest impulse.
+    """
+    return _find_crashes(drive, lambda contact: (contact.impulse,))
+
+
+def shown_crashes(drive: Drive) -> tuple[Crash, ...]:
+    """Returns the events of `find_crashes`, each by the contact that decides its class (T-4).
+
+    A person or two wheels come first, then what was hit hardest, then the larger impulse.
+    """
+
+    def rank(contact: ContactEvent) -> tuple[float, ...]:
+        graded = grade(drive, contact)
+        return graded.is_vulnerable, graded.v_graded, contact.impulse
+
+    return _find_crashes(drive, rank)
+
+
+def _find_crashes(
+    drive: Drive, rank: Callable[[ContactEvent], tuple[float, ...]]
+) -> tuple[Crash, ...]:
+    """Returns all fatal events in order; a recovery is about the contact before it that ranks highest."""
     log = drive.log
-    crashes = [_crash(drive, row, _culprit(log, row)) for row in recovery_rows(log)]
+    crashes = [_crash(drive, row, _culprit(log, row, rank)) for row in recovery_rows(log)]
     crashes += [
         _correct_crash(drive, drive.row(r.tick), CORRECTIONS[r.reason])
         for r in log.relocations
@@ -105,11 +129,13 @@ def contact_crashes(drive: Drive) -> tuple[Crash, ...]:
     return tuple(_crash(drive, drive.row(c.tick), c) for c in first.values())
 
 
-def _culprit(log: RunLog, row: int) -> ContactEvent | None:
-    """Returns the hardest contact within RECOVERY_LAG before a recovery began at `row`; None without any."""
+def _culprit(
+    log: RunLog, row: int, rank: Callable[[ContactEvent], tuple[float, ...]]
+) -> ContactEvent | None:
+    """Returns the contact that ranks highest within RECOVERY_LAG before a recovery at `row`; None: none."""
     tick, lag = int(log.tick[row]), RECOVERY_LAG / log.header.dt
     recent = [c for c in log.contacts if 0 <= tick - c.tick <= lag]
-    return max(recent, key=lambda c: c.impulse, default=None)
+    return max(recent, key=rank, default=None)
 
 
 def _crash(drive: Drive, row: int, contact: ContactEvent | None) -> Crash:

@@ -20,6 +20,7 @@ from skidpad.evidence.drive.collisions import (
     CHAIN_TIME,
     JUST_BEFORE,
     LOOK_BACK,
+    RECOVERY_LAG,
     Crash,
     last_stretch,
     number,
@@ -90,7 +91,7 @@ class Story:
     slowed: Moment | None  # when the other car began to slow, with its speed then
     pushed_by: Moment | None  # a contact with a vehicle just before a departure
     pusher: str
-    followed: tuple[tuple[float, Contact], ...]  # s after, until the ego was put back
+    others: tuple[tuple[float, Contact], ...]  # s after, from just before until it was put back
     put_back: float | None  # s after
 
     @property
@@ -119,7 +120,7 @@ def tell_story(drive: Drive, crash: Crash) -> Story:
         slowed=None if crash.actor is None else _find_slowing(way, crash.actor),
         pushed_by=None if pushed is None else Moment(_seconds(drive, crash, pushed), np.nan),
         pusher="" if pushed is None else pushed.other,
-        followed=_list_later_contacts(drive, crash),
+        others=_list_other_contacts(drive, crash, pushed),
         put_back=_find_put_back(drive, crash),
     )
 
@@ -361,35 +362,41 @@ def _seconds(drive: Drive, crash: Crash, contact: Contact) -> float:
     return (crash.tick - contact.tick) * drive.log.header.dt
 
 
-def _list_later_contacts(drive: Drive, crash: Crash) -> tuple[tuple[float, Contact], ...]:
-    """Returns the contacts after the crash until the supervisor gives the ego back, with s after it."""
-    end = _end_of_recovery(drive, crash)
-    if end is None:
+def _list_other_contacts(
+    drive: Drive, crash: Crash, pushed: Contact | None
+) -> tuple[tuple[float, Contact], ...]:
+    """Returns the contacts from RECOVERY_LAG before a recovery to its end, with s after the crash.
+
+    Without that of the crash and the one that pushed the ego; empty without a recovery.
+    """
+    found = _find_recovery(drive, crash)
+    if found is None:
         return ()
-    last = int(drive.log.tick[end])
+    begin, last = (int(drive.log.tick[row]) for row in found)
+    first = begin - RECOVERY_LAG / drive.log.header.dt
     return tuple(
         (-_seconds(drive, crash, c), c)
         for c in graded_contacts(drive)
-        if crash.tick <= c.tick <= last and c != crash.contact
+        if first <= c.tick <= last and c not in (crash.contact, pushed)
     )
 
 
 def _find_put_back(drive: Drive, crash: Crash) -> float | None:
     """Returns the time in s from the crash to the ego's first move back in its recovery; None if none."""
-    end = _end_of_recovery(drive, crash)
-    if end is None:
+    found = _find_recovery(drive, crash)
+    if found is None:
         return None
-    last = int(drive.log.tick[end])
+    last = int(drive.log.tick[found[1]])
     ticks = [r.tick for r in drive.log.relocations if crash.tick <= r.tick <= last]
     return (ticks[0] - crash.tick) * drive.log.header.dt if ticks else None
 
 
-def _end_of_recovery(drive: Drive, crash: Crash) -> int | None:
-    """Returns the last row of the supervised stretch that the crash began; None: no supervisor took over."""
+def _find_recovery(drive: Drive, crash: Crash) -> tuple[int, int] | None:
+    """Returns first and last row of the supervised stretch that the crash began; None: there is none."""
     at = drive.row(crash.tick)
     begins = np.flatnonzero(~drive.free[at : at + 1 + round(0.3 / drive.log.header.dt)])
     if not begins.size:
         return None
     begin = at + int(begins[0])
     ends = np.flatnonzero(drive.free[begin:])
-    return begin + int(ends[0]) - 1 if ends.size else len(drive.log) - 1
+    return begin, begin + int(ends[0]) - 1 if ends.size else len(drive.log) - 1

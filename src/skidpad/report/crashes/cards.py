@@ -170,7 +170,7 @@ def timeline(story: Story) -> list[Event]:
             parts = [text, moment.v and f"from {format_speed(moment.v)}", format_gap(moment)]
             found.append((moment.before, _event(moment.before, [p for p in parts if p])))
     found.append((0.0, _event(0.0, [headline(crash)])))
-    found += [(-after, _event(-after, [contact_text(c)])) for after, c in story.followed]
+    found += [(-after, _event(-after, [contact_text(c)])) for after, c in story.others]
     if story.put_back is not None:
         found.append(
             (-story.put_back, _event(-story.put_back, ["the ego is put back on its lane"]))

@@ -10,7 +10,7 @@ import polars as pl
 from skidpad.core.files.names import slug
 from skidpad.core.text.wording import count_text
 from skidpad.evidence.contrasts import drive_hash
-from skidpad.evidence.drive.collisions import find_crashes
+from skidpad.evidence.drive.collisions import shown_crashes
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.recording.campaign.folder import snapshot
 from skidpad.recording.run.log_files import read_log
@@ -96,9 +96,10 @@ def crash_sections(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[Blo
         return [Text("No intervention: no crash and no departure.")]
     intro = Text(
         "The hardest crashes of each cell, without the worst of a configuration, which stands in "
-        "the first section. Times count from the contact. A drive that moved alike in several "
-        "weathers stands once, under the first of them. Every other crash stands on its cell's own "
-        "page in the folder cards."
+        "the first section. Times count from the contact. Of several contacts at once a card is "
+        "about the one that decides the class; tables count the one with the largest impulse. A "
+        "drive that moved alike in several weathers stands once, under the first of them. Every "
+        "other crash stands on its cell's own page in the folder cards."
     )
     runs, worst = crashed_runs(matrix), _worst(crashes)
     cells = [
@@ -146,7 +147,7 @@ def _crashes(matrix: Matrix, name: str) -> Iterator[Found]:
         log = read_log(run)
         road_map = kept_map(matrix.folder.path, log.header.map, log.header.map_hash)
         drive = prepare(log, road_map)
-        yield from ((crash, drive, road_map, run) for crash in find_crashes(drive))
+        yield from ((crash, drive, road_map, run) for crash in shown_crashes(drive))
 
 
 def _cell_block(

@@ -36,6 +36,7 @@ PLAN = RESULTS / "preregistration.yaml"
 CLAIMS = RESULTS / "claims.md"
 REFERENCE = "matrix-figure8"  # what others on the same seeds are held against
 REMEDIES = "remedy-none"  # what remedies of the same commit are held against
+OBJECTS = "objects"  # cells on objects by a campaign's own commit, where the matrix was driven again since
 MATRICES = (REFERENCE, "matrix-motorway", "matrix-foreign", "matrix-pixels-two")
 PAGES = ("docs/matrix.md", "docs/matrix-tables.md", "docs/grip.md", "docs/envelope-proof.md")
 BLOCK = re.compile(r"(<!-- results: (\S+) (\S+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
@@ -104,9 +105,7 @@ def block(name: str, which: str, folder: Path) -> str:
         "adas verdicts": lambda path: result_matrix.verdicts(
             [path.with_name(name) for name in MATRICES]
         ),
-        "adas against": lambda path: result_matrix.against(
-            path.with_name(reference_of(path)), path
-        ),
+        "adas against": lambda path: result_matrix.against(reference_of(path), path),
         "adas envelope": result_envelope.rivals,
         "adas goals": result_envelope.goals,
         "adas routes": result_envelope.routes,
@@ -121,13 +120,18 @@ def block(name: str, which: str, folder: Path) -> str:
     return driven(folder) + tables[f"{words[0]} {which}"](folder)
 
 
-def reference_of(folder: Path) -> str:
-    """What a campaign on the same seeds is held against; a remedy, where it can be, at its commit."""
+def reference_of(folder: Path) -> Path:
+    """What a campaign on the same seeds is held against.
+
+    That is what was kept with it in `objects`, else a remedy's base of the same commit, else the matrix.
+    """
+    if (folder / OBJECTS).is_dir():
+        return folder / OBJECTS
     own, base = folder / "driven.json", folder.with_name(REMEDIES) / "driven.json"
     if not folder.name.startswith("remedy-") or not base.is_file():
-        return REFERENCE
+        return folder.with_name(REFERENCE)
     commits = {json.loads(path.read_text(encoding="utf-8"))["commit"] for path in (own, base)}
-    return REMEDIES if len(commits) == 1 else REFERENCE
+    return folder.with_name(REMEDIES if len(commits) == 1 else REFERENCE)
 
 
 def driven(folder: Path) -> str:

@@ -137,6 +137,12 @@ def test_levels_are_paired_by_seed_and_few_seeds_have_no_bound(tmp_path):
     rows = tables.block("matrix-pixels", "against", pixels).splitlines()
     assert any(row.startswith("| all | interventions | 8 | +4.50 | [") for row in rows)
     assert "| all | crashes with vehicles | 8 | +0.00 | no limits |" in rows
+    kept = pixels / "objects"  # of the same commit, where the matrix was driven again
+    kept.mkdir()
+    more.write_parquet(kept / "results.parquet")
+    assert "| all | interventions | 8 | +0.00 | no limits |" in tables.block(
+        "matrix-pixels", "against", pixels
+    )
 
 
 def test_a_remedy_is_held_against_the_cells_of_its_own_commit(tmp_path):

@@ -15,9 +15,11 @@ from __future__ import annotations
 import argparse
 import csv
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterable, Sequence
 from math import inf, pi
 from pathlib import Path
@@ -46,6 +48,8 @@ STEP, SAMPLE = 0.05, 0.2  # s, of the players and of what is stored
 OPTIONS = f"--fixed_timestep {STEP} --disable_controllers"
 LEAST_WAY = 5.0  # m that an entity of a corpus moves to be counted
 CORPUS_END = 40.0  # s of a file of others
+RECORD_MAX = 10_000_000  # bytes that esmini writes before it is interrupted: minutes of a file
+WALL_MAX = 30.0  # s after which it is interrupted, too
 NOT_COMPARABLE = {  # by the file's hash: why its motion is nothing to compare
     "5238302359bb20b98c5061f5c501e6829825afed8a79a40e6f18ad3c5640236e": (
         "swarm.xosc of esmini: a TrafficSwarmAction, whose vehicles esmini draws at random"
@@ -64,9 +68,9 @@ def run_esmini(programs: Path, file: Path, roads: Path | None = None) -> Referen
         command += [*OPTIONS.split(), "--record", str(record), "--disable_stdout", "--disable_log"]
         if roads is not None:
             command += ["--path", str(roads.resolve())]
-        done = subprocess.run(command, cwd=folder, timeout=60, check=False, capture_output=True)
-        if not record.exists() or done.returncode not in (0, 255):
-            raise RuntimeError(f"esmini does not play {file.name} (exit {done.returncode})")
+        code = _run_until_recorded(command, record)
+        if not record.exists() or code not in (0, 255):
+            raise RuntimeError(f"esmini does not play {file.name} (exit {code})")
         rows = [str((programs / "dat2csv").resolve()), "--file", str(record), "--precision", "6"]
         subprocess.run(rows, cwd=folder, timeout=60, check=True, capture_output=True)
         lines = record.with_suffix(".csv").read_text().splitlines()
@@ -78,6 +82,23 @@ def run_esmini(programs: Path, file: Path, roads: Path | None = None) -> Referen
             state = State(*(float(row[k]) for k in ("x", "y", "h", "speed")))
             entities.setdefault(row["name"], {})[ms] = state
     return Reference(_version(programs), OPTIONS, file_hash(file), entities)
+
+
+def _run_until_recorded(command: Sequence[str], record: Path) -> int:
+    """Runs esmini until it ends, or interrupts it after a long record or time; returns its exit status.
+
+    Many files never end by themselves; of what stands still esmini records nothing more.
+    """
+    quiet = subprocess.DEVNULL
+    end = time.monotonic() + WALL_MAX
+    with subprocess.Popen(command, cwd=record.parent, stdout=quiet, stderr=quiet) as running:
+        while running.poll() is None:
+            time.sleep(0.05)
+            long = record.exists() and record.stat().st_size > RECORD_MAX
+            if long or time.monotonic() > end:
+                running.send_signal(signal.SIGINT)
+                return running.wait(WALL_MAX)
+    return running.returncode
 
 
 def _version(programs: Path) -> str:

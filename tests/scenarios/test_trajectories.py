@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from math import cos, hypot, pi, sin, sqrt
+from math import atan, cos, hypot, pi, sin, sqrt
 
 import pytest
 from typer.testing import CliRunner
@@ -258,6 +258,29 @@ coordinateSystem="{axes}"/>"""
     follows = story(event("e", follow(tilted_line(), ABSOLUTE), time(1.0)))
     result = told(tmp_path, stories=follows, stop=condition(by_entity(half, "other")), minor=3)
     assert result.rows[-1].time == pytest.approx(2.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("height", "v", "pitch"),
+    [
+        ('z="{z}"', 10, -atan(0.1)),
+        ('z="{z}"', -10, atan(0.1)),  # rear first up the line: nose down
+        ('z="{z}" p="0.25"', 10, 0.25),
+        ("", 10, 0.0),
+    ],
+)
+def test_a_pitch_that_is_not_said_comes_from_the_climb_of_the_line(tmp_path, height, v, pitch):
+    rows = [(200 + x, height.format(z=0.1 * x)) for x in (0, 20, 40)]
+    line = polyline(*((None, f'<WorldPosition x="{x}" y="-1.75" {z}/>') for x, z in rows))
+    half = f"""<AngleCondition angleType="pitch" angle="{pitch}" angleTolerance="0.001"
+coordinateSystem="world"/>"""
+    begin = init("ego") + init("other", teleport(on_lane(-1, 200)), speed(to(v)))
+    stop = condition(by_entity(half, "other"))
+    later = f'<Condition name="t" delay="0" conditionEdge="none">{time(1.45)}</Condition>'
+    stop = stop.replace("</ConditionGroup>", f"{later}</ConditionGroup>")
+    stories = story(event("e", follow(line), time(1.0)))
+    result = told(tmp_path, init=begin, stories=stories, stop=stop, minor=3)
+    assert result.rows[-1].time == pytest.approx(1.45, abs=1e-6)
 
 
 def test_the_folder_and_osi_have_the_tilts(tmp_path):

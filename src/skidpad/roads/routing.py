@@ -28,10 +28,12 @@ class _Node:
     first: bool
 
 
-def shortest_route(map: RoadMap, start: LanePoint, goal: LanePoint) -> LaneRoute | None:
+def shortest_route(
+    map: RoadMap, start: LanePoint, goal: LanePoint, *, change_cost: float = CHANGE_COST
+) -> LaneRoute | None:
     """Returns the cheapest route by Dijkstra's algorithm; None when the goal cannot be reached.
 
-    Lane changes go to neighbours of the same direction and cost as much as CHANGE_COST metres. A goal
+    Lane changes go to neighbours of the same direction and cost as much as change_cost metres. A goal
     behind the start on the same lane is reached around, if at all.
     """
     origin = _Node(start.lane, True)
@@ -49,7 +51,7 @@ def shortest_route(map: RoadMap, start: LanePoint, goal: LanePoint) -> LaneRoute
             total = cost + goal.s - done
             if best is None or total < best[0]:
                 best = total, node
-        for following, extra in _steps(map, node, done):
+        for following, extra in _steps(map, node, done, change_cost):
             if cost + extra < costs.get(following, float("inf")):
                 costs[following] = cost + extra
                 parents[following] = node
@@ -67,7 +69,9 @@ def _entered_at(map: RoadMap, start: LanePoint, node: _Node) -> float:
     return start.s / float(map.lanes.length[start.lane]) * float(map.lanes.length[node.lane])
 
 
-def _steps(map: RoadMap, node: _Node, done: float) -> Iterator[tuple[_Node, float]]:
+def _steps(
+    map: RoadMap, node: _Node, done: float, change_cost: float
+) -> Iterator[tuple[_Node, float]]:
     """Yields (next node, cost in m) for each drivable successor and each lane change from a node.
 
     done: m along the node's lane where the route came onto it.
@@ -78,7 +82,7 @@ def _steps(map: RoadMap, node: _Node, done: float) -> Iterator[tuple[_Node, floa
             yield _Node(lane, False), rest
     for lane in (int(map.lanes.left[node.lane]), int(map.lanes.right[node.lane])):
         if lane >= 0:
-            yield _Node(lane, node.first), CHANGE_COST
+            yield _Node(lane, node.first), change_cost
 
 
 def _route(

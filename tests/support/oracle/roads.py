@@ -96,6 +96,81 @@ def fork() -> str:
     return network(*roads, f'<junction name="" id="10">{links}</junction>')
 
 
+def detour() -> str:
+    """From road 1 the outer lane leads straight to road 4, by road 2; the inner one by road 3, and to 5.
+
+    Road 3 is a detour to the left; road 5 ends after 60 m.
+    """
+    bows = ((10.0 * pi, 0.05), (20.0 * pi, -0.05), (10.0 * pi, 0.05))
+    spots = ((120.0, 0.0, 0.0), (140.0, 20.0, pi / 2), (180.0, 20.0, -pi / 2))
+    bow, s = "", 0.0
+    for (length, k), (x, y, h) in zip(bows, spots, strict=True):
+        bow += f"""<geometry s="{s}" x="{x}" y="{y}" hdg="{h}" length="{length}">{ARC.format(k)}
+</geometry>"""
+        s += length
+    whole = road((100.0, LINE))
+    return network(
+        whole.replace("<link/>", _ends(after=10), 1),
+        road((100.0, LINE), id=4, start=(220.0, 0.0, 0.0)).replace("<link/>", _ends(before=20), 1),
+        _one_way(2, (120.0, -3.5, 0.0), (80.0, LINE), _ends(10, 20)),
+        _one_way(3, (120.0, 0.0, 0.0), (s, LINE), _ends(10, 20), bow),
+        _one_way(5, (120.0, 0.0, 0.0), (60.0, LINE), _ends(before=10)),
+        *(_link(*piece) for piece in DETOUR),
+        *(f'<junction name="" id="{id}">{"".join(_told(p) for p in DETOUR if p[5] == id)}</junction>'
+          for id in (10, 20)),
+    )  # fmt: skip
+
+
+# id, from road and lane, to road and lane, y and x of the reference line's begin, junction
+DETOUR = (
+    (11, (1, -2), (2, -1), -3.5, 100.0, 10),
+    (13, (1, -1), (5, -1), 0.0, 100.0, 10),
+    (12, (1, -1), (3, -1), 0.0, 100.0, 10),
+    (21, (2, -1), (4, -2), -3.5, 200.0, 20),
+    (22, (3, -1), (4, -1), 0.0, 200.0, 20),
+)
+
+
+def _ends(before: int | None = None, after: int | None = None) -> str:
+    ends = (("predecessor", before), ("successor", after))
+    links = (f'<{k} elementType="junction" elementId="{j}"/>' for k, j in ends if j is not None)
+    return f"<link>{''.join(links)}</link>"
+
+
+def _one_way(
+    id: int,
+    start: tuple[float, float, float],
+    shape: tuple[float, str],
+    links: str,
+    plan: str = "",
+    own: str = lane(-1),
+    junction: int = -1,
+) -> str:
+    """A road with one lane on the right."""
+    (x, y, h), (length, form) = start, shape
+    plan = plan or f'<geometry s="0" x="{x}" y="{y}" hdg="{h}" length="{length}">{form}</geometry>'
+    return f"""<road name="" length="{length}" id="{id}" junction="{junction}">{links}<planView>{plan}
+</planView><lanes><laneSection s="0"><center><lane id="0" type="none" level="false"/></center>
+<right>{own}</right></laneSection></lanes></road>"""
+
+
+def _link(
+    id: int, a: tuple[int, int], b: tuple[int, int], y: float, x: float, junction: int
+) -> str:
+    """A connecting road, straight on for 20 m."""
+    links = f"""<link><predecessor elementType="road" elementId="{a[0]}" contactPoint="end"/>
+<successor elementType="road" elementId="{b[0]}" contactPoint="start"/></link>"""
+    lanes = f'<link><predecessor id="{a[1]}"/><successor id="{b[1]}"/></link>'
+    own = lane(-1).replace("<link/>", lanes)
+    return _one_way(id, (x, y, 0.0), (20.0, LINE), links, own=own, junction=junction)
+
+
+def _told(piece: tuple[int, tuple[int, int], tuple[int, int], float, float, int]) -> str:
+    id, (road_id, lane_id) = piece[:2]
+    return f"""<connection id="{id}" incomingRoad="{road_id}" connectingRoad="{id}" contactPoint="start">
+<laneLink from="{lane_id}" to="-1"/></connection>"""
+
+
 RISE = """<elevation s="0" a="0" b="0" c="0" d="0"/><elevation s="100" a="0" b="0" c="0.0004" d="0"/>
 <elevation s="200" a="4" b="0.08" c="0" d="0"/>"""
 
@@ -116,5 +191,6 @@ ROADS = {
         road((600.0, LINE), banks='<superelevation s="0" a="0.5" b="0" c="0" d="0"/>')
     ),
     "fork": fork(),
+    "detour": detour(),
     "cross": network(road((600.0, LINE)), road((400.0, LINE), id=2, start=(200.0, -200.0, pi / 2))),
 }

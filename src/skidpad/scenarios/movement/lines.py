@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import atan2, cos, hypot, pi, sin
 
@@ -24,6 +24,7 @@ class Vertex:
     """A point of a line; what is not said is None. time: s; heading: rad.
 
     pitch, roll: of an entity there, rad, nose down and left side up; 0 and 0 are those of the road.
+    A pitch of None is that of the line, by the heights of its points.
     """
 
     x: float
@@ -31,15 +32,16 @@ class Vertex:
     z: float
     heading: float | None = None
     time: float | None = None
-    pitch: float = 0.0
+    pitch: float | None = 0.0
     roll: float = 0.0
 
 
 class Line:
     """Points with their lengths and headings, and with times where all have one.
 
-    Headings that the vertices do not name are those of the motion from point to point. A closed
-    line goes back to its first point, at a time that nobody says: its times end before that.
+    Headings that the vertices do not name are those of the motion from point to point, and so are
+    pitches that are None. A closed line goes back to its first point, at a time that nobody says: its
+    times end before that.
     tangential: the headings of the vertices are those of the line, and say nothing about the entity.
     """
 
@@ -80,6 +82,16 @@ class Line:
         """Returns whether the vertices say how an entity looks at length s."""
         k, _ = self._find(self.s, s)
         return self.named[k] is not None and not self.tangential
+
+    def rear_first(self, s: float) -> Pose:
+        """Returns the pose at length s in m of what looks back along the line where that names nothing."""
+        pose, (k, _) = self.at_length(s), self._find(self.s, s)
+        pitch = -pose.pitch if self.pitch[k] is None else pose.pitch
+        return (
+            pose
+            if self.names_heading(s)
+            else replace(pose, pitch=pitch, yaw=wrap_angle(pose.yaw + pi))
+        )
 
     def at_time(self, t: float) -> Pose:
         """Returns the pose at time t s, clamped to the line; linear between points."""
@@ -152,30 +164,40 @@ class Line:
             self.y[k] + u * (self.y[j] - self.y[k]),
             self.z[k] + u * (self.z[j] - self.z[k]),
             self.roll[k] + u * wrap_angle(self.roll[j] - self.roll[k]),
-            self.pitch[k] + u * wrap_angle(self.pitch[j] - self.pitch[k]),
-            self._heading(k, j, u),
+            self._angle(self.pitch, self._climb, k, j, u),
+            self._angle(self.named, self._course, k, j, u),
         )
 
-    def _heading(self, k: int, j: int, u: float) -> float:
-        """Returns the yaw in rad at share u from point k to j: as named, else tangential, corners rounded."""
-        a, b = self.named[k], self.named[j]
+    def _angle(
+        self,
+        named: Sequence[float | None],
+        course: Callable[[int], float],
+        k: int,
+        j: int,
+        u: float,
+    ) -> float:
+        """Returns an angle in rad at share u from point k to j: as named, else tangential, corners rounded.
+
+        course: that of the line from a point to the next.
+        """
+        a, b = named[k], named[j]
         if a is not None and b is not None:
             return wrap_angle(a + u * ((b - a + pi) % (2.0 * pi) - pi))
         if a is not None and u == 0.0:
             return wrap_angle(a)
-        here = self._course(k)
+        here = course(k)
         length = self.s[j] - self.s[k]
         radius = min(CORNER, 0.5 * length)
         before, after = u * length, (1.0 - u) * length
-        if before < radius and k > 0 and self.named[k - 1] is None:
-            return self._mix_headings(self._course(k - 1), here, 0.5 + 0.5 * before / radius)
+        if before < radius and k > 0 and named[k - 1] is None:
+            return self._mix(course(k - 1), here, 0.5 + 0.5 * before / radius)
         if after < radius and j < len(self.x) - 1 and b is None:
-            return self._mix_headings(here, self._course(j), 0.5 - 0.5 * after / radius)
+            return self._mix(here, course(j), 0.5 - 0.5 * after / radius)
         return here
 
     @staticmethod
-    def _mix_headings(a: float, b: float, u: float) -> float:
-        """Returns the yaw in rad at the share u of the shorter turn from a to b."""
+    def _mix(a: float, b: float, u: float) -> float:
+        """Returns the angle in rad at the share u of the shorter turn from a to b."""
         return wrap_angle(a + u * wrap_angle(b - a))
 
     def _course(self, k: int) -> float:
@@ -183,14 +205,25 @@ class Line:
 
         Where none has a length, the heading of the point, else 0.
         """
+        k, j = self._apart(k)
+        if hypot(self.x[j] - self.x[k], self.y[j] - self.y[k]) < NEAR:
+            return wrap_angle(self.named[k] or 0.0)
+        return atan2(self.y[j] - self.y[k], self.x[j] - self.x[k])
+
+    def _climb(self, k: int) -> float:
+        """Returns the pitch in rad of the segment at point k, nose down, as `_course` its direction."""
+        k, j = self._apart(k)
+        way = hypot(self.x[j] - self.x[k], self.y[j] - self.y[k])
+        return atan2(self.z[k] - self.z[j], way) if way >= NEAR else 0.0
+
+    def _apart(self, k: int) -> tuple[int, int]:
+        """Returns the points of the segment that begins at point k, or of the nearest with a length."""
         j = min(k + 1, len(self.x) - 1)
         while j < len(self.x) - 1 and hypot(self.x[j] - self.x[k], self.y[j] - self.y[k]) < NEAR:
             j += 1
         while k > 0 and hypot(self.x[j] - self.x[k], self.y[j] - self.y[k]) < NEAR:
             k -= 1
-        if j == k or hypot(self.x[j] - self.x[k], self.y[j] - self.y[k]) < NEAR:
-            return wrap_angle(self.named[k] or 0.0)
-        return atan2(self.y[j] - self.y[k], self.x[j] - self.x[k])
+        return k, j
 
 
 def clothoid(
@@ -226,7 +259,8 @@ def nurbs(
 ) -> list[Vertex]:
     """Returns points of a rational B-spline; time is a dimension of it where every point has one.
 
-    It runs evenly along the spline where only the ends have times, and has none without both.
+    It runs evenly along the spline where only the ends have times, and has none without both. All
+    points have the pitch of the first control point.
     """
     from scipy.interpolate import BSpline  # 20 MB that only a file with splines needs
 
@@ -243,7 +277,7 @@ def nurbs(
     xyz = rows[:, :3] / rows[:, 3:]
     t0, t1 = points[0].time, points[-1].time
     if t0 is None or t1 is None or t1 <= t0:
-        return [Vertex(x, y, z) for x, y, z in xyz.tolist()]
+        return [Vertex(x, y, z, pitch=points[0].pitch) for x, y, z in xyz.tolist()]
     times = [p.time for p in points if p.time is not None]
     if len(times) == n:
         t = BSpline(np.array(knots), w * times, degree)(u) / rows[:, 3]
@@ -251,7 +285,7 @@ def nurbs(
         s = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(xyz[:, :2], axis=0).T))))
         t = t0 + (t1 - t0) * s / max(float(s[-1]), NEAR)
     return [
-        Vertex(x, y, z, None, when)
+        Vertex(x, y, z, None, when, points[0].pitch)
         for (x, y, z), when in zip(xyz.tolist(), t.tolist(), strict=True)
     ]
 

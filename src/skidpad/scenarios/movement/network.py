@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import atan, cos, sin
@@ -263,7 +264,25 @@ class Network:
             for i, way in ways.items()
             if way & set(roads)
         }
-        return min(ranks, key=lambda i: ranks[i], default=None)
+        if at >= 0 or len(ranks) < 2:
+            return min(ranks, key=lambda i: ranks[i], default=None)
+        return min(ranks, key=lambda i: (self._turns_back(i, roads, ranks[i], step), ranks[i]))
+
+    def _turns_back(
+        self, lane: int, roads: tuple[int, ...], k: int, step: Callable[[int], Sequence[int]]
+    ) -> bool:
+        """Returns whether a lane that leads to roads[k] comes there against the way of the roads."""
+        road = self.map.lanes.road
+        reached = {lane} if int(road[lane]) == roads[k] else set(map(int, step(lane)))
+        reached = {i for i in reached if int(road[i]) == roads[k]}
+        seen: set[int] = set()
+        while reached:
+            seen |= reached
+            further = {int(j) for i in reached for j in step(i)}
+            if any(int(road[j]) in roads[k + 1 : k + 2] for j in further):
+                return False
+            reached = {j for j in further - seen if int(road[j]) == roads[k]}
+        return k + 1 < len(roads)
 
 
 def next_lane_id(lane: int, change: int) -> int:

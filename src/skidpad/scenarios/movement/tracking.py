@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
-from math import atan2, cos, hypot, pi, sin
+from math import atan2, cos, hypot, sin
 from typing import Protocol
 
 from skidpad.core.geometry import Pose, wrap_angle
@@ -103,9 +102,7 @@ class PacedTrack:
         s = self.s + self.sense * v * (t - self.t)
         if self.closed:
             s %= self.line.length
-        pose = self.line.at_length(s)
-        if self.sense < 0.0 and not self.line.names_heading(s):
-            pose = replace(pose, yaw=wrap_angle(pose.yaw + pi))
+        pose = self.line.rear_first(s) if self.sense < 0.0 else self.line.at_length(s)
         beyond = max(s - self.line.length, 0.0)
         return (pose.moved(forward=self.sense * beyond) if beyond else pose), v, 0.0
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import inf
 
 from skidpad.roads.queries import LanePoint
-from skidpad.roads.routing import shortest_route
+from skidpad.roads.routing import LaneRoute, shortest_route
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.movement.measures import between
 from skidpad.scenarios.movement.network import Network, Place
@@ -48,10 +49,16 @@ def compile_route(node: Node, ctx: Context) -> ScenarioRoute:
 
 
 def roads_through(network: Network, points: Sequence[LanePoint]) -> tuple[int, ...]:
-    """Returns the roads from point to point by the shortest way; where there is none, their own roads."""
+    """Returns the roads from point to point; where there is no way, their own roads.
+
+    The way is the shortest one, without changes of lanes where one leads to the point's road, as an
+    entity does not change lanes for its route.
+    """
     roads: list[int] = []
     for a, b in pairwise(points):
         route = shortest_route(network.map, a, b)
+        if route is not None and _changes_lanes(network, route):
+            route = _without_changes(network, a, b) or route
         found = [a.road, b.road] if route is None else [
             int(network.map.lanes.road[i]) for i in route.lanes
         ]  # fmt: skip
@@ -59,6 +66,20 @@ def roads_through(network: Network, points: Sequence[LanePoint]) -> tuple[int, .
             if not roads or roads[-1] != road:
                 roads.append(road)
     return tuple(roads)
+
+
+def _changes_lanes(network: Network, route: LaneRoute) -> bool:
+    """Returns whether a way has a change of lanes."""
+    return any(b not in network.map.successors(a) for a, b in pairwise(route.lanes))
+
+
+def _without_changes(network: Network, start: LanePoint, goal: LanePoint) -> LaneRoute | None:
+    """Returns the shortest way without changes of lanes to any lane of the goal's road, at the goal."""
+    lanes = network.map.lanes
+    abreast = (lanes.road == goal.road) & (lanes.section == lanes.section[goal.lane])
+    goals = [network.beside(goal, int(i)) for i in lanes.lane_id[abreast]]
+    ways = [shortest_route(network.map, start, g, change_cost=inf) for g in goals if g is not None]
+    return min((w for w in ways if w is not None), key=lambda w: w.length, default=None)
 
 
 def random_roads(

@@ -52,13 +52,14 @@ def compile_trajectory(node: Node, ctx: Context) -> Trajectory:
     if shape.tag == "Polyline":
         quick = [_plain_vertex(v) for v in shape.element.iterchildren("Vertex")]
         known = [v for v in quick if v is not None]
-        if known and len(known) == len(quick):
+        heights = len(shape.element.findall("Vertex/Position/WorldPosition[@z]"))
+        if known and len(known) == len(quick) and heights in (0, len(known)):
             _check_times(shape, [v.time for v in known])
             return Trajectory(name, closed, Line(known, closed=closed))
     if shape.tag not in SHAPES:
         raise shape.unsupported_fault()
     nodes, make = SHAPES[shape.tag](shape)
-    places = tuple(position(n, ctx) for n in nodes)
+    places = tuple(_place(n, ctx) for n in nodes)
     fixed = [p.fixed.pose for p in places if isinstance(p, Fixed)]
     from_here = shape.tag == "ClothoidSpline" and not _begins(next(shape.children()))
     trajectory = Trajectory(
@@ -68,6 +69,38 @@ def compile_trajectory(node: Node, ctx: Context) -> Trajectory:
         return trajectory
     line = Line(make(fixed), closed=closed, tangential=trajectory.tangential)
     return replace(trajectory, line=line)
+
+
+@dataclass(frozen=True, slots=True)
+class Raised:
+    """A place at a height of its own: z in m, above an entity's where there is one."""
+
+    ground: Position
+    z: float
+    other: str | None
+
+    def place(self, scene: Scene) -> Place:
+        """Returns the place where it is now, at its height."""
+        place = self.ground.place(scene)
+        below = 0.0 if self.other is None else scene.actors[self.other].pose.z
+        return replace(place, pose=replace(place.pose, z=below + self.z))
+
+
+def _place(node: Node, ctx: Context) -> Position:
+    """Compiles the <Position> of a point of a line, at the height that it says."""
+    ground, said = position(node, ctx), node.only()
+    if not _has_height(said):
+        return ground
+    if said.tag != "WorldPosition":
+        return Raised(ground, said.number("dz"), ctx.entity(said))
+    assert isinstance(ground, Fixed)
+    pose = replace(ground.fixed.pose, z=said.number("z"))
+    return Fixed(replace(ground.fixed, pose=pose))
+
+
+def _has_height(place: Node) -> bool:
+    """Returns whether a position says its height itself; else it is that of the road."""
+    return place.has("z" if place.tag == "WorldPosition" else "dz")
 
 
 def _check_times(shape: Node, times: Sequence[float | None]) -> None:
@@ -85,7 +118,9 @@ def _polyline(shape: Node) -> tuple[list[Node], Shape]:
     times = [n.number("time") if n.has("time") else None for n in nodes]
     places = [n.child("Position") for n in nodes]
     named = [_has_heading(p.only()) for p in places]
-    tilts = [_tilt(p.only()) for p in places]
+    rises = [_has_height(p.only()) for p in places]
+    climbs = [a or b for a, b in zip(rises, [*rises[1:], False], strict=True)]
+    tilts = [_tilt(p.only(), climb) for p, climb in zip(places, climbs, strict=True)]
     _check_times(shape, times)
 
     def make(poses: Sequence[Pose]) -> list[Vertex]:
@@ -95,9 +130,14 @@ def _polyline(shape: Node) -> tuple[list[Node], Shape]:
     return places, make
 
 
-def _tilt(place: Node) -> tuple[float, float]:
-    """Returns pitch and roll in the world that a vertex asks for, rad; 0 where it says nothing."""
+def _tilt(place: Node, climbs: bool) -> tuple[float | None, float]:
+    """Returns pitch and roll in the world that a vertex asks for, rad; 0 where it says nothing.
+
+    climbs: its height or the next one's is said, so that a pitch that is not said is the line's, None.
+    """
     said = place if place.tag == "WorldPosition" else place.find("Orientation")
+    if climbs and (said is None or not said.has("p")):
+        return None, 0.0 if said is None else wrap_angle(said.number("r", 0.0))
     if said is None:
         return 0.0, 0.0
     return wrap_angle(said.number("p", 0.0)), wrap_angle(said.number("r", 0.0))
@@ -117,15 +157,15 @@ def _plain_vertex(element: etree._Element) -> Vertex | None:
         return None
     place = element[0][0].attrib
     try:
-        h, t = place.get("h"), element.get("time")
+        h, t, z = place.get("h"), element.get("time"), place.get("z")
         pitch, roll = float(place.get("p", 0.0)), float(place.get("r", 0.0))
         values = Vertex(
             float(place["x"]),
             float(place["y"]),
-            float(place.get("z", 0.0)),
+            float(z or 0.0),
             None if h is None else float(h),
             None if t is None else float(t),
-            wrap_angle(pitch),
+            wrap_angle(pitch) if z is None or "p" in place else None,
             wrap_angle(roll),
         )
     except (KeyError, ValueError):
@@ -228,11 +268,15 @@ def _nurbs(shape: Node) -> tuple[list[Node], Shape]:
     if not all(1.0 / WEIGHT_MAX <= w <= WEIGHT_MAX for w in weights):
         raise shape.error(f"weights must be between {1.0 / WEIGHT_MAX:g} and {WEIGHT_MAX:g}")
 
+    places = [n.child("Position") for n in nodes]
+    pitch = None if all(_has_height(p.only()) for p in places) else 0.0
+
     def make(poses: Sequence[Pose]) -> list[Vertex]:
         rows = zip(poses, times, strict=True)
-        return nurbs(order, [Vertex(p.x, p.y, p.z, None, t) for p, t in rows], weights, knots)
+        points = [Vertex(p.x, p.y, p.z, None, t, pitch) for p, t in rows]
+        return nurbs(order, points, weights, knots)
 
-    return [n.child("Position") for n in nodes], make
+    return places, make
 
 
 SHAPES: Mapping[str, Callable[[Node], tuple[list[Node], Shape]]] = {

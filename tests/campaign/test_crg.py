@@ -5,15 +5,15 @@ import sys
 import numpy as np
 import pytest
 
-from skidpad.campaign.driving.crg import (
+from skidpad.core.errors import ConfigError, FileError, MissingExtra
+from skidpad.simulation.world.crg import (
     LEVELS_MM,
     hollow_depths,
     puddles,
     read_crg,
     slippery_parts,
 )
-from skidpad.campaign.driving.surfaces import read_surface
-from skidpad.core.errors import ConfigError, FileError, MissingExtra
+from skidpad.simulation.world.surface_files import read_surface
 
 V = np.linspace(-1.5, 1.5, 61)
 

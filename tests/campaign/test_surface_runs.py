@@ -12,7 +12,6 @@ from msgspec import structs
 from typer.testing import CliRunner
 
 from skidpad.campaign.driving.run_setup import stage_of
-from skidpad.campaign.driving.surfaces import read_surface
 from skidpad.campaign.runs.run import run
 from skidpad.cli.main import app
 from skidpad.core.environment.surface import SurfacePatch
@@ -25,6 +24,7 @@ from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.recording.run.log_files import log_hash, read_log
 from skidpad.simulation.embedded.engine import EmbeddedBackend
+from skidpad.simulation.world.surface_files import read_surface
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "puddle.yaml"
 SPEC = RunSpec(course=Scenario(file="lead_slowdown"), sensors=SensorLevel.OBJECTS, duration=12.0)

@@ -6,7 +6,6 @@ from math import exp, log
 import numpy as np
 import pytest
 
-from skidpad.campaign.driving.surfaces import read_surface
 from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import GripModel
@@ -15,6 +14,7 @@ from skidpad.physics.drying import dried_film, evaporation_mm_h, wear_mm_h
 from skidpad.physics.grip import Road
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.world.patches import Patches
+from skidpad.simulation.world.surface_files import read_surface
 
 MILD = Weather()
 

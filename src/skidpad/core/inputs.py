@@ -11,6 +11,7 @@ from enum import Enum, IntEnum
 
 from msgspec import Struct
 
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import require_range
 from skidpad.core.run import Function
 from skidpad.core.vocabulary import GripModel, LightState, RangeModel
@@ -120,3 +121,5 @@ class Outside:
     brake_lamps: tuple[tuple[str, bool], ...] = ()
     # as (m/s, rad it blows to), where wind pushes vehicles; None: as it was (embedded backend)
     wind: tuple[float, float] | None = None
+    # what lies on parts of the road; None: as it was (embedded backend)
+    patches: tuple[SurfacePatch, ...] | None = None

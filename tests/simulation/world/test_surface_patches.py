@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from shapely.geometry import Point, Polygon
 
-from skidpad.campaign.driving.surfaces import read_surface
 from skidpad.core.environment.surface import SurfacePatch, present_patches
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.states import ActorStates
@@ -21,6 +20,7 @@ from skidpad.roads.roadside import Bridge
 from skidpad.roads.surface_outlines import outline_patches
 from skidpad.simulation.world.patches import Patches
 from skidpad.simulation.world.placed import places_for
+from skidpad.simulation.world.surface_files import read_surface
 
 ROAD = load_map("straight")
 X, Y, Z = (float(v[500]) for v in (ROAD.samples.x, ROAD.samples.y, ROAD.samples.z))

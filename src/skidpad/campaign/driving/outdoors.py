@@ -9,6 +9,7 @@ from math import asin, atan2, cos, degrees, log, pi, radians, sin
 
 from msgspec import structs
 
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import CheckpointError, FileError
 from skidpad.core.frames import Frame
 from skidpad.core.geometry import Pose
@@ -102,6 +103,10 @@ class FileChanges:
         assert isinstance(spec.course, Scenario)
         # a speed among the settings goes before what the file says
         self.takes_wind = settings.world.wind_speed is None
+        begun = player.scenario.start.environment
+        laid = () if begun is None else begun.surface or ()
+        # what stays whatever the file says later; a stored run's surface holds the file's first one too
+        self.surface = tuple(patch for patch in spec.surface if patch not in laid)
         self.follows, self.mu_ref = spec.course.weather_of_file, settings.world.mu_ref
         self.outside = Outside(
             weather=spec.weather, grip=spec.grip, range_model=settings.sensors.range
@@ -130,6 +135,8 @@ class FileChanges:
                 now = replace(now, weather=weather)
             if environment.friction_scale is not None:
                 now = replace(now, mu_ref=self.mu_ref * environment.friction_scale)
+            if environment.surface is not None:
+                now = replace(now, patches=lay_beside(self.surface, environment))
             if environment.wind is not None and self.takes_wind:
                 now = replace(now, wind=environment.wind)
         self.outside = now
@@ -145,6 +152,14 @@ class FileChanges:
         """Returns the driver's command with what the file's controllers override of it."""
         ego = self.player.actors.get(self.player.scenario.ego)
         return command if ego is None else ego.overridden(command)
+
+
+def lay_beside(
+    surface: tuple[SurfacePatch, ...], environment: Environment | None
+) -> tuple[SurfacePatch, ...]:
+    """Returns a surface and what an environment of a file lays on the road besides, each patch once."""
+    laid = () if environment is None else environment.surface or ()
+    return (*surface, *(patch for patch in laid if patch not in surface))
 
 
 def in_weather_of_file(run: RunSpec, environment: Environment | None) -> RunSpec:

@@ -17,6 +17,7 @@ from skidpad.campaign.driving.file_stack import NAME as STACK_NAME
 from skidpad.campaign.driving.file_stack import PilotConditions, PilotMaker
 from skidpad.campaign.driving.governing import apply_envelope
 from skidpad.campaign.driving.loop import Arrival, Script, Supervising, Timer, Unsupervised
+from skidpad.campaign.driving.outdoors import lay_beside
 from skidpad.campaign.driving.sharing import find_shared
 from skidpad.campaign.driving.starts import start_of
 from skidpad.campaign.user_files import road_file
@@ -233,6 +234,10 @@ def _scenario(spec: RunSpec, course: Scenario) -> Stage:
     environment = compiled.start.environment
     if environment is not None and environment.friction_scale is not None:
         setup = replace(setup, mu_ref=setup.mu_ref * environment.friction_scale)
+    surface = lay_beside(spec.surface, environment)
+    if surface and spec.backend.backend == BackendKind.CARLA:
+        raise ConfigError("a surface in <RoadCondition> needs the embedded simulator")
+    setup = replace(setup, patches=surface)
     if environment is not None and environment.wind is not None:
         setup = replace(setup, wind=wind_of(spec, environment.wind))
     return Stage(compiled.map, setup, Unsupervised(), played, played)

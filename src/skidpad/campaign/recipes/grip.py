@@ -12,6 +12,8 @@ from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from msgspec import structs
+
 from skidpad import __version__
 from skidpad.campaign.cells.grip import Cross, cross, scenario_of, template
 from skidpad.campaign.recipes.recipe import Driven, Recipe
@@ -94,7 +96,7 @@ def drive_and_judge(out: Path, cell: RunSpec, keep: bool = False) -> GripDrive:
         off_road=driven.off_road,
     )
     if keep or driven.error:
-        write_config(folder, cell.to_plain())
+        write_config(folder, structs.replace(cell, surface=driven.surface).to_plain())
         write_run(folder, driven)
         write_played(folder, driven)
         keep_road(out, driven.road)

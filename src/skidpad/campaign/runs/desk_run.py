@@ -28,6 +28,7 @@ def drive_at_desk(spec: RunSpec, desk: Desk, folder: Path, sinks: Sequence[Sink]
     text = encode_inputs(desk.inputs)
     if text:
         write_bytes(folder / INPUTS, text)
-    write_config(folder, structs.replace(spec, inputs=inputs_hash(text)).to_plain())
+    ready = structs.replace(spec, inputs=inputs_hash(text), surface=driven.surface)
+    write_config(folder, ready.to_plain())
     write_run(folder, driven)
     return driven

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from msgspec import structs
+
 from skidpad.campaign.driving.backends import WATCHDOG, keep_server, make_backend
 from skidpad.campaign.driving.run_setup import load_scenario
 from skidpad.campaign.runs.folder import write_config, write_played, write_run
@@ -50,7 +52,7 @@ def run_task(task: Task) -> Run:
     keep_server(task.run.backend)
     backend = make_backend(task.run.backend, WATCHDOG)
     driven = run(task.run, backend=backend, folder=task.out, checkpoints_s=task.checkpoints_s)
-    write_config(task.out, task.run.to_plain())
+    write_config(task.out, structs.replace(task.run, surface=driven.surface).to_plain())
     write_run(task.out, driven)
     write_played(task.out, driven)
     keep_road(task.out, driven.road)

@@ -29,6 +29,7 @@ from skidpad.campaign.driving.snapshots import Snapshots
 from skidpad.campaign.runs.checkpoints import RunCheckpoint
 from skidpad.campaign.runs.state_files import CheckpointWriter
 from skidpad.campaign.takeover.desk import Desk, DeskBackend, DeskDriver, DeskScript, DeskSupervisor
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import CheckpointError, StackError, require_choice
 from skidpad.core.run import (
     DriverSpec,
@@ -74,6 +75,7 @@ class Run:
         road: the map's name, or its file.
         played: the story of a scenario, where one was played.
         readings: numbers of the further sensors that the stack asked for, where they give any.
+        surface: what lay on parts of the road at the begin, by the run and by its scenario's file.
     """
 
     log: RunLog
@@ -86,6 +88,7 @@ class Run:
     road: str = ""
     played: Played | None = None
     readings: SensorReadings | None = None
+    surface: tuple[SurfacePatch, ...] = ()
 
 
 def drive(
@@ -399,6 +402,7 @@ class OpenRun:
             str(stage.setup.map),
             None if stage.player is None else stage.player.played,
             None if self.recorder is None else self.recorder.finish(),
+            stage.setup.patches,
         )
 
     def _begin(self) -> Stepper | None:

@@ -196,7 +196,7 @@ class Tuned(Struct, frozen=True):
         settings = load_profile(self.profile, values)
         if self.surface is None:
             return structs.replace(run, settings=settings)
-        from skidpad.campaign.driving.surfaces import read_surface
+        from skidpad.simulation.world.surface_files import read_surface
 
         return structs.replace(run, settings=settings, surface=read_surface(self.surface))
 

@@ -152,7 +152,8 @@ class SetEnvironment:
 
 def _environment(node: Node, ctx: Context) -> GlobalAction:
     """Compiles the action that sets the environment given in place or by a catalogue reference."""
-    return SetEnvironment(compile_environment(ctx.catalogs.resolve(node.only(), "Environment")))
+    found = ctx.catalogs.resolve(node.only(), "Environment")
+    return SetEnvironment(compile_environment(found, ctx.network.map, ctx.findings))
 
 
 @dataclass(frozen=True, slots=True)

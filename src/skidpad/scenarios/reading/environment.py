@@ -7,8 +7,14 @@ from enum import Enum
 from math import degrees
 from typing import Any
 
+from skidpad.core.environment.surface import SurfacePatch
+from skidpad.core.errors import ConfigError, FileError, MissingExtra
+from skidpad.roads.queries import RoadMap
 from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.findings import Finding, Kind
 from skidpad.scenarios.reading.moments import moment
+from skidpad.simulation.world.patches import fit_patches
+from skidpad.simulation.world.surface_files import read_surface
 
 CELSIUS = 273.15  # K at 0 deg C
 CLOUDS = {  # share of the sky, by both vocabularies
@@ -17,6 +23,7 @@ CLOUDS = {  # share of the sky, by both vocabularies
     "fiveOktas": 0.625, "sixOktas": 0.75, "sevenOktas": 0.875, "eightOktas": 1.0, "nineOktas": 1.0,
 }  # fmt: skip
 HEAVY = 50.0  # mm/h, what an intensity of 1 means in files before 1.1
+SURFACES = (".yaml", ".yml", ".crg")  # files of a road condition that say what lies on the road
 
 
 class Fall(Enum):
@@ -55,6 +62,7 @@ class Environment:
     wind: tuple[float, float] | None = None  # m/s, and rad of the world that it blows to
     wetness: Wetness | None = None
     friction_scale: float | None = None  # of what the road has otherwise
+    surface: tuple[SurfacePatch, ...] | None = None  # what lies on parts of the road
     time_of_day: str = ""  # ISO 8601
     moment: float | None = None  # the same in s since 1970
     clock_runs: bool = False  # the time of day goes on
@@ -76,25 +84,57 @@ class Environment:
         )
 
 
-def compile_environment(node: Node) -> Environment:
-    """Compiles an <Environment> with its weather, road condition and time of day."""
+def compile_environment(node: Node, map: RoadMap, findings: list[Finding]) -> Environment:
+    """Compiles an <Environment> with its weather, road condition and time of day.
+
+    map: on which surfaces that it names must fit. findings: get a note on files that are not read.
+    """
     weather, road, time = (node.find(t) for t in ("Weather", "RoadCondition", "TimeOfDay"))
-    wetness, scale = None, None
+    wetness, scale, surface = None, None, None
     if road is not None:
         scale = road.number("frictionScaleFactor", 1.0)
         if scale < 0.0:
             raise road.error(f"frictionScaleFactor must be >= 0, got {scale:g}")
         wetness = road.choice("wetness", Wetness) if road.has("wetness") else None
+        surface = _surface(road, map, findings)
     found = {} if weather is None else _weather(weather)
     return Environment(
         name=node.label(),
         wetness=wetness,
         friction_scale=scale,
+        surface=surface,
         time_of_day="" if time is None else time.text("dateTime", ""),
         moment=None if time is None else moment_of(time),
         clock_runs=time is not None and time.flag("animation", default=False),
         **found,
     )
+
+
+def _surface(road: Node, map: RoadMap, findings: list[Finding]) -> tuple[SurfacePatch, ...] | None:
+    """Returns the patches of the files that a <RoadCondition> names; None where it has no <Properties>.
+
+    Names are relative to the file's folder. Raises a Fault for one that cannot be read or fits no road.
+    """
+    properties = road.find("Properties")
+    if properties is None:
+        return None
+    found: list[SurfacePatch] = []
+    for node in properties.children("File"):
+        path = node.file.parent / node.text("filepath")
+        if path.suffix.lower() not in SURFACES:
+            what = f"{path.name} is not read: surfaces end in {', '.join(SURFACES)}"
+            findings.append(node.finding(what, Kind.NOTE))
+            continue
+        try:
+            patches = read_surface(path)
+        except (ConfigError, FileError, MissingExtra) as error:
+            raise node.error(f"{error}") from None
+        try:
+            fit_patches(map, patches)
+        except ConfigError as error:
+            raise node.error(f"{path}: {error}") from None
+        found += patches
+    return tuple(found)
 
 
 def moment_of(node: Node) -> float | None:

@@ -22,7 +22,7 @@ from skidpad.roads.queries import RoadMap
 from skidpad.sensors.requested import AskedSensors
 from skidpad.simulation.sensing import sensing_of
 from skidpad.simulation.world.feel import feel_motion
-from skidpad.simulation.world.stage import build_world
+from skidpad.simulation.world.stage import build_world, patches_of
 from skidpad.simulation.world.world import EGO, World
 
 REVERSE = 4  # column of the commands
@@ -104,8 +104,12 @@ class EmbeddedBackend:
             range_model=range_model,
             grip=outside.grip,
             mu_ref=mu_ref,
+            patches=self._setup.patches if outside.patches is None else outside.patches,
         )
-        self.world.lay(road_of(changed))
+        road = road_of(changed)
+        if changed.patches != self._setup.patches:
+            self.world.lay_patches(patches_of(self.map, changed, road))
+        self.world.lay(road)
         if outside.wind is not None:
             self.world.blow(*outside.wind)
         self.world.lights.hold(outside.lights)

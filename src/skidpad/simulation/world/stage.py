@@ -5,8 +5,9 @@ from __future__ import annotations
 from skidpad.core.errors import ConfigError
 from skidpad.core.setup import Setup, TrafficSetup
 from skidpad.core.vocabulary import Bodywork, Control, Scenery
-from skidpad.physics.grip import road_of
+from skidpad.physics.grip import Road, road_of
 from skidpad.roads.bundled import load_map
+from skidpad.roads.queries import RoadMap
 from skidpad.scenery.dressing import dress_map
 from skidpad.simulation.world.actors import Role, cast_of, place_of
 from skidpad.simulation.world.lights import Lights
@@ -42,10 +43,7 @@ def build_world(setup: Setup, seed: int) -> World:
     traffic = setup.traffic or TrafficSetup(vehicles=0)
     drivers = Traffic(map, traffic, seed, care_of(setup, traffic.slow_in_weather))
     world.let_drive(drivers)
-    lanes = lane_frictions(setup)
-    if setup.patches or lanes or setup.sheet_flow:
-        flow = SheetFlow(map) if setup.sheet_flow else None
-        world.patches = Patches(map, setup.patches, road, lanes, flow)
+    world.patches = patches_of(map, setup, road)
     drawn = setup.scenery is Scenery.FULL or setup.bodywork is Bodywork.SHAPED
     paints = seed if drawn else None
     ids = world.enter([role.newcomer(i, paints) for i, role in enumerate(roles)])
@@ -67,6 +65,18 @@ def build_world(setup: Setup, seed: int) -> World:
             _engage(world, drivers, id, role)
     world.feel_grip()
     return world
+
+
+def patches_of(map: RoadMap, setup: Setup, road: Road) -> Patches | None:
+    """Returns the patches and materials of a set-up on its map; None where there are none.
+
+    road: without them. ConfigError for what does not fit the map.
+    """
+    lanes = lane_frictions(setup)
+    if not (setup.patches or lanes or setup.sheet_flow):
+        return None
+    flow = SheetFlow(map) if setup.sheet_flow else None
+    return Patches(map, setup.patches, road, lanes, flow)
 
 
 def lane_frictions(setup: Setup) -> LaneFrictions:

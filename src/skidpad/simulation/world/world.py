@@ -249,11 +249,19 @@ class World:
         """Sets what the weather does to the road from now on, in patches too."""
         self._grip, self._road = road.params(), road
         self._fill_grips()
-        if self.patches is None:
-            return
-        self.patches.lay(road)
+        if self.patches is not None:
+            self.patches.lay(road)
         if self.traffic is not None and self.traffic.sees_patches:
-            self.traffic.see_patches(self.patches.lane_shares())
+            n = len(self.map.samples.x)
+            shares = np.ones(n) if self.patches is None else self.patches.lane_shares()
+            self.traffic.see_patches(shares)
+
+    def lay_patches(self, patches: Patches | None) -> None:
+        """Sets other patches from now on, None for none; drivers see them when the road is laid next."""
+        self.patches, w = patches, self.on_wheels
+        w.patched[:], w.patch_stiffness[:], w.patch_film[:] = 1.0, NO_PATCH, NO_PATCH
+        if patches is not None:
+            patches.set_vehicles(self.fleet.types)
 
     def blow(self, speed: float, towards: float) -> None:
         """Sets the mean wind, in m/s and rad, from now on; nothing changes where wind pushes no vehicles."""

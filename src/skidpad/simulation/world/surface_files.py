@@ -7,11 +7,11 @@ from typing import Any, Literal, TypeVar
 
 import msgspec
 
-from skidpad.campaign.driving.crg import read_crg
 from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import ConfigError
 from skidpad.core.files.reading import decode_yaml, read_bytes
 from skidpad.core.text.told import describe_value, on_a_line
+from skidpad.simulation.world.crg import read_crg
 
 S = TypeVar("S")
 

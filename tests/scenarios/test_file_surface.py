@@ -1,0 +1,108 @@
+"""The surface of a scenario's road condition: felt from the begin or from an event on, and stored."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from skidpad.campaign.driving.run_setup import check_scenario
+from skidpad.campaign.runs.stored import read_run
+from skidpad.cli.main import app
+from skidpad.core.environment.surface import SurfacePatch
+from skidpad.core.errors import FileError
+from skidpad.core.run import Scenario
+from skidpad.recording.run.log_files import read_log
+from skidpad.recording.run.surfaces import read_run_surface
+from support.scenarios.files import at, event, story, time, write
+
+ICE = SurfacePatch(name="ice", ice_mm=3.0, road=1)
+
+
+def condition(properties: str) -> str:
+    """An environment that says nothing but what lies on the road."""
+    return f"""<GlobalAction><EnvironmentAction><Environment name="theirs">
+<RoadCondition frictionScaleFactor="1">{properties}</RoadCondition>
+</Environment></EnvironmentAction></GlobalAction>"""
+
+
+def named(file: str) -> str:
+    return condition(f'<Properties><File filepath="{file}"/></Properties>')
+
+
+def write_ice(folder) -> None:
+    text = "patches:\n  - {name: ice, ice_mm: 3, road: 1}\n"
+    (folder / "ice.yaml").write_text(text, encoding="utf-8")
+
+
+def played(folder, *words, **parts):
+    init = at("ego", -3, 100) + at("other", -1, 120) + parts.pop("begin", "")
+    file = write(folder, init=init, end=2.0, **parts)
+    out = folder / f"out{len(words)}"
+    done = CliRunner().invoke(
+        app, ["play", str(file), "--out", str(out), "--actors", "physical", *words]
+    )
+    assert done.exit_code == 0, done.output
+    return read_log(out), read_run(out), out
+
+
+@pytest.mark.osc("RoadCondition")
+def test_the_surface_that_a_road_condition_names_is_felt_and_stored(tmp_path):
+    """As `--surface` with the same file; the run's description and its pages know the patches."""
+    write_ice(tmp_path)
+    log, run, out = played(tmp_path, begin=named("ice.yaml"))
+    asked, beside, _ = played(tmp_path, "--surface", str(tmp_path / "ice.yaml"))
+    assert run.surface == beside.surface == (ICE,)
+    assert read_run_surface(out) == (ICE,)
+    assert log.mu[5, 0].max() < 0.2
+    assert np.array_equal(log.mu[:, :2], asked.mu[:, :2], equal_nan=True)
+
+
+@pytest.mark.osc("EnvironmentAction")
+def test_an_event_lays_a_surface_and_another_takes_it_away(tmp_path):
+    """What `--surface` has laid stays; a road condition without properties changes nothing."""
+    write_ice(tmp_path)
+    wet = "patches:\n  - {name: wet, water_mm: 2, road: 1}\n"
+    (tmp_path / "wet.yaml").write_text(wet, encoding="utf-8")
+    events = (
+        event("ice comes", named("ice.yaml"), time(0.5))
+        + event("nothing new", condition(""), time(0.8))
+        + event("ice goes", condition("<Properties/>"), time(1.2))
+    )
+    log, run, _ = played(tmp_path, stories=story(events))
+    ego = log.mu[:, 0].max(axis=-1)
+    assert run.surface == ()
+    assert ego[(log.t > 0.1) & (log.t <= 0.5)].min() > 0.7
+    assert ego[(log.t > 0.6) & (log.t <= 1.2)].max() < 0.2
+    assert ego[log.t > 1.3].min() > 0.7
+    wetter, _, _ = played(tmp_path, "--surface", str(tmp_path / "wet.yaml"), stories=story(events))
+    over = wetter.mu[:, 0].max(axis=-1)[log.t > 1.3]
+    assert (over < ego[log.t > 1.3] - 0.03).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("patches:\n  - {water_mm: 12, road: 1}\n", "water_mm must be between 0 and 10, got 12"),
+        ("patches:\n  - {water_mm: 2, road: 9}\n", r"bad.yaml: patches\[0\]: .* has no road 9"),
+        (None, r"bad\.yaml"),
+    ],
+)
+def test_a_bad_surface_is_refused_with_its_line_and_range(tmp_path, text, said):
+    if text is not None:
+        (tmp_path / "bad.yaml").write_text(text, encoding="utf-8")
+    later = event("change", named("bad.yaml"), time(1.0))
+    file = write(tmp_path, init=at("ego", -3, 100) + at("other", -1, 120), stories=story(later))
+    with pytest.raises(FileError, match=rf"line \d+, <File>: .*{said}"):
+        check_scenario(Scenario(file=str(file))).playable()
+
+
+def test_a_file_of_another_tool_is_noted_and_not_read(tmp_path):
+    begin = named("friction.bin")
+    file = write(tmp_path, init=at("ego", -3, 100) + at("other", -1, 120) + begin)
+    found = check_scenario(Scenario(file=str(file)))
+    assert found.playable().start.environment.surface == ()
+    (note,) = [str(f) for f in found.findings if f.element == "File"]
+    assert re.search(r"friction\.bin is not read: surfaces end in \.yaml, \.yml, \.crg", note)

@@ -41,6 +41,7 @@ class SurfacePatch(
         s: from and to along the road, m; None: the whole road.
         bridges: the area is every bridge that the map names.
         side: half of each lane, seen in its driving direction, its two wheel paths, or the rest of it.
+        by_deposits: `water_mm` is what is there at `precipitation_deposits` 100; at 0 nothing is.
         dried_min: minutes without rain for which `water_mm` has dried when the run begins.
         air_below_c: the patch is there while the air is colder, degrees Celsius; None: always.
     """
@@ -60,6 +61,7 @@ class SurfacePatch(
     side: Literal["both", "left", "right", "wheel_paths", "beside_wheel_paths"] = "both"
     air_below_c: float | None = None
     dried_min: float = 0.0
+    by_deposits: bool = False
 
     def __post_init__(self) -> None:
         self._require_what()
@@ -85,6 +87,8 @@ class SurfacePatch(
         require_range("dried_min", self.dried_min, *DRIED_MIN)
         if self.dried_min > 0.0 and self.water_mm == 0.0:
             raise ConfigError("dried_min goes with water_mm")
+        if self.by_deposits and self.water_mm == 0.0:
+            raise ConfigError("by_deposits goes with water_mm")
 
     def _require_where(self) -> None:
         """Raises ConfigError unless the area is one valid circle, polygon, road, or the bridges."""

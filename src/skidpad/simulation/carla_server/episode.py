@@ -7,7 +7,10 @@ from dataclasses import dataclass, replace
 from itertools import count
 from typing import Any
 
+from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
+from skidpad.physics.grip import Road
+from skidpad.roads.queries import RoadMap
 from skidpad.sensors.raster.live_scene import scene_of
 from skidpad.simulation.carla_server import filling
 from skidpad.simulation.carla_server.actors import shapes
@@ -46,7 +49,8 @@ from skidpad.simulation.carla_server.weather import Sky
 from skidpad.simulation.world.ground import ground_height
 from skidpad.simulation.world.lights import Lights
 from skidpad.simulation.world.obstacles import obstacles
-from skidpad.simulation.world.patches import FrictionZone
+from skidpad.simulation.world.patches import FrictionZone, Patches
+from skidpad.simulation.world.surface_files import read_surface
 from skidpad.simulation.world.world import Conditions, World
 
 KINDS = ("point", "line", "arrow", "box", "text", "hud point", "hud line", "hud arrow", "hud box")
@@ -71,6 +75,8 @@ class Stock:
         self.catalogue = make_catalogue(options.weather_grip, options.mu_ref)
         self.remarks = Remarks()
         self.ids: Iterator[int] = count(1)  # of actors
+        self._surface = () if options.surface is None else read_surface(options.surface)
+        self._first_map = ""  # its hash
 
     def blueprint(self, id: str) -> Blueprint:
         """The blueprint of that id; CallError when it is not offered."""
@@ -83,6 +89,19 @@ class Stock:
         """The weather as the server was started."""
         o = self.options
         return Sky(o.ice, o.weather_grip, o.mu_ref)
+
+    def patches_on(self, roads: RoadMap, road: Road) -> Patches | None:
+        """Returns what the server's surface lays on a map: all on the first map, nothing on others.
+
+        road: without it. ConfigError where it does not fit the first map.
+        """
+        self._first_map = self._first_map or roads.content_hash
+        if not self._surface or roads.content_hash != self._first_map:
+            return None
+        try:
+            return Patches(roads, self._surface, road)
+        except ConfigError as error:
+            raise ConfigError(f"{self.options.surface}: {error}") from None
 
 
 class Episode:
@@ -102,6 +121,7 @@ class Episode:
             seed=seed, dt=clock.step, grip=self.sky.grip, road_noise=0.0, all_lanes=True
         )
         self.moving = World(map.roads, Lights(map.roads, arms=True), conditions)
+        self.moving.lay_patches(stock.patches_on(map.roads, self.sky.road))
         self.actors = ActorTable(self.moving, stock.ids)
         self.rows = Rows()
         self.vehicles = Vehicles(self.moving)
@@ -261,7 +281,7 @@ class Episode:
         actor.row = self.rows.add(actor.id)
 
     def _mark_zones(self) -> None:
-        """Friction triggers act on every tyre inside."""
+        """Friction triggers act on every tyre inside, where they are now."""
         self.moving.zones = [
             FrictionZone(t.pose, t.half, float(t.attributes["friction"]))
             for t in self.actors.of(Family.TRIGGER)
@@ -275,6 +295,8 @@ class Episode:
             actor.mount = pose
         elif actor.body is None:
             actor.pose = pose
+            if actor.family is Family.TRIGGER:
+                self._mark_zones()
         else:
             self.moving.teleport(actor.body, replace(pose, z=pose.z - actor.lift))
             self.falling.start_fall(actor)
@@ -295,10 +317,17 @@ class Episode:
 
         dt: s, must be the step that is set in `moving`, by which the world advances.
         """
-        self.moving.grip = self.sky.grip
+        self._feel_weather()
         self.vehicles.command(dt)
         self.moving.step()
         self.falling.tick(dt)
+
+    def _feel_weather(self) -> None:
+        """Lets the weather act on the road, and on what the server's surface lays there."""
+        if self.moving.patches is None:
+            self.moving.grip = self.sky.grip
+        elif self.moving.road is not self.sky.road:
+            self.moving.lay(self.sky.road)
 
     def follow(self) -> None:
         """Moves each attached actor to its mount on its parent."""
@@ -306,6 +335,8 @@ class Episode:
             carrier = self.actors.carrier(actor) if actor.parent else None
             if carrier is not None:
                 actor.pose = self.actors.pose(carrier) @ actor.mount
+                if actor.family is Family.TRIGGER:
+                    self._mark_zones()
 
     def fill_rows(self, dt: float) -> None:
         """The snapshot's columns as of now, dt s after the last time."""

@@ -38,6 +38,13 @@ class ServerOptions(Struct, frozen=True, kw_only=True):
     mu_ref: Annotated[
         float, Meta(ge=0.05, le=3.0, description="Friction at tire_friction 3.5 on dry road.")
     ] = MU_REF
+    surface: Annotated[
+        Path | None,
+        Meta(
+            description="YAML or OpenCRG file with puddles, ice, snow or friction of parts of the map "
+            "to begin with; deposits of clients' weather fill puddles that say so."
+        ),
+    ] = None
     govern: Annotated[
         Govern,
         Meta(

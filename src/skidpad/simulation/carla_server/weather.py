@@ -7,7 +7,7 @@ from typing import Any
 
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import RANGES, Weather
-from skidpad.physics.grip import grip_params
+from skidpad.physics.grip import Road
 from skidpad.simulation.carla_server.protocol import wire
 
 PACKED = (  # order of the wire
@@ -78,4 +78,5 @@ class Sky:
         if weather.ice_thickness > 0.0:
             weather = replace(weather, air_temperature_c=COLD_C, road_temperature_c=COLD_C)
         self.weather = weather
-        self.grip = grip_params(weather, self._model, self._mu_ref)
+        self.road = Road(weather, self._model, self._mu_ref)
+        self.grip = self.road.params()

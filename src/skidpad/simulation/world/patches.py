@@ -41,7 +41,7 @@ from skidpad.simulation.world.patch_kernel import (
 from skidpad.simulation.world.placed import Places, places_for
 from skidpad.simulation.world.sheet_flow import SheetFlow
 
-__all__ = ["NO_PATCH", "FrictionZone", "LaneFrictions", "Patches", "in_zone"]
+__all__ = ["NO_PATCH", "FrictionZone", "LaneFrictions", "Patches", "zoned_tyres"]
 
 # by road and lane: from and to along the road in m, and the share of the friction there
 LaneFrictions = dict[tuple[int, int], list[tuple[float, float, float]]]
@@ -93,17 +93,7 @@ class Patches:
 
     def set_vehicles(self, types: Sequence[VehicleType]) -> None:
         """These are the vehicles from now on."""
-        self._place = np.array(
-            [
-                [
-                    (x, y)
-                    for x in (t.x_front_axle, t.x_rear_axle)
-                    for y in (t.track / 2, -t.track / 2)
-                ]
-                for t in types
-            ],
-            dtype=np.float64,
-        ).reshape(-1, 4, 2)
+        self._place = wheel_places(types)
         self._tyres = [t.tyres for t in types]
         self._pack()
 
@@ -166,6 +156,15 @@ class Patches:
         return share
 
 
+def wheel_places(types: Sequence[VehicleType]) -> Floats:
+    """Returns how far forward and left of its vehicle's origin each wheel is, m, (w, 4, 2)."""
+    places = [
+        [(x, y) for x in (t.x_front_axle, t.x_rear_axle) for y in (t.track / 2, -t.track / 2)]
+        for t in types
+    ]
+    return np.array(places, dtype=np.float64).reshape(-1, 4, 2)
+
+
 def _arrays(
     map: RoadMap,
     patches: Sequence[SurfacePatch],
@@ -218,7 +217,8 @@ def _surface_grip(patch: SurfacePatch, road: Road, tyres: str) -> GripParams:
     """
     outside = road_surface(road.weather)
     in_paths = patch.side == "wheel_paths"
-    water_mm = dried_film(patch.water_mm, patch.dried_min, road.weather, traffic=in_paths)
+    filled = 0.01 * road.weather.precipitation_deposits if patch.by_deposits else 1.0
+    water_mm = dried_film(filled * patch.water_mm, patch.dried_min, road.weather, traffic=in_paths)
     surface = replace(
         outside,
         film_mm=max(outside.film_mm, water_mm),
@@ -259,23 +259,34 @@ def _samples(patch: SurfacePatch, map: RoadMap) -> NDArray[np.bool_]:
 
 @dataclass(frozen=True, slots=True)
 class FrictionZone:
-    """An upright box in which every tyre has this tire_friction."""
+    """An upright box in which a tyre has this tire_friction."""
 
     pose: Pose  # of its middle
     half: tuple[float, float, float]  # m
     tire_friction: float
 
 
-def in_zone(zone: FrictionZone, s: ActorStates) -> NDArray[np.bool_]:
-    """(n,) whose position is inside; feet up to 1 m below or above the box count."""
-    c, sn = cos(zone.pose.yaw), sin(zone.pose.yaw)
-    dx, dy = s.x - zone.pose.x, s.y - zone.pose.y
-    inside: NDArray[np.bool_] = (
-        (np.abs(dx * c + dy * sn) <= zone.half[0])
-        & (np.abs(dy * c - dx * sn) <= zone.half[1])
-        & (np.abs(s.z - zone.pose.z) <= zone.half[2] + 1.0)
-    )
-    return inside
+def zoned_tyres(
+    zones: Sequence[FrictionZone], own: Floats, wheels: Floats, s: ActorStates
+) -> Floats:
+    """Returns tire_friction at each wheel, (w, 4): `own`, or that of the slipperiest zone that it is in.
+
+    wheels: their places on their vehicles. Feet up to 1 m below or above a box count.
+    """
+    least = np.full_like(own, np.inf)
+    c, sn = np.cos(s.yaw)[:, None], np.sin(s.yaw)[:, None]
+    x = s.x[:, None] + wheels[:, :, 0] * c - wheels[:, :, 1] * sn
+    y = s.y[:, None] + wheels[:, :, 0] * sn + wheels[:, :, 1] * c
+    for zone in zones:
+        c0, s0 = cos(zone.pose.yaw), sin(zone.pose.yaw)
+        dx, dy = x - zone.pose.x, y - zone.pose.y
+        inside = (
+            (np.abs(dx * c0 + dy * s0) <= zone.half[0])
+            & (np.abs(dy * c0 - dx * s0) <= zone.half[1])
+            & (np.abs(s.z - zone.pose.z) <= zone.half[2] + 1.0)[:, None]
+        )
+        least[inside] = np.minimum(least[inside], zone.tire_friction)
+    return np.where(np.isfinite(least), least, own)
 
 
 def fit_patches(map: RoadMap, patches: Sequence[SurfacePatch]) -> tuple[SurfacePatch, ...]:

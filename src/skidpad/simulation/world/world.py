@@ -29,7 +29,13 @@ from skidpad.roads.queries import RoadMap
 from skidpad.simulation.world.ground import ROAD_NOISE, RoadSigns, read_signs
 from skidpad.simulation.world.lights import Lights
 from skidpad.simulation.world.obstacles import Obstacles, obstacles
-from skidpad.simulation.world.patches import NO_PATCH, FrictionZone, Patches, in_zone
+from skidpad.simulation.world.patches import (
+    NO_PATCH,
+    FrictionZone,
+    Patches,
+    wheel_places,
+    zoned_tyres,
+)
 from skidpad.simulation.world.rows import Member, Newcomer, Rows, bodies_of, table_of
 from skidpad.simulation.world.step import (
     DECIDE,
@@ -245,6 +251,11 @@ class World:
             self._grip, self._road = grip, None
             self._fill_grips()
 
+    @property
+    def road(self) -> Road | None:
+        """What was laid last; None: one grip was set for all vehicles."""
+        return self._road
+
     def lay(self, road: Road) -> None:
         """Sets what the weather does to the road from now on, in patches too."""
         self._grip, self._road = road.params(), road
@@ -426,8 +437,11 @@ class World:
             self.patches.fill(self.states, self.placed, w.patched, w.patch_stiffness, w.patch_film)
         if self.zones or self._zoned:
             self.fleet.tire_friction[:] = self.tyres
-            for zone in self.zones:
-                self.fleet.tire_friction[in_zone(zone, self.fleet.states)] = zone.tire_friction
+            if self.zones:
+                wheels = wheel_places(self.fleet.types)
+                self.fleet.tire_friction[:] = zoned_tyres(
+                    self.zones, self.tyres, wheels, self.fleet.states
+                )
         self._zoned = bool(self.zones)
 
     def feel_grip(self) -> None:

@@ -60,6 +60,6 @@ FRICTION_RULE = (
         "CARLA's friction trigger",
         "replaces",
         "tire_friction",
-        "of every wheel inside, the physics control's too",
+        "of every wheel inside, the physics control's too; of several triggers the slippery one counts",
     ),
 )

@@ -1,22 +1,23 @@
-"""What an environment says of each tick: the ego's own motion, its lane, and the vehicle ahead.
+"""What an environment says of each tick: a vehicle's own motion, its lane, and the vehicle ahead.
 
 Perception is ideal up to `REACH`; friction is not observed, only what the car feels of it.
 """
 
 from __future__ import annotations
 
-from math import cos, sin
+from math import pi
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.geometry import wrap_angle
-from skidpad.core.states import EgoEstimate
-from skidpad.simulation.world.traffic.network import Network
-from skidpad.simulation.world.world import EGO, World
+from skidpad.core.jit import Held, inner_kernel, kernel
+from skidpad.simulation.world.feel import feel_motion
+from skidpad.simulation.world.placed import Places
+from skidpad.simulation.world.step import Arena
 
 REACH = 150.0  # m to the vehicle ahead; farther ones are not observed
+LONGEST = 30.0  # m by which the middle of a vehicle may lie beyond REACH
 FASTEST = 100.0  # m/s, bound of speeds
 
 
@@ -45,75 +46,54 @@ OBSERVED = (
 )
 LOW = np.array([q.low for q in OBSERVED], dtype=np.float32)
 HIGH = np.array([q.high for q in OBSERVED], dtype=np.float32)
+GAP, CLOSING = 9, 10  # columns
+Observations = NDArray[np.float32]  # (n, len(OBSERVED))
 
 
-class Lead(NamedTuple):
-    """The vehicle ahead on the lanes that the ego follows."""
-
-    gap: float  # m, bumper to bumper
-    closing_speed: float  # m/s
-
-
-class Observer:
-    """Reads observations off a world."""
-
-    def __init__(self, net: Network) -> None:
-        self.net = net
-        self._ways: dict[int, NDArray[np.float64]] = {}
-
-    def observe(self, world: World, ego: EgoEstimate, lead: Lead | None) -> NDArray[np.float32]:
-        """Returns the observation of this tick, within its bounds."""
-        here = world.placed[EGO]
-        on_lane = here["lane"] >= 0
-        point = self.net.point[here["sample"]] if on_lane else None
-        gap, closing = (REACH, 0.0) if lead is None else lead
-        values = (
-            ego.speed,
-            ego.ax,
-            ego.ay,
-            ego.yaw_rate,
-            min(ego.wheel_speeds) - ego.speed,
-            here["offset"] if on_lane else 0.0,
-            wrap_angle(ego.pose.yaw - here["heading"]) if on_lane else 0.0,
-            0.0 if point is None else point["curvature"],
-            0.0 if point is None else point["limit"],
-            gap,
-            closing,
-            0.0 if lead is None else 1.0,
-        )
-        return np.array(values, dtype=np.float32).clip(LOW, HIGH)
-
-    def find_lead(self, world: World) -> Lead | None:
-        """Returns the nearest vehicle ahead in lane within reach; None where there is none."""
-        placed = world.placed
-        here = placed[EGO]
-        lane = int(here["lane"])
-        if lane < 0:
-            return None
-        way = self._ways.get(lane)
-        if way is None:
-            way = self._ways[lane] = self._way(lane)
-        ahead = way[placed["lane"]] + placed["s"] - here["s"]
-        ahead[~(placed["present"] & (placed["lane"] >= 0) & (ahead > 0.0))] = np.inf
-        i = int(ahead.argmin())
-        gap = float(ahead[i] - placed["half_length"][i] - here["half_length"])
-        if not gap <= REACH:
-            return None
-        return Lead(gap, _along(here, here) - _along(placed[i], here))
-
-    def _way(self, lane: int) -> NDArray[np.float64]:
-        """Returns for each lane of the map the way in m to its begin from that of `lane`; inf: not on it."""
-        lanes = self.net.lane
-        way = np.full(len(lanes), np.inf)
-        at, end = 0.0, REACH + float(lanes["length"][lane])
-        while lane >= 0 and at <= end and np.isinf(way[lane]):
-            way[lane] = at
-            at += float(lanes["length"][lane])
-            lane = int(lanes["ahead"][lane])
-        return way
+@kernel
+def observe(arena: Held[Arena], out: Observations) -> None:
+    """Writes what the first vehicles observe in this tick, within its bounds; a row of `out` for each."""
+    placed, net = arena.value.rows.placed, arena.value.streets.net
+    for i in range(len(out)):
+        here, row = placed[i], out[i]
+        _, _, _, _, _, yaw, speed, yaw_rate, ax, ay, fl, fr, rl, rr = feel_motion(arena, i)
+        row[0], row[1], row[2], row[3] = speed, ax, ay, yaw_rate
+        row[4] = min(fl, fr, rl, rr) - speed
+        row[5:] = 0.0
+        row[GAP] = REACH
+        if here.lane >= 0:
+            point = net.point[here.sample]
+            turned = (yaw - here.heading + pi) % (2.0 * pi) - pi
+            row[5], row[6] = here.offset, pi if turned == -pi else turned
+            row[7], row[8] = point.curvature, point.limit
+            lead, way = find_lead(placed, net.lane, i)
+            if lead >= 0:
+                gap = way - placed[lead].half_length - here.half_length
+                if gap <= REACH:
+                    row[GAP], row[CLOSING], row[11] = gap, here.v - placed[lead].v, 1.0
+        for k in range(len(row)):
+            row[k] = min(max(row[k], LOW[k]), HIGH[k])
 
 
-def _along(actor: np.void, here: np.void) -> float:
-    """Returns an actor's speed in m/s along its own lane, or along the ego's where it has none."""
-    heading = actor["heading"] if actor["lane"] >= 0 else here["heading"]
-    return float(actor["vx"] * cos(heading) + actor["vy"] * sin(heading))
+@inner_kernel
+def find_lead(placed: Places, lanes: NDArray[np.void], i: int) -> tuple[int, float]:
+    """Returns the nearest vehicle ahead on the lanes that follow straight on, and the m to its middle.
+
+    Row -1: none is near. Lanes are followed until the first one comes again.
+    """
+    here = placed[i]
+    lane, begin = here.lane, -here.s  # m from the vehicle to the lane's begin
+    while begin <= REACH + LONGEST:
+        nearest, lead = np.inf, -1
+        for j in range(len(placed)):
+            if placed[j].lane == lane and placed[j].present:
+                way = begin + placed[j].s
+                if j != i and 0.0 < way < nearest:
+                    nearest, lead = way, j
+        if lead >= 0:
+            return lead, nearest
+        begin += lanes[lane].length
+        lane = lanes[lane].ahead
+        if lane < 0 or lane == here.lane:
+            break
+    return -1, np.inf

@@ -16,12 +16,20 @@ PAGE = (Path(__file__).resolve().parents[2] / "docs" / "learning.md").read_text(
 
 def test_the_code_of_the_page_runs():
     blocks = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    assert len(blocks) == 2
+    assert len(blocks) == 3
     known: dict[str, object] = {}
-    for block in blocks:
+    for block in blocks[:2]:
         exec(block, known)
     assert known["info"]["metrics"]["distance_km"] > 0.0
     assert known["observations"].shape == (2, len(OBSERVED))
+
+
+def test_the_code_of_all_agents_runs():
+    pytest.importorskip("pettingzoo", reason="needs PettingZoo (extra rl)")
+    block = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)[2]
+    known: dict[str, object] = {}
+    exec(block, known)
+    assert len(known["run"].log) == 100
 
 
 def test_the_tables_are_those_of_the_code():

@@ -1,5 +1,6 @@
 """Gymnasium environments over the one loop, for learning to drive (extra `rl`).
 
+`skidpad.env.parallel_env` lets agents drive all vehicles, as a parallel environment of PettingZoo.
 Importing it registers `skidpad/Follow-v0` (pedals, lane centring steers) and `skidpad/Drive-v0`
 (pedals and steer).
 """
@@ -22,5 +23,8 @@ __all__ = ["OBSERVED", "WEIGHTS", "DriveEnv"]
 for _id, _steers in (("skidpad/Follow-v0", False), ("skidpad/Drive-v0", True)):
     if _id not in gymnasium.registry:
         gymnasium.register(
-            _id, entry_point="skidpad.env.drive_env:DriveEnv", kwargs={"steers": _steers}
+            _id,
+            entry_point="skidpad.env.drive_env:DriveEnv",
+            vector_entry_point="skidpad.env.vector_env:DriveVectorEnv",
+            kwargs={"steers": _steers},
         )

@@ -139,5 +139,7 @@ class DriveEnv(gymnasium.Env):  # type: ignore[misc]
 
     def close(self) -> None:
         """Releases the worlds."""
-        self.episodes.close(self._episode)
-        self._episode = None
+        if self._episode is not None:
+            self.episodes.put_aside(self._episode)
+            self._episode = None
+        self.episodes.close()

@@ -70,17 +70,17 @@ class EgoEpisode:
         self.wheel.action = [min(max(float(value), -1.0), 1.0) for value in action]
         run = self.run
         run.answer()
-        truncated = not run.sense()
+        if not run.sense():  # it has answered the last tick, and nothing moves any more
+            self.terms = [0.0] * len(TERMS)
+            return 0.0, False, True
         observe(self.world.arena, self.observations)
         assert run.stepper is not None
-        terminated = not truncated and run.stepper.frame.supervision is not Supervision.NONE
+        terminated = run.stepper.frame.supervision is not Supervision.NONE
         reason = self.supervisor.reason if terminated else None
-        self.terms = terms_of(
-            run.stepper.truth, self.observations[0], reason, run.stage.setup.dt
-        )
+        self.terms = terms_of(run.stepper.truth, self.observations[0], reason, run.stage.setup.dt)
         self.sums = [a + b for a, b in zip(self.sums, self.terms, strict=True)]
         reward = sum([weight * self.terms[k] for k, weight in rewards.items()])
-        return reward, terminated, truncated
+        return reward, terminated, False
 
     def close(self) -> None:
         """Releases the world."""

@@ -103,7 +103,7 @@ class Episodes(Generic[E]):
         """
         options = options or {}
         if last is not None:
-            self._put_aside(last)
+            self.put_aside(last)
         key = (seed, *(chosen for chosen in (self.outside | dict(options)).values()))
         if idle := self._idle.get(key):
             found = idle.pop()
@@ -114,20 +114,18 @@ class Episodes(Generic[E]):
             self._keys[id(made)] = key
         return made
 
-    def close(self, last: E | None) -> None:
-        """Releases all worlds. last: the one of the present episode."""
-        if last is not None:
-            self._put_aside(last)
-        for idle in self._idle.values():
-            for episode in idle:
-                episode.close()
-        self._idle.clear()
-        self._keys.clear()
-
-    def _put_aside(self, last: E) -> None:
+    def put_aside(self, last: E) -> None:
         """Keeps a world for another episode of its seed where seeds are listed, else releases it."""
         key = self._keys.get(id(last))
         if key is None:
             last.close()
         else:
             self._idle.setdefault(key, []).append(last)
+
+    def close(self) -> None:
+        """Releases all worlds that were put aside."""
+        for idle in self._idle.values():
+            for episode in idle:
+                episode.close()
+        self._idle.clear()
+        self._keys.clear()

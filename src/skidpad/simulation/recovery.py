@@ -297,7 +297,8 @@ class Supervisor:
                 return RelocationReason.WRONG_WAY  # more than 120 deg off (A-196, A-197)
         if self.last is None or not self._has_left(truth, place):
             return None
-        ended = self._is_past_the_end(states, self.last)
+        x, y = float(states.x[0]), float(states.y[0])
+        ended = is_past_the_end(self.map, x, y, self.last)
         return RelocationReason.ROAD_END if ended else RelocationReason.OFF_ROAD
 
     def _has_left(self, truth: WorldTruth, place: LanePoint | None) -> bool:
@@ -315,17 +316,6 @@ class Supervisor:
         self.off += 1
         beyond = float(self.map.edge.beyond(x, y, z)[0])
         return self.off * self.dt >= OFF_ROAD_TIME or beyond > OFF_ROAD_LIMIT
-
-    def _is_past_the_end(self, states: ActorStates, last: LanePoint) -> bool:
-        """Returns whether the ego left over the end of a lane that leads nowhere: there the map ends."""
-        lanes, drivable = self.map.lanes, self.map.arrays.drivable
-        if last.s < lanes.length[last.lane] - 0.01 or any(
-            drivable[lane] for lane in self.map.successors(last.lane)
-        ):
-            return False
-        dx, dy = float(states.x[0]) - last.x, float(states.y[0]) - last.y
-        ahead = dx * cos(last.heading) + dy * sin(last.heading)
-        return ahead > abs(dy * cos(last.heading) - dx * sin(last.heading))
 
     def _is_stuck(self, truth: WorldTruth, report: StackReport | None) -> bool:
         """Returns whether the ego is near standstill for too long without a reason to stand (A-200).
@@ -368,6 +358,21 @@ class Supervisor:
         near &= (distance > 0.0) & (distance < LIGHT_REACH)
         stop = (LightState.RED, LightState.YELLOW)
         return any(truth.lights.get(int(i)) in stop for i in signals.id[near])
+
+
+def is_past_the_end(map: RoadMap, x: float, y: float, last: LanePoint) -> bool:
+    """Returns whether a vehicle left over the end of a lane that leads nowhere: there the map ends.
+
+    x, y: m, where it is now. last: its last place on a lane.
+    """
+    lanes, drivable = map.lanes, map.arrays.drivable
+    if last.s < lanes.length[last.lane] - 0.01 or any(
+        drivable[lane] for lane in map.successors(last.lane)
+    ):
+        return False
+    dx, dy = x - last.x, y - last.y
+    ahead = dx * cos(last.heading) + dy * sin(last.heading)
+    return ahead > abs(dy * cos(last.heading) - dx * sin(last.heading))
 
 
 @kernel

@@ -73,10 +73,13 @@ class GripDrive:
     timing: Timing
 
 
-def drive_and_judge(out: Path, cell: RunSpec, keep: bool = False) -> GripDrive:
+def drive_and_judge(
+    out: Path, cell: RunSpec, keep: bool = False, checkpoints_s: float | None = None
+) -> GripDrive:
     """Drives a run of the catalogue and measures it; with `keep`, or when it failed, writes its folder.
 
-    Of an earlier attempt it removes the folder first.
+    Of an earlier attempt it removes the folder first. checkpoints_s: s between checkpoints in a folder that
+    is kept; None: none.
     """
     from skidpad.campaign.driving.backends import WATCHDOG, keep_server, make_backend
     from skidpad.campaign.runs.run import run
@@ -86,7 +89,8 @@ def drive_and_judge(out: Path, cell: RunSpec, keep: bool = False) -> GripDrive:
     folder, watch = fresh_folder(out, cell.name), Stopwatch()
     keep_server(cell.backend)
     backend = make_backend(cell.backend, WATCHDOG)
-    driven = run(cell, backend=backend, folder=folder if keep else None)
+    kept = folder if keep else None
+    driven = run(cell, backend=backend, folder=kept, checkpoints_s=checkpoints_s)
     metrics = grip_metrics(
         driven.log,
         driven.outcome,
@@ -103,11 +107,13 @@ def drive_and_judge(out: Path, cell: RunSpec, keep: bool = False) -> GripDrive:
     return GripDrive(driven, metrics, log_hash(driven.log), watch.timing())
 
 
-def drive_one(out: Path, cell: RunSpec, *, keep: bool = False) -> Driven[GripKey, GripMetrics]:
-    """Drives a run and writes its series, with `keep` its log too; returns its row."""
+def drive_one(
+    out: Path, cell: RunSpec, *, keep: bool = False, checkpoints_s: float | None = None
+) -> Driven[GripKey, GripMetrics]:
+    """Drives a run and writes its series, with `keep` its log and checkpoints too; returns its row."""
     from skidpad.evidence.grip.scores import grip_series
 
-    found = drive_and_judge(out, cell, keep)
+    found = drive_and_judge(out, cell, keep, checkpoints_s)
     write_series(series_path(out, cell.cell, cell.seed), grip_series(found.driven.log))
     return Driven(
         key=grip_key(cell, found.driven.outcome, found.log_hash),
@@ -135,13 +141,15 @@ def grip_key(cell: RunSpec, outcome: Outcome, log_hash: str | None = None) -> Gr
     )
 
 
-def finish(cells: Sequence[RunSpec], out: Path, runner: Runner) -> None:
+def finish(
+    cells: Sequence[RunSpec], out: Path, runner: Runner, checkpoints_s: float | None = None
+) -> None:
     """Drives the runs that the report shows again with their logs, and writes the stopping distances.
 
-    A drive is the same whenever it is driven.
+    A drive is the same whenever it is driven. checkpoints_s: s between checkpoints of these; None: none.
     """
     wanted = set(select_shown_runs(read_results(out)).select(*CELL, "seed").iter_rows())
-    work = partial(drive_one, out, keep=True)
+    work = partial(drive_one, out, keep=True, checkpoints_s=checkpoints_s)
     jobs = [
         Job(c.name, work, c, c.deadline_s)
         for c in cells
@@ -157,18 +165,23 @@ def finish(cells: Sequence[RunSpec], out: Path, runner: Runner) -> None:
     )
 
 
-def recipe(keep_all: bool = False) -> Recipe[RunSpec, GripKey, GripMetrics]:
-    """Returns what a grip campaign is made of; keep_all: every run leaves its whole log."""
+def recipe(
+    keep_all: bool = False, checkpoints_s: float | None = None
+) -> Recipe[RunSpec, GripKey, GripMetrics]:
+    """Returns what a grip campaign is made of; keep_all: every run leaves its whole log.
+
+    checkpoints_s: s between checkpoints of runs whose logs are kept; None: none.
+    """
     return Recipe(
         command="grip",
         columns=GRIP,
         entry=GripEntry,
         key=grip_key,
-        drive=partial(drive_one, keep=keep_all),
+        drive=partial(drive_one, keep=keep_all, checkpoints_s=checkpoints_s),
         warm_up=warm_up,
         success=lambda metrics: metrics.completion,
         success_means="completed",
-        finish=finish,
+        finish=partial(finish, checkpoints_s=checkpoints_s),
     )
 
 

@@ -9,11 +9,12 @@ from typing import Any, TypeVar, overload
 from skidpad.campaign.driving.sharing import share_setups
 from skidpad.campaign.runs.folder import last_line
 from skidpad.campaign.runs.run import Run, describe, drive, run
+from skidpad.campaign.runs.together import drive_together
 from skidpad.campaign.workers.pool import run_jobs
 from skidpad.campaign.workers.worker import Job
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.run import RunSpec
-from skidpad.stack.interface import Stack
+from skidpad.stack.interface import Stack, VectorStack
 
 T = TypeVar("T")
 Described = RunSpec | Mapping[str, Any]
@@ -49,6 +50,7 @@ def drive_many(
 
     Args:
         runs: run values, as `skidpad.Scenario(...).spec` is one, or mappings of what `skidpad.drive` takes.
+            Runs whose `stack` is the same `VectorStack`, an object, are driven by it together.
         workers: processes; 1 drives in this one.
         device: "cpu". There is no other one yet.
         judge: is called with each run where it was driven, and its value stands in the list in place of
@@ -71,13 +73,16 @@ def drive_many(
         )
     if workers < 1:
         raise ConfigError(f"workers must be at least 1, got {workers}")
-    described = [
-        (one, None) if isinstance(one, RunSpec) else describe(**{**DEFAULTS, **one}) for one in runs
-    ]
+    vectors = [_vector_of(one) for one in runs]
+    described = [_describe(one) for one in runs]
     drive_one = partial(_drive_one, judge)
     if workers == 1:
         with share_setups():
+            if any(vector is not None for vector in vectors):
+                return _drive_with_vectors(described, vectors, judge)
             return [drive_one(spec, kind) for spec, kind in described]
+    if any(vector is not None for vector in vectors):
+        raise ConfigError("a stack that drives several runs together needs workers=1")
     specs = [spec for spec, _ in described]
     jobs = [Job(str(k), drive_one, spec, spec.deadline_s) for k, spec in enumerate(specs)]
     found: dict[int, Any] = {}
@@ -87,6 +92,39 @@ def drive_many(
             raise BackendError(f"run {k} ({specs[k].name}): {last_line(finished.detail)}")
         found[k] = finished.value
     return [found[k] for k in range(len(specs))]
+
+
+def _vector_of(one: Described) -> VectorStack | None:
+    """Returns the stack that drives this run together with others; None: it has one of its own."""
+    stack = None if isinstance(one, RunSpec) else one.get("stack")
+    together = isinstance(stack, VectorStack) and not isinstance(stack, type)
+    return stack if together else None
+
+
+def _describe(one: Described) -> tuple[RunSpec, type[Stack] | None]:
+    """Returns a run, and the class of its stack where it is loaded."""
+    if isinstance(one, RunSpec):
+        return one, None
+    vector = _vector_of(one)
+    own = one if vector is None else {**one, "stack": type(vector)}
+    return describe(**{**DEFAULTS, **own})
+
+
+def _drive_with_vectors(
+    described: Sequence[tuple[RunSpec, type[Stack] | None]],
+    vectors: Sequence[VectorStack | None],
+    judge: Callable[[Run], Any] | None,
+) -> list[Any]:
+    """Drives runs of which some are driven together, and returns them in their order, judged if asked."""
+    found: dict[int, Any] = {}
+    for k, ((spec, kind), vector) in enumerate(zip(described, vectors, strict=True)):
+        if vector is None:
+            found[k] = _drive_one(judge, spec, kind)
+        elif k not in found:
+            group = [i for i, other in enumerate(vectors) if other is vector]
+            driven = drive_together(vector, {i: described[i][0] for i in group})
+            found |= driven if judge is None else {i: judge(run) for i, run in driven.items()}
+    return [found[k] for k in range(len(described))]
 
 
 def _drive_one(

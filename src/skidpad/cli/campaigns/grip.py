@@ -10,9 +10,9 @@ import typer
 from msgspec import structs
 
 from skidpad.cli.options.asked import MAPS, EgoStack, GripCross, MapAsked, Tuned
-from skidpad.cli.options.campaigns import FirstSeed, How
+from skidpad.cli.options.campaigns import Checkpoints, FirstSeed, How
 from skidpad.cli.options.spread import spread_fields
-from skidpad.core.errors import require_choice
+from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.run import Friction, RunSpec, Scenario
 from skidpad.core.simulator import BackendChoice
 from skidpad.core.vocabulary import ENDED, Outcome, SensorLevel
@@ -50,6 +50,7 @@ def grip(
     keep: Annotated[
         Keep, typer.Option(help="shown: logs of runs in the report; all: of every run.")
     ] = Keep.SHOWN,
+    checkpoints: Checkpoints = None,
 ) -> None:
     """Drive scenarios x weathers x frictions x seeds; prints the answer and the path of the report."""
     from skidpad.cli.options.carla_backend import check_backend, drives_alone
@@ -58,6 +59,8 @@ def grip(
     alone, keep_all = drives_alone(run.backend), keep is Keep.ALL
     if map.map_of is not None:
         require_choice("--map-of", map.map_of, MAPS)
+        if checkpoints is not None:
+            raise ConfigError("--checkpoints is not for --map-of: rerun one of its runs with it")
         from skidpad.campaign.campaign import Campaign
         from skidpad.campaign.recipes import threshold
         from skidpad.cli.campaigns import threshold_plan
@@ -82,7 +85,7 @@ def grip(
         page, rows = write_grip_report(folder), read_results(folder)
         return f"{answer_text(rows)}\n{page}\n{next_text(rows)}"
 
-    how(Campaign(recipe(keep_all), cells, alone=alone), answer)
+    how(Campaign(recipe(keep_all, checkpoints), cells, alone=alone), answer)
 
 
 def answer_text(rows: pl.DataFrame) -> str:

@@ -9,7 +9,7 @@ gymnasium = pytest.importorskip("gymnasium", reason="needs Gymnasium (extra rl)"
 
 from skidpad.core.errors import ConfigError  # noqa: E402
 from skidpad.env import OBSERVED  # noqa: E402
-from skidpad.env.crowd import CrowdEpisode  # noqa: E402
+from skidpad.env.all_agents import AllAgentsEpisode  # noqa: E402
 from skidpad.env.ego import EgoEpisode  # noqa: E402
 from skidpad.env.episodes import Episodes  # noqa: E402
 from skidpad.env.reward import TERMS  # noqa: E402
@@ -94,7 +94,7 @@ def test_what_cannot_be_of_a_vector_is_said_at_once():
 )
 def test_an_agent_alone_drives_and_ends_as_an_ego(map, pedal, steer, term):
     alone, ego = (
-        begin(kind, map=map, vehicles=0, duration=60.0) for kind in (CrowdEpisode, EgoEpisode)
+        begin(kind, map=map, vehicles=0, duration=60.0) for kind in (AllAgentsEpisode, EgoEpisode)
     )
     for _ in range(1199):
         alone.step(np.array([[pedal, steer]]))
@@ -110,7 +110,7 @@ def test_an_agent_alone_drives_and_ends_as_an_ego(map, pedal, steer, term):
 
 
 def test_agents_drive_on_the_one_loop_and_their_vehicles_are_noted_in_its_log():
-    crowd = begin(CrowdEpisode, weather="icy_30")
+    crowd = begin(AllAgentsEpisode, weather="icy_30")
     assert len(crowd.names) == 21
     for _ in range(200):
         crowd.step(keep_lane(crowd.observations))
@@ -129,7 +129,7 @@ def test_agents_drive_on_the_one_loop_and_their_vehicles_are_noted_in_its_log():
 def test_the_tyres_of_every_agent_slide_on_ice():
     speeds = {}
     for weather in ("clear-noon", "icy_100"):
-        crowd = begin(CrowdEpisode, weather=weather)
+        crowd = begin(AllAgentsEpisode, weather=weather)
         for _ in range(40):
             crowd.step(np.tile((1.0, 0.0), (21, 1)))
         speeds[weather] = crowd.observations[:, AT["speed"]][~crowd.ended]
@@ -137,7 +137,7 @@ def test_the_tyres_of_every_agent_slide_on_ice():
 
 
 def test_agents_that_touch_are_both_taken_off_the_road():
-    crowd = begin(CrowdEpisode)
+    crowd = begin(AllAgentsEpisode)
     for _ in range(300):
         crowd.step(np.tile((1.0, 0.0), (21, 1)))
         touched = crowd.terms[:, TERM["contacts"]] > 0
@@ -154,7 +154,7 @@ def test_agents_that_touch_are_both_taken_off_the_road():
 
 def test_a_crowd_goes_back_to_its_first_tick():
     found = []
-    crowd = begin(CrowdEpisode, weather="icy_30", duration=5.0)
+    crowd = begin(AllAgentsEpisode, weather="icy_30", duration=5.0)
     for _ in range(2):
         while not crowd.over:
             crowd.step(keep_lane(crowd.observations, 1.0))

@@ -18,7 +18,7 @@ import numpy as np
 import skidpad.env  # noqa: F401  # registers the environments
 from skidpad.core.arrays import Floats
 from skidpad.core.run import RunSpec
-from skidpad.env.crowd import CrowdEpisode, look
+from skidpad.env.all_agents import AllAgentsEpisode, look
 from skidpad.env.ego import EgoEpisode
 from skidpad.env.episodes import E, Episodes
 from skidpad.env.observation import OBSERVED, Observations, observe
@@ -107,7 +107,9 @@ def measure(drive: Callable[[int], tuple[int, float, list[float]]], steps: int) 
     )
 
 
-def parts_of(episode: EgoEpisode | CrowdEpisode, step: Callable[[], object]) -> dict[str, float]:
+def parts_of(
+    episode: EgoEpisode | AllAgentsEpisode, step: Callable[[], object]
+) -> dict[str, float]:
     """Returns where the time of a tick goes, us of processor time: medians over calls of each part."""
     whole = _us(step)
     arena, seen = episode.world.arena, episode.observations.copy()
@@ -130,7 +132,7 @@ def main() -> None:
     drive_agents(agents, 8 * 400)
     for name, drive in (("by PettingZoo", drive_agents), ("by arrays", drive_arrays)):
         print(f"| 21 agents, {name} | {measure(partial(drive, agents), CROWD_STEPS)} |", flush=True)
-    ego, crowd = _episode(EgoEpisode), _episode(CrowdEpisode)
+    ego, crowd = _episode(EgoEpisode), _episode(AllAgentsEpisode)
     for _ in range(100):
         ego.step((0.3,), {})
         crowd.step(follow(crowd.observations))

@@ -138,7 +138,7 @@ class DriveEnv(gymnasium.Env):  # type: ignore[misc]
         return self._present.run.stage.map
 
     def close(self) -> None:
-        """Releases the worlds."""
+        """Releases all worlds that are kept."""
         if self._episode is not None:
             self.episodes.put_aside(self._episode)
             self._episode = None

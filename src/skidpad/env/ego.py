@@ -42,7 +42,7 @@ class EgoEpisode:
 
     @property
     def world(self) -> World:
-        """Returns the moving world."""
+        """Returns the moving world of the run."""
         return world_of(self.run)
 
     @property
@@ -83,7 +83,7 @@ class EgoEpisode:
         return reward, terminated, False
 
     def close(self) -> None:
-        """Releases the world."""
+        """Releases the world of the run."""
         self.run.close()
 
 

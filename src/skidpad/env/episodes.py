@@ -30,7 +30,7 @@ class Episode(Protocol):
         ...
 
     def close(self) -> None:
-        """Releases the world."""
+        """Releases the world of the run."""
         ...
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from skidpad.campaign.runs.run import Run
 from skidpad.core.errors import ConfigError, MissingExtra, require_choice
 from skidpad.core.weather import Weather
-from skidpad.env.crowd import CrowdEpisode
+from skidpad.env.all_agents import AllAgentsEpisode
 from skidpad.env.episodes import OPTIONS, Episodes
 from skidpad.env.observation import HIGH, LOW
 from skidpad.env.reward import STUCK, TERMS, WEIGHTS, weigh
@@ -79,7 +79,7 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
         for k, weight in weigh(asked).items():
             self._rewards[k] = weight
         self.episodes = Episodes(
-            CrowdEpisode,
+            AllAgentsEpisode,
             map=map,
             weather=weather,
             grip=grip,

@@ -100,7 +100,7 @@ class DriveVectorEnv(VectorEnv):  # type: ignore[misc]
                 self._rngs[i], _ = seeding.np_random(given)
             seeds[i] = self._begin(i, given, options)
         self._over[:] = False
-        return self._observe(), _noted("seed", seeds, np.ones(self.num_envs, dtype=np.bool_))
+        return self._observe(), _note("seed", seeds, np.ones(self.num_envs, dtype=np.bool_))
 
     def step(
         self, actions: NDArray[np.float32]
@@ -116,7 +116,7 @@ class DriveVectorEnv(VectorEnv):  # type: ignore[misc]
             else:
                 rewards[i], terminated[i], truncated[i] = self._at(i).step(action, self._rewards)
         self._over = terminated | truncated
-        infos = _noted("seed", seeds, begun) | self._infos(~begun)
+        infos = _note("seed", seeds, begun) | self._infos(~begun)
         return self._observe(), rewards, terminated, truncated, infos
 
     def episode(self, i: int) -> EgoEpisode:
@@ -124,7 +124,7 @@ class DriveVectorEnv(VectorEnv):  # type: ignore[misc]
         return self._at(i)
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Releases the worlds."""
+        """Releases all worlds that are kept."""
         del kwargs
         for i, last in enumerate(self._present):
             if last is not None:
@@ -151,11 +151,11 @@ class DriveVectorEnv(VectorEnv):  # type: ignore[misc]
         return np.concatenate(found)
 
     def _infos(self, driven: Flags) -> dict[str, Any]:
-        """Returns the infos of a step, as `DriveEnv` has them, with masks of who has them."""
+        """Returns the infos of a step, as `DriveEnv` has them, with masks of environments that have them."""
         episodes = [self._at(i) for i in range(self.num_envs)]
-        infos = _noted("t", np.array([one.t for one in episodes]), driven)
-        infos |= _noted("terms", _by_name([one.terms for one in episodes]), driven)
-        return infos | _noted("metrics", _by_name([one.sums for one in episodes]), self._over)
+        infos = _note("t", np.array([one.t for one in episodes]), driven)
+        infos |= _note("terms", _by_name([one.terms for one in episodes]), driven)
+        return infos | _note("metrics", _by_name([one.sums for one in episodes]), self._over)
 
 
 def _by_name(rows: Sequence[Sequence[float]]) -> dict[str, Floats]:
@@ -163,6 +163,6 @@ def _by_name(rows: Sequence[Sequence[float]]) -> dict[str, Floats]:
     return dict(zip(TERMS, np.array(rows).T, strict=True))
 
 
-def _noted(name: str, values: Any, has: Flags) -> dict[str, Any]:
-    """Returns an info, and under the name with an underscore who has it; {} where nobody has."""
+def _note(name: str, values: Any, has: Flags) -> dict[str, Any]:
+    """Returns an info, and the mask of environments that have it; {} where none has."""
     return {name: values, f"_{name}": has.copy()} if has.any() else {}

@@ -9,7 +9,7 @@ from math import cos, hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.campaign.driving.loop import Unsupervised
+from skidpad.campaign.driving.loop import Script, Timer, Unsupervised
 from skidpad.campaign.driving.run_setup import Stage, stage_of
 from skidpad.campaign.runs.run import OpenRun
 from skidpad.core.arrays import Floats
@@ -37,27 +37,22 @@ INSIDE, OUTSIDE, BACKWARDS = 0, 1, 2  # how a vehicle lies on its lane
 
 
 class Leavers:
-    """A script that lasts so many ticks and takes vehicles off the road by their names."""
+    """A script without an end that takes vehicles off the road by their names."""
 
-    def __init__(self, ticks: int) -> None:
-        self.left, self.leaving = ticks, list[str]()
-
-    @property
-    def ended(self) -> bool:
-        """Returns True when the ticks are over."""
-        return self.left <= 0
+    def __init__(self) -> None:
+        self.ended = False
+        self.leaving: list[str] = []
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
-        """Counts one tick down and returns the commands to those who leave."""
+        """Returns the commands to vehicles that leave."""
         del truth
-        self.left -= 1
         words = [ActorCommand(name, present=False) for name in self.leaving]
         self.leaving.clear()
         return words
 
 
-class CrowdEpisode:
-    """The run of an episode in which nobody but agents drives, and the way back to its first tick.
+class AllAgentsEpisode:
+    """The run of an episode in which agents drive all vehicles, and the way back to its first tick.
 
     Attributes:
         names: of the agents; row i of every array is that of names[i].
@@ -69,9 +64,9 @@ class CrowdEpisode:
     """
 
     def __init__(self, spec: RunSpec) -> None:
-        stage = crowd_stage(spec)
-        assert isinstance(stage.script, Leavers)
-        self.script, self.map = stage.script, stage.map
+        self.script = Leavers()
+        stage = set_up_agents(spec, self.script)
+        self.map = stage.map
         self.run = OpenRun(spec, ActionStack, stage=stage)
         self.run.sense()
         self.wheel, self.begin = wheel_of(self.run), self.run.save()
@@ -113,7 +108,7 @@ class CrowdEpisode:
         self._judge()
 
     def close(self) -> None:
-        """Releases the world."""
+        """Releases the world of the run."""
         self.run.close()
 
     def _judge(self) -> None:
@@ -166,8 +161,11 @@ class CrowdEpisode:
         return lane >= 0 and is_past_the_end(self.map, x, y, self.map.at(int(lane), s))
 
 
-def crowd_stage(spec: RunSpec) -> Stage:
-    """Returns the stage of a run in which all vehicles begin as ever, and none has a driver of its own."""
+def set_up_agents(spec: RunSpec, script: Script) -> Stage:
+    """Returns a run's world in which all vehicles begin as ever, and none has a driver of its own.
+
+    script: takes vehicles off the road; the run ends when its time is over.
+    """
     stage = stage_of(spec)
     setup = stage.setup
     roles = cast_of(load_map(setup.map), setup, spec.seed)
@@ -175,8 +173,8 @@ def crowd_stage(spec: RunSpec) -> Stage:
         replace(role.actor, driver=Control.SCRIPTED) for role in roles[1:] if not role.late
     )
     setup = replace(setup, actors=actors, traffic=None, specs=())
-    script = Leavers(round(spec.duration / setup.dt))
-    return replace(stage, setup=setup, supervisor=Unsupervised(), script=script)
+    timer = Timer(round(spec.duration / setup.dt), script)
+    return replace(stage, setup=setup, supervisor=Unsupervised(), script=timer)
 
 
 @kernel

@@ -13,7 +13,7 @@ from skidpad.campaign.driving.loop import Script, Timer, Unsupervised
 from skidpad.campaign.driving.run_setup import Stage, stage_of
 from skidpad.campaign.runs.run import OpenRun
 from skidpad.core.arrays import Floats
-from skidpad.core.jit import Held, kernel
+from skidpad.core.kernels.jit import Held, kernel
 from skidpad.core.run import RunSpec
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import WorldTruth

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import Held, inner_kernel, kernel
+from skidpad.core.kernels.jit import Held, inner_kernel, kernel
 from skidpad.simulation.world.feel import feel_motion
 from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.step import Arena

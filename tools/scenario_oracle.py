@@ -48,7 +48,7 @@ STEP, SAMPLE = 0.05, 0.2  # s, of the players and of what is stored
 OPTIONS = f"--fixed_timestep {STEP} --disable_controllers"
 LEAST_WAY = 5.0  # m that an entity of a corpus moves to be counted
 CORPUS_END = 40.0  # s of a file of others
-RECORD_MAX = 10_000_000  # bytes that esmini writes before it is interrupted: minutes of a file
+RECORD_MAX = 3_000_000  # bytes that esmini writes before it is interrupted: minutes of a file
 WALL_MAX = 30.0  # s after which it is interrupted, too
 NOT_COMPARABLE = {  # by the file's hash: why its motion is nothing to compare
     "5238302359bb20b98c5061f5c501e6829825afed8a79a40e6f18ad3c5640236e": (
@@ -78,7 +78,7 @@ def run_esmini(programs: Path, file: Path, roads: Path | None = None) -> Referen
     entities: dict[str, dict[int, State]] = {}
     for row in csv.DictReader(lines[head:], skipinitialspace=True):
         ms = round(float(row["time"]) * 1000.0)
-        if ms % round(SAMPLE * 1000.0) == 0:
+        if ms % round(SAMPLE * 1000.0) == 0 and ms <= CORPUS_END * 1000.0:
             state = State(*(float(row[k]) for k in ("x", "y", "h", "speed")))
             entities.setdefault(row["name"], {})[ms] = state
     return Reference(_version(programs), OPTIONS, file_hash(file), entities)
@@ -146,10 +146,7 @@ def record(programs: Path, folders: Sequence[Path]) -> int:
         except (RuntimeError, subprocess.SubprocessError, StopIteration) as error:
             print(f"{file}: {error}")
             continue
-        within = {n: {t: s for t, s in states.items() if t <= CORPUS_END * 1000.0}
-                  for n, states in reference.entities.items()}  # fmt: skip
-        short = Reference(reference.version, reference.options, hashed, within)
-        (OTHERS / f"{hashed[:16]}.csv").write_text(short.text(), encoding="utf-8")
+        (OTHERS / f"{hashed[:16]}.csv").write_text(reference.text(), encoding="utf-8")
     return 0
 
 

@@ -126,6 +126,12 @@ def test_a_file_without_a_road_has_a_plain_one(tmp_path):
     assert compiled(tmp_path, road="").map_name == "straight"
 
 
+def test_a_story_without_events_and_without_a_stop_trigger_does_not_end_what_init_begins(tmp_path):
+    empty = """<Story name="s"><Act name="a"><ManeuverGroup name="g" maximumExecutionCount="1">
+<Actors selectTriggeringEntities="false"/></ManeuverGroup><StartTrigger/></Act></Story>"""
+    assert told(tmp_path, stories=empty, stop="").rows[-1].time == pytest.approx(60.0, abs=0.1)
+
+
 def test_a_place_beyond_the_end_of_its_lane_is_moved_there_and_noted(tmp_path):
     path = write(tmp_path, init=at("ego", -3, 100) + at("other", -1, 9120))
     found = check(path)

@@ -246,13 +246,17 @@ class ToldStory(ToldParent):
 
 
 class Telling:
-    """All stories of a run. Without a stop trigger it ends when all acts are complete."""
+    """All stories of a run. Without a stop trigger it ends when all acts are complete.
+
+    A storyboard without any event, whose <Init> alone moves entities, does not end by itself.
+    """
 
     def __init__(self, board: Storyboard) -> None:
         self.stories = [ToldStory(s) for s in board.stories]
         self.acts = [a for s in self.stories for a in s.acts]
         self.halt = Watch(board.stop)
         self.begun = self.ended = False
+        self.ends = not self.halt and bool(board.events)
 
     @property
     def events(self) -> list[ToldEvent]:
@@ -271,8 +275,8 @@ class Telling:
             story.look(scene)
 
     def step(self, scene: Scene) -> None:
-        """Goes on with what is under way; `ended` when all acts are complete and no stop trigger exists."""
+        """Goes on with what is under way; `ended` when all acts are complete, where that ends it."""
         for story in self.stories:
             story.step(scene)
-        if not self.halt and self.acts and all(a.complete for a in self.acts):
+        if self.ends and all(a.complete for a in self.acts):
             self.ended = True

@@ -1,4 +1,5 @@
 import re
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,14 @@ DECISION = re.compile(r"[XLMGCKRT]-[1-9]\d?")  # the project's settled questions
 def test_every_mark_names_a_requirement_or_a_decision():
     unknown = {i for i in set(marks()) - set(summaries()) if not DECISION.fullmatch(i)}
     assert not unknown
+
+
+def test_every_mark_in_the_tests_is_listed():
+    """Counted in the texts, in whatever place or form a mark stands there."""
+    texts = [p.read_text(encoding="utf-8") for p in Path(__file__).parent.rglob("*.py")]
+    calls = [ids for text in texts for ids in re.findall(r"mark\.req\(([^)]*)\)", text)]
+    written = Counter(i for ids in calls for i in re.findall(r"[A-Z]+-\d+", ids))
+    assert written == Counter({i: len(tests) for i, tests in marks().items()})
 
 
 def test_states_name_requirements_and_exclude_each_other():

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -31,7 +32,7 @@ from skidpad.recording.campaign.ledger import (
 )
 from skidpad.recording.campaign.matrix import MATRIX, MatrixEntry, Metrics, RunKey
 from skidpad.recording.campaign.results import Timing, definitions_of, read_results
-from skidpad.recording.fingerprint import comparison_text, fingerprint
+from skidpad.recording.fingerprint import comparison_text, fingerprint, reach_text
 
 IDENTITY = {"configs": [0, 1], "seeds": 2}
 
@@ -238,6 +239,19 @@ def test_a_reader_is_told_whether_hashes_may_be_compared() -> None:
     assert comparison_text({"a"}, {"a"}).startswith("hashes may be compared")
     for a, b in (({"a"}, {"b"}), ({"a", "b"}, {"a"}), (set(), {"a"}), ({"a"}, set())):
         assert comparison_text(a, b).startswith("hashes may not be compared")
+
+
+@pytest.mark.req("X-2")
+@pytest.mark.parametrize(
+    ("places", "told"),
+    [
+        (["x"], "may be compared with .* alone: fingerprint x"),
+        (["y", "x"], "may not be compared with another: .* several fingerprints, x and y"),
+        ([], "may not be compared with another: its fingerprint was not recorded"),
+    ],
+)
+def test_with_what_a_hash_may_be_compared_is_one_sentence(places: list[str], told: str) -> None:
+    assert re.fullmatch(rf"Its hash {told}\.", reach_text(places))
 
 
 def test_a_folder_says_which_command_wrote_it(tmp_path):

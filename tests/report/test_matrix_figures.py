@@ -115,6 +115,33 @@ def test_published_numbers_stand_in_their_own_section_with_what_differs_said_fir
 
 
 @pytest.mark.req("A-259")
+@pytest.mark.parametrize(
+    ("caption", "published", "ours"),
+    [
+        ("Interventions (bars) and published", "collisions", "fatal_collisions"),
+        ("Dropout (bars) and the published", "dropout_pct", "dropout_pct"),
+    ],
+)
+def test_bars_are_ours_and_diamonds_the_published_values(page, caption, published, ours):
+    html, rows = page
+    svg, table = figure(html, caption), read_published(Source.MATRIX)
+    configs = ("0", *CONFIGS)
+    cells = [
+        table.filter(
+            config_id=int(config),
+            weather={"clear": "Clear Sky", "rain": "Heavy Rain"}[kind],
+            time_of_day=time.capitalize(),
+        )[published].item()
+        for config in configs
+        for kind, time in (weather.split("-") for weather in WEATHERS)
+    ]
+    ((_, diamonds),) = marks_of(svg, "#ffffff")
+    assert [y for _, y in diamonds] == pytest.approx(cells, rel=2e-3, abs=0.02)
+    for config, colour in zip(configs, PALETTE, strict=False):
+        assert bars(svg, colour) == pytest.approx(means(rows, ours, config), abs=1e-3)
+
+
+@pytest.mark.req("A-259")
 def test_two_configurations_stand_side_by_side_with_their_difference(page, tmp_path):
     _, rows = page
     rows_of = write_drawn_campaign(tmp_path, seeds=3)

@@ -4,8 +4,10 @@ from dataclasses import fields
 import polars as pl
 import pytest
 
+from skidpad.recording.campaign.folder import CampaignFolder
 from skidpad.recording.campaign.matrix import MATRIX, Metrics
 from skidpad.recording.files import write_parquet
+from skidpad.recording.fingerprint import reach_text
 from skidpad.report.elements.tables import number
 from skidpad.report.matrix.data import (
     WEATHERS,
@@ -74,6 +76,15 @@ def test_equal_drives_are_named_and_count_once(tmp_path):
     matrix = load_matrix(tmp_path)
     assert matrix.same_weather == [("1", ["clear-noon", "rain-noon"])]
     assert matrix.rate("fatal_collisions", "1").events == 2
+
+
+@pytest.mark.req("X-2")
+@pytest.mark.parametrize("places", [[], ["x"], ["x", "y"]])
+def test_the_page_says_with_what_its_hash_may_be_compared(tmp_path, monkeypatch, places):
+    MATRIX.write(tmp_path, [(key("1", "clear-noon", 1), Metrics(distance_km=7.0))])
+    monkeypatch.setattr(CampaignFolder, "fingerprints", places)
+    (section,) = (s for s in build_page(load_matrix(tmp_path)).sections if "versions" in s.title)
+    assert reach_text(places) in section.blocks[0].text
 
 
 def test_runs_that_did_not_finish_are_said_and_left_out(tmp_path):

@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 
 import skidpad
+from skidpad.core.text.wording import list_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +42,19 @@ def comparison_text(a: Collection[str], b: Collection[str]) -> str:
     return (
         "hashes may not be compared, equal drives may differ in theirs: other processor features, "
         f"libraries or version ({places[0]} against {places[1]})"
+    )
+
+
+def reach_text(places: Collection[str]) -> str:
+    """Returns in words with what a hash of drives on these fingerprints may be compared; empty: not known."""
+    if not places:
+        return "Its hash may not be compared with another: its fingerprint was not recorded."
+    driven = list_text(sorted(places))
+    if len(places) > 1:
+        return f"Its hash may not be compared with another: it was driven on several fingerprints, {driven}."
+    return (
+        "Its hash may be compared with that of a campaign on the same processor features, libraries "
+        f"and version alone: fingerprint {driven}."
     )
 
 

@@ -17,6 +17,7 @@ from skidpad.recording.campaign.folder import CampaignFolder
 from skidpad.recording.campaign.ledger import E
 from skidpad.recording.campaign.quantities import ENDINGS, NAMES, unit_of
 from skidpad.recording.campaign.results import Columns, definitions_of
+from skidpad.recording.fingerprint import reach_text
 from skidpad.report.elements.page import Block, Code, Definitions, Text, words
 
 NAMED = 5  # runs
@@ -120,7 +121,7 @@ class CampaignView(Generic[E]):
         """Returns versions, machines and times as text, and the configuration common to all runs."""
         lines = [
             f"Skidpad {__version__}, results hash {self.columns.hash(self.results)}.",
-            f"Machine fingerprints: {', '.join(self.folder.fingerprints) or 'none'}.",
+            reach_text(self.folder.fingerprints),
             *self._times(),
         ]
         text = msgspec.json.format(

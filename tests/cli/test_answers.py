@@ -7,9 +7,11 @@ from typer.testing import CliRunner
 from skidpad.cli.campaigns.adas import answer
 from skidpad.cli.campaigns.grip import answer_text, next_text
 from skidpad.cli.main import app
+from skidpad.cli.output.tables import fit_terminal
 from skidpad.recording.campaign.folder import CampaignFolder
 from skidpad.recording.campaign.matrix import MATRIX, Metrics, RunKey
-from skidpad.report.matrix.data import Matrix
+from skidpad.report.matrix.answers import terminal_answer
+from skidpad.report.matrix.data import Matrix, load_matrix
 
 
 def rows(*cells):
@@ -90,6 +92,43 @@ def test_adas_ends_with_the_answers_the_page_and_the_run_to_look_at(tmp_path, mo
     assert sure.startswith("2 seeds per cell cannot tell two configurations apart")
     assert page == str(tmp_path / "report.html")
     assert following == f"Next: skidpad show {tmp_path}/runs/2-2 tells of the run with 6 crashes"
+
+
+def calm_campaign(folder):
+    """Two seeds of configuration 1 without a crash."""
+    same = {"weather": "clear-noon", "precipitation_kind": "clear", "time_of_day": "noon"}
+    same |= {"profile": "recommended", "map": "figure8", "sensors": "objects", "grip": "physical"}
+    keys = [
+        RunKey(config="1", seed=s, range="physical", outcome="completed", log_hash=str(s), **same)
+        for s in (1, 2)
+    ]
+    MATRIX.write(folder, [(key, Metrics(fatal_collisions=0, distance_km=5.0)) for key in keys])
+    return load_matrix(folder)
+
+
+@pytest.mark.parametrize(
+    ("logs", "told"),
+    [
+        ({"1": "runs/1"}, "Next: skidpad show runs/1 tells of a run without a crash"),
+        ({"2": "runs/2"}, "Next: skidpad show runs/2 tells of a run without a crash"),
+        ({}, "Next: skidpad compare {} OTHER says what another campaign changes"),
+    ],
+)
+def test_a_campaign_without_a_crash_names_the_next_command_too(tmp_path, monkeypatch, logs, told):
+    matrix = calm_campaign(tmp_path)
+    monkeypatch.setattr(Matrix, "names", lambda _, runs: [str(s) for s in runs["seed"]])
+    monkeypatch.setattr(CampaignFolder, "log", lambda _, name: logs.get(name))
+    assert terminal_answer(matrix)[-1] == told.format(tmp_path)
+
+
+def test_prose_is_filled_to_the_width_of_a_terminal_and_commands_are_not_cut(monkeypatch):
+    text = f"{'word ' * 30}end\n/a/path/of/a/page.html\nNext: skidpad show {'long/' * 30}run"
+    assert fit_terminal(text) == text, "in a pipe a line stays a line"
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "80")
+    first, second, page, following = fit_terminal(text).split("\n")
+    assert max(len(first), len(second)) <= 80
+    assert f"{first} {second}\n{page}\n{following}" == text
 
 
 @pytest.mark.parametrize(

@@ -70,6 +70,7 @@ class CampaignOptions(Driving, frozen=True, kw_only=True):
         """
         from dataclasses import replace
 
+        from skidpad.cli.output.tables import fit_terminal
         from skidpad.core.text.wording import count_text
 
         campaign = replace(campaign, until_halfwidth=self.until_halfwidth)
@@ -80,7 +81,7 @@ class CampaignOptions(Driving, frozen=True, kw_only=True):
             report(out)
         for name, part in parts.items():
             self._run(part, out / name, out)
-        typer.echo(report(out))
+        typer.echo(fit_terminal(str(report(out))))
         if summary.failed == summary.runs > 0:
             typer.echo(f"none of {count_text(summary.runs, 'run')} has a result", err=True)
             raise typer.Exit(1)

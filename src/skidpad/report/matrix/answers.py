@@ -47,26 +47,30 @@ def answers(
 
 
 def terminal_answer(matrix: Matrix) -> list[str]:
-    """Returns the first two answers as lines, where possible with a last line `Next: <command>`.
+    """Returns the first two answers as lines and a last line `Next: <command>`.
 
-    The command shows the run with the most crashes of the compared configurations; there is none
-    where that run had no crash or its log was not kept. One line alone where no run was finished.
+    One line alone where no run was finished.
     """
     if not len(matrix.finished):
         return ["No run was finished."]
     functions, weather = _functions(matrix), _weather(matrix)
-    lines = [functions.sentence, *functions.lines, weather.sentence]
+    return [functions.sentence, *functions.lines, weather.sentence, _next_command(matrix)]
+
+
+def _next_command(matrix: Matrix) -> str:
+    """Returns the line with the command that shows the run with the most crashes of those that were kept.
+
+    Of the compared configurations; without a log that was kept, the command that compares campaigns.
+    """
     runs = matrix.finished.filter(pl.col("config").is_in(matrix.comparison_configs))
-    worst = runs.sort(EVENTS, "config", "weather", "seed", descending=[True, *[False] * 3]).head(1)
-    for name in matrix.names(worst):
-        if (
-            name is not None
-            and worst[EVENTS][0]
-            and (folder := matrix.folder.log(name)) is not None
-        ):
-            crashes = count_text(worst[EVENTS][0], EVENT, EVENTS)
-            lines.append(f"Next: skidpad show {folder} tells of the run with {crashes}")
-    return lines
+    runs = runs.sort(EVENTS, "config", "weather", "seed", descending=[True, *[False] * 3])
+    for name, crashes in zip(matrix.names(runs), runs[EVENTS], strict=True):
+        folder = None if name is None else matrix.folder.log(name)
+        if folder is not None:
+            with_crashes = f"the run with {count_text(crashes or 0, EVENT, EVENTS)}"
+            told = with_crashes if crashes else f"a run without a {EVENT}"
+            return f"Next: skidpad show {folder} tells of {told}"
+    return f"Next: skidpad compare {matrix.folder.path} OTHER says what another campaign changes"
 
 
 # --- which functions

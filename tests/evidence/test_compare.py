@@ -203,6 +203,38 @@ def test_the_command_says_whether_hashes_may_be_compared(tmp_path, place, told):
     assert lines.splitlines()[-1].startswith(f"Next: skidpad report {tmp_path / 'b'}")
 
 
+@pytest.mark.parametrize(
+    ("before", "after", "told"),
+    [
+        (rows(), rows(), "Nothing changed: every run is the same drive in both."),
+        (
+            rows(seeds=range(1, 4)), rows(extra=2, seeds=range(1, 4)),
+            "Of 6 differences none is shown: all may be chance.",
+        ),
+        (
+            rows(seeds=range(1, 13)), rows(extra=2, seeds=range(1, 13)),
+            ("Changed beyond chance: interventions (all configurations, +1) and interventions "
+            "(configuration 2, +2)."),
+        ),
+    ],
+    ids=["same", "few", "many"],
+)  # fmt: skip
+def test_the_command_ends_with_one_sentence_of_answer(tmp_path, before, after, told):
+    MATRIX.write(tmp_path / "a", before)
+    MATRIX.write(tmp_path / "b", after)
+    done = CliRunner().invoke(app, ["compare", str(tmp_path / "a"), str(tmp_path / "b")])
+    assert done.stdout.splitlines()[-2] == told
+
+
+def test_one_run_without_a_partner_is_told_in_the_singular(tmp_path):
+    MATRIX.write(tmp_path / "a", rows())
+    MATRIX.write(tmp_path / "b", rows()[:-1])
+    call = ["compare", str(tmp_path / "a"), str(tmp_path / "b"), "--fail-if", "interventions > 9"]
+    told = CliRunner().invoke(app, call)
+    assert f"without a partner: 1 run of {tmp_path / 'a'}, 0 of" in told.stdout
+    assert "without a partner: 1 run of A, 0 of B" in told.stderr
+
+
 @pytest.mark.req("T-6")
 def test_no_text_of_one_seed_has_a_p_value_or_an_infinity(tmp_path):
     for name, extra in (("a", 0), ("b", 2)):

@@ -17,7 +17,7 @@ import polars as pl
 
 from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError
-from skidpad.core.text.wording import count_text
+from skidpad.core.text.wording import count_text, list_text
 from skidpad.evidence.comparisons import LIST_COLUMNS, Flaw, parse_comparison
 from skidpad.evidence.contrasts import NOT_RUN
 from skidpad.evidence.statistics import (
@@ -120,6 +120,19 @@ def judge_rules(
     return judged
 
 
+def summarise_changes(changes: Sequence[Change]) -> str:
+    """Returns one sentence on which columns changed beyond chance, two-sided, adjusted for all (Holm)."""
+    if all(c.same == c.runs for c in changes):
+        return "Nothing changed: every run is the same drive in both."
+    tested = [c for c in changes if c.comparison.p is not None]
+    adjusted = holm([c.comparison.p for c in tested if c.comparison.p is not None])
+    sure = [c for c, p in zip(tested, adjusted, strict=True) if p <= ALPHA]
+    if not sure:
+        return f"Of {count_text(len(changes), 'difference')} none is shown: all may be chance."
+    named = list_text([f"{c.column} ({c.subject}, {c.comparison.mean:+.3g})" for c in sure])
+    return f"Changed beyond chance: {named}."
+
+
 def seeds_to_fire(hypotheses: int) -> int:
     """Returns the least seeds with which one of so many hypotheses can be below 5 %, one-sided, adjusted.
 
@@ -137,11 +150,13 @@ def flaws(a: pl.DataFrame, b: pl.DataFrame, rules: Sequence[Rule]) -> dict[Flaw,
     by = list(PAIRED_BY)
     alone = [len(x.join(y, on=by, how="anti", nulls_equal=True)) for x, y in ((a, b), (b, a))]
     if any(alone):
-        found[Flaw.MISSING] = f"without a partner: {alone[0]} runs of A, {alone[1]} of B"
+        found[Flaw.MISSING] = (
+            f"without a partner: {count_text(alone[0], 'run')} of A, {alone[1]} of B"
+        )
     crashed = [int(t["outcome"].is_in(NOT_RUN).sum()) for t in (a, b)]
     if any(crashed):
         found[Flaw.CRASHED] = (
-            f"crashed, timed out or failed: {crashed[0]} runs of A, {crashed[1]} of B"
+            f"crashed, timed out or failed: {count_text(crashed[0], 'run')} of A, {crashed[1]} of B"
         )
     empty = sorted({who for rule in rules for who in _empty(a, b, rule.column)})
     if empty:

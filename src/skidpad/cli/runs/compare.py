@@ -140,7 +140,9 @@ def _read_rules(texts: list[str]) -> list[Rule]:
 
 def _compare(a: Path, b: Path, rules: list[Rule], gate: Gate) -> dict[str, list[str]]:
     """Prints what changed and what the rules say of it; returns what fails, by rule and flaw of data."""
-    from skidpad.evidence.compare import compare_campaigns, flaws, judge_rules
+    from skidpad.cli.output.tables import fit_terminal
+    from skidpad.core.text.wording import count_text
+    from skidpad.evidence.compare import compare_campaigns, flaws, judge_rules, summarise_changes
     from skidpad.recording.campaign.matrix import MATRIX
     from skidpad.recording.campaign.results import read_results
     from skidpad.recording.fingerprint import comparison_text
@@ -149,9 +151,10 @@ def _compare(a: Path, b: Path, rules: list[Rule], gate: Gate) -> dict[str, list[
     before, after = (_with_interventions(read_results(folder, MATRIX)) for folder in (a, b))
     changes, alone_a, alone_b = compare_campaigns(before, after, wanted)
     _print(changes)
-    typer.echo(comparison_text(*(_places(t) for t in (before, after))))
+    typer.echo(fit_terminal(comparison_text(*(_places(t) for t in (before, after)))))
     if alone_a or alone_b:
-        typer.echo(f"without a partner: {alone_a} runs of {a}, {alone_b} of {b}")
+        typer.echo(f"without a partner: {count_text(alone_a, 'run')} of {a}, {alone_b} of {b}")
+    typer.echo(fit_terminal(summarise_changes(changes)))
     judged = judge_rules(rules, changes, point=gate.point)
     failures = {
         rule.text: [j.text for j in _against(rule, judged, gate.undecided)] for rule in rules

@@ -34,6 +34,11 @@ INSIDE = frozenset(  # understood where they stand inside others
         "ConnectTrailerAction", "DisconnectTrailerAction", "TrafficStopAction",
     }
 )  # fmt: skip
+TILTED = "pitch and roll are those of a trajectory, pitch also by the climb of its points, else of the road"
+ROUTED = (
+    "chooses the way at forks, without changes of lanes where there is one; "
+    "does not change lanes by itself"
+)
 STATES = (
     "colours and three lamps such as `on;off;off` are shown; other words are for conditions alone"
 )
@@ -74,12 +79,10 @@ PARTIAL: Mapping[str, str] = MappingProxyType(
             ("TrailerAction", "ConnectTrailerAction", "DisconnectTrailerAction"), TOWED
         ),
         "InfrastructureAction": STATES,
-        "AngleCondition": "pitch and roll are those of a trajectory, else of the road",
-        "RelativeAngleCondition": "pitch and roll are those of a trajectory, else of the road",
+        **dict.fromkeys(("AngleCondition", "RelativeAngleCondition"), TILTED),
         "AssignControllerAction": CONTROLLED,
         "ActivateControllerAction": CONTROLLED,
-        "AcquirePositionAction": "chooses the way at forks; does not change lanes by itself",
-        "AssignRouteAction": "chooses the way at forks; does not change lanes by itself",
+        **dict.fromkeys(("AcquirePositionAction", "AssignRouteAction"), ROUTED),
         "TrafficSourceAction": f"at most {MOST} at a time; who drives them is chosen here",
         "TrafficSinkAction": "takes vehicles of traffic, never entities of the file",
         "TrafficSwarmAction": f"at most {MOST}; who drives them is chosen here",

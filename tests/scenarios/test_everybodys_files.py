@@ -14,6 +14,7 @@ from skidpad.roads.opendrive.bake import bake
 from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.scenarios.reading.findings import Kind, ScenarioError
 from skidpad.scenarios.scenario import check, compile_scenario
+from support.oracle.actions import lane_change
 from support.scenarios.files import (
     BRIDGE,
     at,
@@ -169,6 +170,20 @@ def test_what_is_missing_but_clear_plays_when_asked_to_be_lenient(tmp_path):
     ego, other, third = (play_ideal(scenario, 0.1).of(n)[0] for n in ("ego", "other", "third"))
     assert (other.x - ego.x, other.y - ego.y) == pytest.approx((0.0, 3.0), abs=1e-6)
     assert (third.x - ego.x, third.y - ego.y) == pytest.approx((20.0, 0.0), abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["end", "$end"])  # some files declare names with the sign
+def test_an_offset_that_is_none_is_read_as_no_offset_when_asked_to_be_lenient(tmp_path, name):
+    change = lane_change('<AbsoluteTargetLane value="-2"/>').replace('"0.0"', '"$end"', 1)
+    file = write(
+        tmp_path, stories=story(event("e", private(change), time(0.1))), end=6.0,
+        parameters=f'<ParameterDeclaration name="{name}" parameterType="double" value="None"/>',
+    )  # fmt: skip
+    with pytest.raises(ScenarioError, match="None"):
+        compile_scenario(file)
+    scenario = compile_scenario(file, lenient=True)
+    assert "targetLaneOffset is None: read as no offset" in notes(scenario)
+    assert play_ideal(scenario, 6.0).of("other")[-1].y == pytest.approx(-5.25, abs=0.01)
 
 
 def test_a_file_of_the_domain_specific_language_is_called_so(tmp_path):

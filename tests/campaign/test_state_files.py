@@ -25,7 +25,8 @@ from skidpad.campaign.runs.state_files import (
     REFUSED,
     StateFiles,
     find_nearest,
-    read_header,
+    read_state,
+    unpack_state,
 )
 from skidpad.core.errors import CheckpointError
 from skidpad.core.run import Friction, Scenario
@@ -83,9 +84,9 @@ def test_a_run_goes_on_from_a_file(tmp_path, case):
     go_on(run)
     assert log_hash(run.finish().log) == log_hash(log), "to write changes nothing"
     for k, path in written.items():
-        assert read_header(path, spec).tick == k
+        assert read_state(path, spec).header.tick == k
         run, files = begin(spec)
-        files.restore(path)
+        files.restore(unpack_state(path))
         assert run.tick == k
         go_on(run)
         rest = run.log.log.finish()
@@ -124,7 +125,7 @@ def test_another_file_is_refused_in_one_sentence(tmp_path, contents, sentence):
     path = tmp_path / "state"
     path.write_bytes(contents())
     with pytest.raises(CheckpointError, match=sentence) as caught:
-        read_header(path, spec_of("figure8", 2, duration=6.0))
+        read_state(path, spec_of("figure8", 2, duration=6.0))
     assert "\n" not in str(caught.value)
 
 
@@ -144,7 +145,7 @@ def test_a_damaged_file_is_refused(tmp_path):
     path.write_bytes(written_bytes()[:-7] + b"\0" * 7)
     _, files = begin(spec_of("figure8", 2, duration=6.0))
     with pytest.raises(CheckpointError, match="is damaged"):
-        files.restore(path)
+        files.restore(unpack_state(path))
 
 
 @pytest.mark.parametrize(
@@ -165,7 +166,7 @@ def test_no_file_makes_what_is_no_data(tmp_path, forged):
     path.write_bytes(repacked(lambda plain: plain["came"].append(forged)))
     _, files = begin(spec_of("figure8", 2, duration=6.0))
     with pytest.raises(CheckpointError, match="cannot be a part of|none of this run"):
-        files.restore(path)
+        files.restore(unpack_state(path))
 
 
 def test_a_run_that_begins_otherwise_is_refused(tmp_path):
@@ -173,7 +174,7 @@ def test_a_run_that_begins_otherwise_is_refused(tmp_path):
     path.write_bytes(written_bytes())
     _, files = begin(spec_of("figure8", 0, duration=6.0))
     with pytest.raises(CheckpointError, match="begins otherwise"):
-        files.restore(path)
+        files.restore(unpack_state(path))
 
 
 def test_a_file_branches_by_name(tmp_path):
@@ -184,7 +185,7 @@ def test_a_file_branches_by_name(tmp_path):
     hashes = []
     for branch in ("", "a", "b", "a"):
         run, files = begin(spec)
-        files.restore(tmp_path / "state")
+        files.restore(unpack_state(tmp_path / "state"))
         if branch:
             run.branch(branch)
         go_on(run)
@@ -202,7 +203,7 @@ def test_a_stack_of_the_user_goes_on_from_a_file(tmp_path, name):
     go_on(run, 20)
     files.write(tmp_path / "state")
     run, files = begin(spec)
-    files.restore(tmp_path / "state")
+    files.restore(unpack_state(tmp_path / "state"))
     go_on(run)
     assert log_hash(run.log.log.finish()) == log_hash(last_ticks(log, 21))
 
@@ -221,7 +222,7 @@ def test_the_nearest_before_is_found(tmp_path):
     whole = log_hash(drive(spec, folder=tmp_path, checkpoints_s=0.5).log)
     assert whole == log_hash(drive(spec).log)
     found = [find_nearest(tmp_path, spec, tick) for tick in (10, 11, 20, 39)]
-    assert [None if path is None else path.stem for path in found] == [
+    assert [None if stored is None else stored.path.stem for stored in found] == [
         None, "0000010", "0000010", "0000030",
     ]  # fmt: skip
 

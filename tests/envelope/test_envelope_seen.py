@@ -17,7 +17,7 @@ from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import Govern, SensorLevel
 from skidpad.core.weather import Weather
-from skidpad.envelope.belief import BRIDGE_K, CAUTION, COLD_C, bridge_prior, prior_of, quantile
+from skidpad.envelope.belief import BRIDGE_K, COLD_C, prior_grip
 from skidpad.envelope.bridges import BridgesAhead
 from skidpad.envelope.limits import Binding, bridge_speed, preview_speed
 from skidpad.envelope.seen import FORGET, LEAST, Direction, SeenDistances, boundary_end
@@ -139,10 +139,9 @@ def test_the_next_bridge_is_found_on_the_lane_ahead(tmp_path):
 
 
 def test_a_bridge_is_expected_to_freeze_before_the_road():
-    near = COLD_C + 0.5 * BRIDGE_K
-    assert quantile(bridge_prior(0, near), CAUTION) < 0.5 * quantile(prior_of(0, False), CAUTION)
-    warm = COLD_C + BRIDGE_K
-    assert np.array_equal(bridge_prior(1, warm), prior_of(1, False))
+    near, warm = COLD_C + 0.5 * BRIDGE_K, COLD_C + BRIDGE_K
+    assert prior_grip(0, near - BRIDGE_K) < 0.5 * prior_grip(0, near)
+    assert prior_grip(1, warm - BRIDGE_K) == prior_grip(1, warm)
 
 
 def bindings(file, air_c, govern):

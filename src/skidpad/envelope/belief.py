@@ -59,14 +59,6 @@ def prior_of(stage: int, is_cold: bool) -> Floats:
     return p
 
 
-def bridge_prior(stage: int, air_c: float) -> Floats:
-    """Returns what is expected on a bridge: `prior_of` in air that is BRIDGE_K colder.
-
-    stage: of the rain sensor, 0: dry; air_c: air in deg C by the thermometer.
-    """
-    return prior_of(stage, air_c - BRIDGE_K < COLD_C)
-
-
 def quantile(p: Floats, share: float) -> float:
     """Returns the grip below which `share` of the (n,) probabilities lies."""
     return exp(float(np.interp(share, np.cumsum(p) - 0.5 * p, LOG_GRIP)))

@@ -26,7 +26,7 @@ from skidpad.core.specs import (
 )
 from skidpad.core.states import EgoEstimate, StackReport, VehicleCommand
 from skidpad.core.vocabulary import Supervision
-from skidpad.envelope.belief import BRIDGE_K, CAUTION, COLD_C, bridge_prior, quantile
+from skidpad.envelope.belief import BRIDGE_K, COLD_C, prior_grip
 from skidpad.envelope.bridges import BridgesAhead
 from skidpad.envelope.grip import STIFFNESS, Grip, GripEstimator
 from skidpad.envelope.limits import (
@@ -233,7 +233,7 @@ class Envelope:
         if self.bridge is None:
             return {}
         set_to = self.settings
-        expected = min(grip.value, quantile(bridge_prior(stage, air_c), CAUTION))
+        expected = min(grip.value, prior_grip(stage, air_c - BRIDGE_K))
         approach = min(set_to.approach, set_to.share * grip.value * G)
         v = max(frame.ego.speed, 0.0)
         on_bridge = set_to.share * expected * G

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 from skidpad.campaign.cells.matrix import describe_run
 from skidpad.campaign.driving.drivers import describe_driver
 from skidpad.campaign.runs.run import OpenRun
-from skidpad.campaign.runs.state_files import StateFiles
+from skidpad.campaign.runs.state_files import StateFiles, unpack_state
 from skidpad.campaign.stepping import Scenario
 from skidpad.core.run import Roads, RunSpec
 from skidpad.core.settings.parts import load_profile
@@ -43,7 +43,8 @@ def measure(spec: RunSpec) -> tuple[float, float, float, float]:
     tick = (time.process_time() - began) / TICKS
     with TemporaryDirectory() as folder:
         path = Path(folder) / "state"
-        write, restore = _median(lambda: files.write(path)), _median(lambda: files.restore(path))
+        write = _median(lambda: files.write(path))
+        restore = _median(lambda: files.restore(unpack_state(path)))
         size = path.stat().st_size
     run.close()
     return size / 1e3, 1e3 * tick, write, restore

@@ -109,10 +109,10 @@ def _go_to_nearest(opened: OpenRun, run: Path, tick: int) -> tuple[str, int]:
     Returns why none was used, where that needs a word, and its tick; 0: none was.
     """
     try:
-        path = find_nearest(run, opened.spec, tick)
-        if path is None or opened.step() is None:
+        stored = find_nearest(run, opened.spec, tick)
+        if stored is None or opened.step() is None:
             return "", 0
-        StateFiles(opened).restore(path)
+        StateFiles(opened).restore(stored)
     except CheckpointError as error:
         return str(error), 0
     return "", opened.tick

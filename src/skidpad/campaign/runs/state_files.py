@@ -10,7 +10,7 @@ from __future__ import annotations
 import zlib
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import msgspec
 
@@ -51,6 +51,14 @@ class Header(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     begin: str
     tick: int
     state: str
+
+
+class StoredState(NamedTuple):
+    """A file that was read, its header, and the packed state that follows it."""
+
+    path: Path
+    header: Header
+    state: bytes
 
 
 class Parts(Protocol):
@@ -102,13 +110,13 @@ class StateFiles:
         )
         write_bytes(path, MAGIC + msgspec.json.encode(header) + b"\n" + state)
 
-    def restore(self, path: Path) -> None:
+    def restore(self, stored: StoredState) -> None:
         """Puts the run to the state of a file; its log goes on with the next tick.
 
         Raises:
-            CheckpointError: the file is of another run, version or machine, or damaged.
+            CheckpointError: the file is of another run, or damaged.
         """
-        header, state = _read_parts(path)
+        path, header, state = stored
         if header.begin != self.ground.digest:
             raise CheckpointError(f"{path}: the run begins otherwise now than when it was written")
         if header.state != sha256(state).hexdigest():
@@ -118,14 +126,14 @@ class StateFiles:
         self.run.take_parts(self.ground.root[-1])
 
 
-def read_header(path: Path, spec: RunSpec) -> Header:
-    """Returns the header of a file that can be restored here into this run.
+def read_state(path: Path, spec: RunSpec) -> StoredState:
+    """Returns the contents of a file that can be restored here into this run.
 
     Raises:
         CheckpointError: it says in one sentence what the file is instead.
     """
-    header, _ = _read_parts(path)
-    here = fingerprint()
+    stored = unpack_state(path)
+    header, here = stored.header, fingerprint()
     for what, there, now in (
         ("format", header.format, FORMAT),
         ("Skidpad", header.skidpad, here.skidpad),
@@ -135,11 +143,11 @@ def read_header(path: Path, spec: RunSpec) -> Header:
             raise CheckpointError(f"{path} was written with another {what}: {there}, here {now}")
     if header.run != run_hash(spec):
         raise CheckpointError(f"{path} is of another run")
-    return header
+    return stored
 
 
-def find_nearest(folder: Path, spec: RunSpec, tick: int) -> Path | None:
-    """Returns the file of a run's folder with the latest tick before this one; None where there is none.
+def find_nearest(folder: Path, spec: RunSpec, tick: int) -> StoredState | None:
+    """Returns the state in a run's folder of the latest tick before this one; None where there is none.
 
     Raises:
         CheckpointError: that file cannot be restored here, or the run said why it has none.
@@ -151,9 +159,7 @@ def find_nearest(folder: Path, spec: RunSpec, tick: int) -> Path | None:
         raise CheckpointError(read_bytes(refused, "sentence").decode(errors="replace").strip())
     if not before:
         return None
-    path = max(before, key=lambda path: int(path.stem))
-    read_header(path, spec)
-    return path
+    return read_state(max(before, key=lambda path: int(path.stem)), spec)
 
 
 class CheckpointWriter:
@@ -186,14 +192,14 @@ def run_hash(spec: RunSpec) -> str:
     return sha256(msgspec.json.encode(plain, order="deterministic")).hexdigest()[:16]
 
 
-def _read_parts(path: Path) -> tuple[Header, bytes]:
-    """Returns header and state of a file; CheckpointError for another kind of file."""
+def unpack_state(path: Path) -> StoredState:
+    """Returns what a file holds, whatever run it is of; CheckpointError for another kind of file."""
     magic, _, rest = read_bytes(path, "checkpoint").partition(b"\n")
     line, _, state = rest.partition(b"\n")
     try:
         if magic + b"\n" != MAGIC:
             raise msgspec.DecodeError
-        return msgspec.json.decode(line, type=Header), state
+        return StoredState(path, msgspec.json.decode(line, type=Header), state)
     except msgspec.DecodeError:
         raise CheckpointError(
             f"{path} is no checkpoint of Skidpad, or one of another format"

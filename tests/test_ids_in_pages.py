@@ -80,6 +80,32 @@ def test_ids_on_the_cockpits_page_stand_with_what_they_are() -> None:
     check_ids([word for word in page.split('"') if " " in word])
 
 
+FLEET = {"axle": ("/", "/work", "/places", "/case", "/changes"), "red operator": ("/alerts",),
+         "researcher": ("/research",)}  # fmt: skip
+
+
+def test_ids_on_the_fleets_pages_stand_with_what_they_are(tmp_path: Path) -> None:
+    pytest.importorskip("nicegui", reason="nicegui is not installed (extra fleet)")
+    from skidpad.fleet.site.build import pages_of
+    from support.fleet_server import call, filled, loaded, someone, start_fleet
+
+    tokens = filled(tmp_path / "data")
+    child, address = start_fleet(tmp_path / "data")
+    with child:
+        try:
+            headers = {"Authorization": f"Bearer {tokens['axle']}"}
+            hazards = call("GET", f"{address}/api/v1/hazards", headers=headers).json()
+            replay = f"/replay/{hazards[0]['id']}"
+            visited = {**FLEET, "axle": (*FLEET["axle"], replay)}
+            assert sum(map(len, visited.values())) == len(pages_of(None, None))
+            for who, paths in visited.items():
+                with someone(address, tokens[who]) as client:
+                    for path in paths:
+                        check_ids([word for word in loaded(client, path).split('"') if " " in word])
+        finally:
+            child.terminate()
+
+
 OUTPUT = (
     "extensions", "doctor", "friction", "profiles list", "profiles show thesis_text",
     "profiles diff thesis_text recommended", "campaign --help",

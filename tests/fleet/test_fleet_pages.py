@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import gzip
 import json
 import os
 import signal
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
 
-import httpx
 import pytest
 
 from skidpad.cli.fleet.links import map_lines, open_maps
@@ -24,19 +18,12 @@ from skidpad.fleet.site.login import log_in_page
 from skidpad.fleet.words import FIRST_PAGE, NOT_THERE, RIGHTS, Action, Refused
 from support.chromium import CHROMIUM, FLAGS
 from support.fleet_maker import released
-from support.fleet_server import start_fleet
-from support.fleet_world import indicator_row, make_world, packed, record
+from support.fleet_server import WAIT_MS, call, filled, loaded, opened, someone, start_fleet
+from support.fleet_world import make_world, packed, record
 from support.stadium import RADIUS, STRAIGHT, WIDTH, written
 
-WAIT_MS = 120_000
 SCENE = {"map": "town", "ego": {"x": 1.0, "y": 2.0, "heading": 0.1}, "v": 8.0}
 ALERT = {"kind": "hazard", "text": "<b>car</b> ahead stopped", "scene": SCENE}
-
-
-def call(method: str, url: str, **rest) -> httpx.Response:
-    """One request with patience: a busy machine is no fault."""
-    with httpx.Client(timeout=WAIT_MS / 1000, trust_env=False) as client:
-        return client.request(method, url, **rest)
 
 
 def test_every_click_for_every_role_and_foreign_id(world):
@@ -66,48 +53,6 @@ def test_every_click_for_every_role_and_foreign_id(world):
             assert refused.value.status == (404 if who.role.value in roles else 403), (name, click)
     with pytest.raises(Refused):
         clicks["order"][0]("nobody")
-
-
-def filled(data: Path) -> dict[str, str]:
-    """A store with hazards, indicators and people; their credentials by name."""
-    world = make_world(data, None)
-    world.clock.now = time.time()
-    for k in range(3):
-        name = ("red-1", "red-2", "blue-1")[k]
-        hazards = [record(10 * k + i, (120.0 + i, 30.0)) for i in range(3)]
-        assert world.send(name, packed(*hazards), f"batch-key-{k}").status_code == 200
-        rows = gzip.compress(json.dumps(indicator_row(0, 200 + 20 * k)).encode())
-        assert world.send(name, rows, f"rows-key-{k}", "indicators").status_code == 200
-    world.post("red operator", "/api/v1/analyses")
-    tokens = {name: account.token for name, account in world.accounts.items()}
-    world.close()
-    return tokens
-
-
-def opened(address: str, token: str) -> str:
-    answer = call("POST", f"{address}/api/v1/session", headers={"Authorization": f"Bearer {token}"})
-    assert answer.status_code == 200, answer.text
-    return address + answer.json()["path"]
-
-
-def loaded(client: httpx.Client, path: str) -> str:
-    """A page as it is sent; a busy machine may need more than NiceGUI's 3 s to fill it."""
-    for _ in range(20):
-        answer = client.get(path)
-        assert answer.status_code == 200, (path, answer.status_code)
-        if '"nav"' in answer.text:  # the head that every filled page has
-            return answer.text
-    raise AssertionError(f"{path} was never filled")
-
-
-@contextmanager
-def someone(address: str, token: str) -> Iterator[httpx.Client]:
-    """A browser with a session of whose token it is."""
-    with httpx.Client(
-        base_url=address, timeout=WAIT_MS / 1000, trust_env=False, follow_redirects=True
-    ) as client:
-        client.get(opened(address, token)).raise_for_status()
-        yield client
 
 
 RED = "redtown"  # a map where only red vehicles drove

@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
-from support.ids import ROOT, bare_ids, check_ids, texts_of
+from support.ids import ROOT, bare_ids, check_ids, texts_in_script, texts_of
 
 
 def test_a_page_is_read_by_block() -> None:
@@ -76,8 +76,7 @@ def test_ids_on_the_cockpits_page_stand_with_what_they_are() -> None:
         [sys.executable, "-c", COCKPIT], capture_output=True, text=True, check=True,
         cwd=ROOT / "tests", env=env,
     ).stdout  # fmt: skip
-    # the page's elements lie in a script, as JSON
-    check_ids([word for word in page.split('"') if " " in word])
+    check_ids(texts_in_script(page))
 
 
 FLEET = {"axle": ("/", "/work", "/places", "/case", "/changes"), "red operator": ("/alerts",),
@@ -101,7 +100,7 @@ def test_ids_on_the_fleets_pages_stand_with_what_they_are(tmp_path: Path) -> Non
             for who, paths in visited.items():
                 with someone(address, tokens[who]) as client:
                     for path in paths:
-                        check_ids([word for word in loaded(client, path).split('"') if " " in word])
+                        check_ids(texts_in_script(loaded(client, path)))
         finally:
             child.terminate()
 

@@ -74,6 +74,11 @@ def texts_of(page: str) -> list[str]:
     return [text for part in TAG.split(page) if (text := " ".join(unescape(part).split()))]
 
 
+def texts_in_script(page: str) -> list[str]:
+    """Returns the texts of a page of NiceGUI, whose elements lie in a script as JSON; paths of SVG have no words."""
+    return [text for text in page.split('"') if " " in text and WORD.search(text)]
+
+
 def listed_ids() -> set[str]:
     """Returns every id that a page explains."""
     return listed_decisions() | listed_requirements() | listed_findings()

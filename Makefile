@@ -9,7 +9,7 @@ TEST_ARGS ?=
 DRIVE_ARGS ?=
 NIGHTLY_ARGS ?=
 
-.PHONY: cockpit run published results test test-all test-times quick-share quick-mutants test-bare check wheel-check versions-check bench oracle fuzz nightly soak refs data fleet fleet-load docs figures gallery arm64 channels campaigns tables docs-run clean
+.PHONY: cockpit run published results test test-all test-times quick-share quick-mutants test-bare check wheel-check versions-check extras-check bench oracle fuzz nightly soak refs data fleet fleet-load docs figures gallery arm64 channels campaigns tables docs-run clean
 
 # ten seeds of every distinct cell on objects, one of them once more on pixels
 run: $(VENV)/.installed
@@ -71,6 +71,10 @@ wheel-check: $(BIN)/python
 # the newest versions that are allowed on the newest Python here, the oldest on the oldest
 versions-check: $(BIN)/python
 	$(BIN)/python tools/versions_check.py
+
+# which extras install from wheels on which Python; asks the package index, needs uv
+extras-check: $(BIN)/python
+	$(BIN)/python tools/extras_check.py
 
 # damaged files for every reader, a process per core; what CI tries are the first 500
 # one thread for tables: the cores are busy, and small tables pay more for threads than they gain

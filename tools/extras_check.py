@@ -1,4 +1,4 @@
-"""Resolves the package with each extra alone on each Python that it takes, from wheels only, and prints a table.
+"""Resolves the package with each extra alone on each Python, from wheels only, and prints a table.
 
     python tools/extras_check.py              # all extras; needs uv (pip install uv) and the package index
     python tools/extras_check.py osi carla    # some of them
@@ -42,7 +42,12 @@ def normalize(name: str) -> str:
 def resolve(extra: str, minor: int, project: Path = PROJECT) -> subprocess.CompletedProcess[str]:
     """Asks the index for versions of everything that the package with this extra needs on Python 3.minor."""
     words = ["uv", "pip", "compile", "--quiet", "--no-header", "--no-annotate", "--no-build"]
-    words += ["--python-version", f"3.{minor}", *(["--extra", extra] if extra else []), str(project)]
+    words += [
+        "--python-version",
+        f"3.{minor}",
+        *(["--extra", extra] if extra else []),
+        str(project),
+    ]
     return subprocess.run(words, capture_output=True, text=True, check=False)
 
 
@@ -63,7 +68,9 @@ def main(words: list[str]) -> int:
     if unknown:
         print(f"no extra of {PROJECT.name}: {', '.join(unknown)}", file=sys.stderr)
         return 2
-    print(f"| extra | {' | '.join(f'3.{minor}' for minor in MINORS)} |\n|---{'|---' * len(MINORS)}|")
+    print(
+        f"| extra | {' | '.join(f'3.{minor}' for minor in MINORS)} |\n|---{'|---' * len(MINORS)}|"
+    )
     failed = False
     with ThreadPoolExecutor(2) as pool:
         for extra in words or extras:

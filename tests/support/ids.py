@@ -75,7 +75,7 @@ def texts_of(page: str) -> list[str]:
 
 
 def texts_in_script(page: str) -> list[str]:
-    """Returns the texts of a page of NiceGUI, whose elements lie in a script as JSON; paths of SVG have no words."""
+    """Returns the texts in the script of a NiceGUI page, as JSON; paths of SVG have no words."""
     return [text for text in page.split('"') if " " in text and WORD.search(text)]
 
 

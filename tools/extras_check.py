@@ -21,7 +21,7 @@ from versions_check import MINORS, ROOT
 
 PROJECT = ROOT / "pyproject.toml"
 BASE = ""  # no extra
-NAME = re.compile(r"[A-Za-z0-9._-]+")
+AFTER_NAME = re.compile(r"[^A-Za-z0-9._-]")  # brackets, comparisons, markers
 
 
 def extras_of(project: str) -> dict[str, list[str]]:
@@ -29,7 +29,7 @@ def extras_of(project: str) -> dict[str, list[str]]:
     block = project.split("[project.optional-dependencies]\n")[1].split("\n[")[0]
     found = re.findall(r"^(\w+) = \[(.*?)\](?=$|  #|\n)", block, re.DOTALL | re.MULTILINE)
     return {
-        name: [normalize(NAME.match(text)[0]) for text in re.findall(r'"([^"]+)"', body)]
+        name: [normalize(AFTER_NAME.split(text)[0]) for text in re.findall(r'"([^"]+)"', body)]
         for name, body in found
     }
 

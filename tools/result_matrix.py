@@ -17,6 +17,7 @@ from skidpad.recording.campaign.folder import CampaignFolder
 from skidpad.recording.campaign.matrix import MatrixEntry
 from skidpad.recording.campaign.quantities import name_of
 from skidpad.report.matrix.data import Matrix, config_title, rate_by_seed, weather_title
+from skidpad.report.matrix.tables import METRICS
 
 COUNTS = {
     column: name_of(column)
@@ -24,9 +25,9 @@ COUNTS = {
 }
 COMPARED = {
     **{c: name_of(c) for c in ("fatal_collisions", "crashes_vehicle", "road_departures")},
-    "mean_speed_kmh": "mean speed, km/h",
+    "mean_speed_kmh": METRICS["mean_speed_kmh"].heading,
     "dropout_pct": "dropout, percentage points",
-    "mean_error_m": "mean distance error, m",
+    "mean_error_m": METRICS["mean_error_m"].heading,
 }
 
 
@@ -43,7 +44,7 @@ def headline(folder: Path) -> str:
         "runs",
         *COUNTS.values(),
         "interventions per 100 km",
-        "mean speed, km/h",
+        METRICS["mean_speed_kmh"].heading,
     ]
     rows = []
     for c in matrix.configs:
@@ -65,7 +66,7 @@ def factors(folder: Path) -> str:
         rows.append(
             [config_title(c), weather_title(w), str(len(runs)), *counts, _speed(matrix, c, w)]
         )
-    head = ["configuration", "weather", "runs", *COUNTS.values(), "mean speed, km/h"]
+    head = ["configuration", "weather", "runs", *COUNTS.values(), METRICS["mean_speed_kmh"].heading]
     return markdown(head, rows)
 
 

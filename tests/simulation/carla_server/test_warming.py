@@ -11,9 +11,12 @@ from skidpad.simulation.carla_server import warming
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.served import Served
-from skidpad.simulation.carla_server.warming import EverybodyListens
+from skidpad.simulation.carla_server.warming import (
+    EverybodyListens,
+    contacts_of_nobody,
+    vehicles_of_nobody,
+)
 from skidpad.simulation.world import step
-from skidpad.simulation.world.ahead import contacts_of_nobody, vehicles_of_nobody
 
 
 def types(*values):

@@ -71,6 +71,11 @@ def newest(changes: Iterable[LampChange], t: float) -> Mapping[tuple[str, Lamp],
     return {(c.entity, c.lamp): c for c in changes if c.t <= t + ROUNDING}
 
 
+def lamps_of(changes: Iterable[LampChange], t: float, entity: str) -> Mapping[Lamp, LampChange]:
+    """Returns the last change of each lamp of one entity up to time t."""
+    return {lamp: c for (name, lamp), c in newest(changes, t).items() if name == entity}
+
+
 def write_lamps(folder: Path, changes: Sequence[LampChange]) -> None:
     """Writes the lamp changes of a run to `lamps.csv` in its folder; no file where there are none."""
     if not changes:

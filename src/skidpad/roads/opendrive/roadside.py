@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import cos, sin
 
 import numpy as np
@@ -11,11 +12,18 @@ import shapely
 from skidpad.core.arrays import Floats
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.lanes import SignalTable
-from skidpad.roads.opendrive.bridges import bridges_of
 from skidpad.roads.opendrive.document import Document, Node, Reader, RoadRecord
 from skidpad.roads.opendrive.lane_shapes import LaneShape
 from skidpad.roads.opendrive.signals import road_place, signal_heads
-from skidpad.roads.roadside import UNPAINTED, Barrier, BarrierKind, Box, ParkingSpace, Roadside
+from skidpad.roads.roadside import (
+    UNPAINTED,
+    Barrier,
+    BarrierKind,
+    Box,
+    Bridge,
+    ParkingSpace,
+    Roadside,
+)
 
 BARRIER_STEP = 2.0  # m between the points of a barrier; 7 mm of chord at R 70
 REPEATS_MAX = 1_000_000  # of one object
@@ -307,3 +315,29 @@ def _places(read: Reader, node: Node) -> Iterator[tuple[float, float, float]]:
                 t0 + share * (t1 - t0),
                 z0 + share * (z1 - z0),
             )
+
+
+def bridges_of(read: Reader, road: RoadRecord) -> Iterator[Bridge]:
+    """Yields the bridges of a road (OpenDRIVE 1.9.0, section 13.12), one for each `<validity>` of some lanes.
+
+    FileError without s and length, or for one of them below 0; what lies beyond the road is cut off.
+    """
+    for node in road.bridges:
+        s, length = (_place(read, node, name) for name in ("s", "length"))
+        end = round(min(s + length, road.length), 5)
+        whole = Bridge(road.id, round(s, 5), end)
+        if s >= end:
+            continue
+        spans = [
+            sorted(read.integer(valid, name) for name in ("fromLane", "toLane"))
+            for valid in node.findall("validity")
+        ]
+        yield from [replace(whole, lanes=(low, high)) for low, high in spans] or [whole]
+
+
+def _place(read: Reader, node: Node, name: str) -> float:
+    """Returns a number of a node that must be 0 or more, m."""
+    value = read.number(node, name)
+    if value < 0.0:
+        raise read.fail(node, f"needs {name} of 0 or more, got {value:g}")
+    return value

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from skidpad.core.inputs import Beam
-from skidpad.recording.run.lamps import FLASH, Lamp, LampChange, LampMode, newest
+from skidpad.recording.run.lamps import FLASH, Lamp, LampChange, LampMode, lamps_of, newest
 from skidpad.scenarios.actions.base import NoEffect, PrivateAction
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.reading.document import Node
@@ -61,8 +61,8 @@ def lit_brake_lamps(scene: Scene) -> tuple[tuple[str, bool], ...]:
 
 def beam_of_ego(scene: Scene) -> Beam | None:
     """Returns the beam that the file switches the ego's headlights to; None where it says nothing."""
-    found = newest(scene.lamps, scene.t)
-    low, high = (found.get((scene.ego, lamp)) for lamp in (Lamp.LOW_BEAM, Lamp.HIGH_BEAM))
+    found = lamps_of(scene.lamps, scene.t, scene.ego)
+    low, high = found.get(Lamp.LOW_BEAM), found.get(Lamp.HIGH_BEAM)
     if high is not None and high.is_lit(scene.t):
         return Beam.HIGH
     if low is not None:

@@ -12,9 +12,17 @@ import signal
 from collections.abc import Callable
 from contextlib import suppress
 from multiprocessing.connection import Connection
+from typing import Any
+
+import numpy as np
 
 from skidpad.core.geometry import Pose
 from skidpad.core.kernels.jit import is_kept, kernel_cache
+from skidpad.core.setup import DT
+from skidpad.physics.contact import CONTACT_LAW, Contacts, resolve_contacts
+from skidpad.physics.fleet import Fleet
+from skidpad.physics.segments import static_segments
+from skidpad.physics.vehicle import step_vehicles
 from skidpad.sensors.raster import rays
 from skidpad.simulation.carla_server.actors.catalogue import Family
 from skidpad.simulation.carla_server.actors.registry import Attachment
@@ -29,7 +37,7 @@ from skidpad.simulation.carla_server.sensing.gbuffers import (
 from skidpad.simulation.carla_server.sensing.producers import PRODUCERS
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.world import step
-from skidpad.simulation.world.ahead import compile_parts
+from skidpad.simulation.world.rows import Rows, bodies_of
 
 CONTEXT = multiprocessing.get_context("spawn")
 LIMIT = 600.0  # s that the child may take
@@ -127,3 +135,29 @@ def _help(pipe: Connection, options: ServerOptions) -> None:
     except EOFError:  # the server is gone
         return
     a_tick(options, sensors=True)
+
+
+def vehicles_of_nobody() -> tuple[Any, ...]:
+    """Returns what `step_vehicles` is called with for no vehicles."""
+    rows = Rows.of([], 0)
+    fleet = Fleet([], DT, states=rows.states)
+    active = np.zeros(0, dtype=np.bool_)
+    return (
+        rows.states, fleet.wheels, fleet.params, rows.commands, fleet.feel, rows.grade, rows.bank,
+        active, np.zeros((0, 2)), DT, 1,
+    )  # fmt: skip
+
+
+def contacts_of_nobody() -> tuple[Any, ...]:
+    """Returns what `resolve_contacts` is called with for no bodies and no obstacles."""
+    nothing = static_segments(np.zeros((0, 4)), np.zeros(0), np.zeros(0))
+    return Rows.of([], 0).states, bodies_of([]), nothing, CONTACT_LAW, DT, Contacts.room()
+
+
+def compile_parts() -> None:
+    """Compiles the kernels of vehicle motion and of contacts by running them on no actors.
+
+    Machine code goes to the disk by the types of the arguments, so these are those of a step.
+    """
+    resolve_contacts(*contacts_of_nobody())
+    step_vehicles(*vehicles_of_nobody())

@@ -106,9 +106,9 @@ def _figures(matrix: Matrix, configs: Sequence[str]) -> list[Block]:
     weathers = [w for w in matrix.weathers if w in WEATHERS]
     groups = [w.replace("-", "\n", 1) for w in weathers]
     figures: list[Block] = []
-    for column, label, caption in (
-        (INTERVENTIONS, "interventions per run", "Interventions (bars) and published collisions (diamonds)."),
-        ("dropout_pct", "dropout, %", "Dropout (bars) and the published dropout (diamonds)."),
+    for column, per, caption in (
+        (INTERVENTIONS, " per run", "Interventions (bars) and published collisions (diamonds)."),
+        ("dropout_pct", "", "Dropout (bars) and the published dropout (diamonds)."),
     ):  # fmt: skip
         series = [
             Series(
@@ -118,7 +118,7 @@ def _figures(matrix: Matrix, configs: Sequence[str]) -> list[Block]:
             )
             for c in configs
         ]
-        figures.append(Figure(grouped_bars(groups, series, label), caption))
+        figures.append(Figure(grouped_bars(groups, series, METRICS[column].heading + per), caption))
     charts = [
         (METRICS[column].heading, Series(column, [before, after]))
         for column, before, after in published_preliminary()

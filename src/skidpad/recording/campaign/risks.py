@@ -7,11 +7,10 @@ from typing import Any
 
 from msgspec import Struct
 
-from skidpad.core.files.reading import decode_json, read_bytes
 from skidpad.core.maths.space import Space
 from skidpad.core.run import RunSpec, run_from_plain
 from skidpad.core.traffic.disturbance import actor_of_draw
-from skidpad.recording.campaign.searches import LARGEST, read_stored
+from skidpad.recording.campaign.searches import read_lines, read_stored
 
 RISK, RISK_RUNS, RISK_FOUND = "risk.json", "runs.jsonl", "probability.json"
 SPLITTING = "splitting.jsonl"
@@ -164,11 +163,7 @@ def read_risk(out: Path) -> Risk:
 
 def read_repetitions(out: Path) -> list[Repetition]:
     """Returns the repetitions of splitting in a folder; a last line that was cut off is left out."""
-    path = out / SPLITTING
-    if not path.is_file():
-        return []
-    lines = read_bytes(path, SPLITTING, LARGEST).split(b"\n")[:-1]
-    return [decode_json(line, f"{path} line {k + 1}", Repetition) for k, line in enumerate(lines)]
+    return read_lines(out / SPLITTING, Repetition)
 
 
 def read_risk_found(out: Path) -> RiskFound:

@@ -195,13 +195,20 @@ def read_search(out: Path) -> Search:
     return read_stored(out, SEARCH, Search)
 
 
-def read_trials(out: Path, name: str = TRIALS) -> list[Trial]:
-    """Return the trials of a folder in order; a last line that was cut off is left out."""
-    path = out / name
+def read_lines(path: Path, kind: type[S]) -> list[S]:
+    """Returns what the lines of a file hold, each a JSON object; nothing where there is no file.
+
+    A last line that was cut off is left out.
+    """
     if not path.is_file():
         return []
-    lines = read_bytes(path, name, LARGEST).split(b"\n")[:-1]
-    return [decode_json(line, f"{path} line {k + 1}", Trial) for k, line in enumerate(lines)]
+    lines = read_bytes(path, path.name, LARGEST).split(b"\n")[:-1]
+    return [decode_json(line, f"{path} line {k + 1}", kind) for k, line in enumerate(lines)]
+
+
+def read_trials(out: Path, name: str = TRIALS) -> list[Trial]:
+    """Return the trials of a folder in order; a last line that was cut off is left out."""
+    return read_lines(out / name, Trial)
 
 
 def failure_folder(out: Path, number: int) -> Path:

@@ -52,6 +52,17 @@ def campaign(tmp_path_factory) -> Path:
     return out
 
 
+def test_a_kept_run_is_driven_again_from_its_checkpoint(tmp_path):
+    from skidpad.campaign.runs.rerun import rerun
+
+    out = tmp_path / "out"
+    Campaign(recipe(checkpoints_s=2.0), cells()[:1]).run(out, here)
+    (kept,) = (out / "runs").iterdir()
+    again = rerun(kept, 5.0, 5.2, tmp_path / "pictures")
+    assert again.same
+    assert (again.begun_s, again.refused) == (4.0, "")
+
+
 @pytest.mark.req("B-001", "B-004", "B-055", "B-066")
 def test_ratio_1_changes_nothing_and_less_does(campaign):
     table = read_results(campaign)

@@ -40,6 +40,7 @@ class Cells(NamedTuple):
     rise: Floats  # (SLOTS,) sum of power times elevation, rad
     taken: Ints  # (MOST,) slots in use
     reached: Ints  # (1,) how many
+    own: Floats  # (3,) velocity of the antenna in its axes in m/s, yaw rate in rad/s
 
 
 class Grid(NamedTuple):
@@ -58,7 +59,7 @@ def make_cells() -> Cells:
     re, im, power, weight, rise = np.zeros((5, SLOTS))
     return Cells(
         np.full(SLOTS, EMPTY), re, im, power, weight, rise, np.zeros(MOST, np.int64),
-        np.zeros(1, np.int64),
+        np.zeros(1, np.int64), np.zeros(3),
     )  # fmt: skip
 
 

@@ -40,7 +40,7 @@ from skidpad.sensors.physical_radar.echoes import (
 )
 from skidpad.sensors.physical_radar.ghosts import add_ghosts
 from skidpad.sensors.physical_radar.interference import add_interference
-from skidpad.sensors.physical_radar.lists import POWER, SECTION, add_sections, join_rows
+from skidpad.sensors.physical_radar.lists import POWER, add_sections, join_rows
 from skidpad.sensors.physical_radar.mirrors import mirrors_of
 from skidpad.sensors.physical_radar.setup import (
     FASTEST,
@@ -130,18 +130,14 @@ class PhysicalRadar:
         count = find_detections(self._held, self._world, self._cells, states, tick, self._out)
         if self._output is RadarOutput.POINTS:
             return Reading(RadarPoints(*self._out[:count, :4].T))
-        count = join_cells(self._held, self._out, count)
-        if self._output is RadarOutput.TRACKS:
-            count = follow_objects(
-                self._held, self._tracks, states, self._dt, self._out, self._more, count
-            )
+        follows = self._output is RadarOutput.TRACKS
+        count = list_objects(
+            self._held, self._cells, self._tracks, follows, self._dt, self._out, self._more, count
+        )
         rows = self._out[:count]
         points = RadarPoints(*rows[:, :4].T)
-        snr, section = (
-            (10.0 * np.log10(np.maximum(rows[:, k], 1e-9))).astype(np.float32)
-            for k in (POWER, SECTION)
-        )
-        objects = RadarObjects(snr, section)
+        levels = (10.0 * np.log10(np.maximum(rows[:, POWER:].T, 1e-9))).astype(np.float32)
+        objects = RadarObjects(levels[0], levels[1])
         if self._output is RadarOutput.DETECTIONS:
             return Reading(points, objects)
         return Reading(points, objects, self._tracks_of(count))
@@ -177,6 +173,7 @@ def find_detections(
     radar, world, cells = held.value, surroundings.value, state.value
     sensor = _sensor_of(radar, states)
     clear(cells)
+    _note_motion(cells.own, sensor, states.yaw_rate[0])
     screens = find_screens(radar, world, states, sensor.origin)
     if radar.rivals > 0.0:
         sensor = add_interference(radar, world, states, sensor, screens)
@@ -191,33 +188,37 @@ def find_detections(
 
 
 @kernel
-def join_cells(held: Held[RadarSetup], out: NDArray[np.float32], count: int) -> int:
-    """Replace the rows of cells by the objects that they form; returns how many."""
-    count = join_rows(out, count)
-    add_sections(held.value, out, count)
-    return count
-
-
-@kernel
-def follow_objects(
+def list_objects(
     held: Held[RadarSetup],
+    state: Held[Cells],
     followed: Held[Tracks],
-    states: ActorStates,
+    follows: bool,
     dt: float,
     out: NDArray[np.float32],
     more: NDArray[np.float64],
     count: int,
 ) -> int:
-    """Carry the tracks on to this tick's objects and write the confirmed ones; returns how many."""
-    sensor = _sensor_of(held.value, states)
-    r = sensor.rotation
-    own = (
-        r[0, 0] * sensor.vx + r[1, 0] * sensor.vy,
-        r[0, 1] * sensor.vx + r[1, 1] * sensor.vy,
-        states.yaw_rate[0],
-    )
+    """Replace the rows of this tick's cells by the objects that they form; returns how many.
+
+    follows: carry the tracks on to the objects, and write the confirmed ones in their place.
+    """
+    count = join_rows(out, count)
+    add_sections(held.value, out, count)
+    if not follows:
+        return count
+    motion = state.value.own
+    own = (motion[0], motion[1], motion[2])
     update_tracks(followed.value, out, count, own, dt)
     return write_tracks(followed.value, own, out, more)
+
+
+@inner_kernel
+def _note_motion(own: NDArray[np.float64], sensor: Sensor, yaw_rate: float) -> None:
+    """Write the velocity of the antenna in its axes in m/s and its yaw rate in rad/s."""
+    r = sensor.rotation
+    own[0] = r[0, 0] * sensor.vx + r[1, 0] * sensor.vy
+    own[1] = r[0, 1] * sensor.vx + r[1, 1] * sensor.vy
+    own[2] = yaw_rate
 
 
 @inner_kernel

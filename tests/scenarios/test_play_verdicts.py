@@ -233,7 +233,7 @@ def test_the_terminal_shows_a_table_of_80_columns_the_answer_and_the_next_comman
     table = lines[: lines.index("")]
     assert max(map(len, table)) <= 80
     assert table[0].split() == ["scenario", "weather", "verdict", "gap", "TTC", "decel", "hit"]
-    assert [line.partition(":")[0] for line in lines[-3:]] == ["page", "table", "next"]
+    assert [line.partition(":")[0] for line in lines[-3:]] == ["page", "table", "Next"]
 
 
 def test_a_name_that_is_too_long_keeps_its_ends():

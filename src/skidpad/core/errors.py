@@ -103,9 +103,10 @@ def require_choice(
 
 def describe_unknown(field: str, value: str, allowed: Sequence[str], list_command: str = "") -> str:
     """Returns the sentence on a name that is none of `allowed`, as `require_choice` raises it."""
-    near = get_close_matches(value, allowed, n=3)
+    words = [str.__str__(name) for name in allowed]  # members of enumerations, too
+    near = get_close_matches(value, words, n=3)
     hint = f"; did you mean {list_text([repr(name) for name in near], 'or')}?" if near else ""
     if list_command:
         listed = f"{hint} All" if near else "; all"
         return f"unknown {field} {value!r}{listed} {len(allowed)} are listed by: {list_command}"
-    return f"unknown {field} {value!r}; choose one of: {', '.join(allowed)}{hint}"
+    return f"unknown {field} {value!r}; choose one of: {', '.join(words)}{hint}"

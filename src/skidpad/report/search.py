@@ -60,7 +60,7 @@ def write_search_report(out: Path) -> str:
     lines += [f"page: {out / REPORT}"]
     if findings.groups:
         first = failure_folder(out, findings.groups[0].failures[0].number)
-        lines += [f"next: skidpad replay {first}"]
+        lines += [f"Next: skidpad replay {first}"]
     return "\n".join(lines)
 
 

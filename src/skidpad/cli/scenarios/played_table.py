@@ -28,7 +28,7 @@ def played_text(played: Played, page: Path) -> str:
     lines += [LEGEND, "", *_reasons(runs), criterion(played), answer(played)]
     lines += [f"page: {page}", f"table: {played.out / CSV}"]
     following = _next_command(runs)
-    return "\n".join([*lines, f"next: {following}"] if following else lines)
+    return "\n".join([*lines, f"Next: {following}"] if following else lines)
 
 
 def _line(cells: Sequence[str]) -> str:

@@ -8,7 +8,7 @@ from typer.core import TyperOption
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
-from skidpad.cli.options.help_panels import COMMANDS
+from skidpad.cli.options.help_panels import COMMANDS, SUBCOMMANDS
 
 ROOT = typer.main.get_command(app)
 SHOWN = {name: command for name, command in ROOT.commands.items() if not command.hidden}
@@ -24,9 +24,29 @@ def test_every_command_stands_in_a_group_and_has_an_example():
     assert max(map(len, told.splitlines())) <= 80
 
 
-@pytest.mark.parametrize("name", sorted(set(EXAMPLES) - FOREIGN))
-def test_the_example_is_one_that_the_command_takes(name):
-    words = shlex.split(EXAMPLES[name])
+def subcommands(group, path):
+    """(words, command) of every command below a group."""
+    for name, command in getattr(group, "commands", {}).items():
+        if command.hidden:
+            continue
+        words = f"{path} {name}".strip()
+        if hasattr(command, "commands"):
+            yield from subcommands(command, words)
+        elif path:
+            yield words, command
+
+
+def test_every_command_of_a_group_has_its_own_example():
+    for words, command in subcommands(ROOT, ""):
+        assert f"{command.epilog} ".startswith(f"Example: skidpad {words} "), words
+    assert len(SUBCOMMANDS) == len([*subcommands(ROOT, "")])
+
+
+@pytest.mark.parametrize(
+    "example", sorted({*SUBCOMMANDS, *(EXAMPLES[name] for name in set(EXAMPLES) - FOREIGN)})
+)
+def test_the_example_is_one_that_the_command_takes(example):
+    words = shlex.split(example)
     command, first = ROOT, 0
     while first < len(words) and words[first] in getattr(command, "commands", {}):
         command, first = command.commands[words[first]], first + 1

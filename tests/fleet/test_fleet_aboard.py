@@ -247,7 +247,7 @@ def test_a_vehicle_of_the_command_alerts_and_is_stopped_by_a_teleoperator(tmp_pa
     assert alert["kind"] == "hazard"
     assert alert["scene"]["map"]
     assert "an order to stop: obeyed" in told
-    assert "1 orders obeyed, 0 words that the fleet has not got" in told
+    assert "1 order obeyed, 0 words that the fleet has not got" in told
     assert "; complete" in told  # the monitor
     assert kinds == {"hazard", "minimal_risk"}
     items = [m.item for m in open_channels(out / "drive.mcap", None).messages()]

@@ -258,6 +258,7 @@ def drive_one(
 
     from skidpad.campaign.channels.routes import driven_routes
     from skidpad.core.errors import require_choice
+    from skidpad.core.text.wording import count_text
     from skidpad.recording.files import require_free
 
     with fleet_extra():
@@ -273,8 +274,9 @@ def drive_one(
         spec = structs.replace(chosen, duration=seconds, seed=seed)
         outcome, watched = drive_aboard(spec, out, aboard)
     typer.echo(
-        f"{outcome.driven_s:.1f} s, {outcome.distance_m:.0f} m driven; {aboard.raised} alerts raised, "
-        f"{aboard.obeyed} orders obeyed, {aboard.waiting} words that the fleet has not got\n"
+        f"{outcome.driven_s:.1f} s, {outcome.distance_m:.0f} m driven; "
+        f"{count_text(aboard.raised, 'alert')} raised, {count_text(aboard.obeyed, 'order')} obeyed, "
+        f"{count_text(aboard.waiting, 'word')} that the fleet has not got\n"
         f"monitor: {watched.sentence}"
     )
 

@@ -52,6 +52,38 @@ COMMANDS: dict[str, dict[str, str]] = {
         "carla-launcher": "carla-launcher out/carla",
     },
 }
+SUBCOMMANDS = (  # an example of each
+    "profiles list",
+    "profiles sensors",
+    "profiles show recommended",
+    "profiles diff recommended thesis_text",
+    "map list",
+    "map info figure8",
+    "map bake road.xodr",
+    "channels info drive.mcap",
+    "channels compare out/monitored out/again",
+    "channels drive --route route-1 --hours 0.2 --out out/channels",
+    "channels outcomes out/channels out/one-channel",
+    "channels evaluate out/monitored",
+    "channels train out/channels --out model.npz",
+    "hazards list out/monitored",
+    "hazards show out/monitored",
+    "hazards export out/monitored",
+    "fleet serve --data fleet",
+    "fleet enrol operator Ann --tenant 'Red Cabs' --data fleet",
+    "fleet end operator Ann --tenant 'Red Cabs' --data fleet",
+    "fleet open --to http://127.0.0.1:8470 --token-file ann.token",
+    "fleet upload out/monitored --spool spool --to http://127.0.0.1:8470 --token-file v1.token",
+    "fleet drive --to http://127.0.0.1:8470 --token-file v1.token --orders-key orders.pub --out out/v1",
+    "fleet keys --manufacturer Axle --data fleet --out offline",
+    "fleet sign rules.yaml --kind rules --list list.json --key offline/targets-1.key --out next.json",
+    "fleet certificate --out certificates",
+    "fleet demo --recorded",
+    "campaign estimate adas --sensors objects --seeds 50",
+    "campaign estimate grip --scenarios front_accident",
+    "campaign estimate channels --route route-1 --hours 10",
+    "campaign estimate play scenarios",
+)
 # options of a command by the parameter that they make up
 OPTIONS = {
     "how": "Campaign",
@@ -76,14 +108,32 @@ OPTIONS = {
 
 
 def arrange_help(app: typer.Typer) -> None:
-    """Sets the panel and the example of every command that COMMANDS names."""
+    """Sets the panel and the example of every command that COMMANDS names, and examples of SUBCOMMANDS."""
     places = {name: (panel, text) for panel, of in COMMANDS.items() for name, text in of.items()}
-    commands: list[CommandInfo | TyperInfo] = [*app.registered_commands, *app.registered_groups]
-    for info in commands:
+    for info in _commands_of(app):
         panel, text = places.get(name_of(info), (None, None))
         if panel is not None:
             info.rich_help_panel = panel
             info.epilog = f"Example: skidpad {text}"
+        if isinstance(info, TyperInfo):
+            _set_examples(info, name_of(info))
+
+
+def _commands_of(app: typer.Typer) -> list[CommandInfo | TyperInfo]:
+    """Returns the commands and groups of commands that are right below `app`."""
+    return [*app.registered_commands, *app.registered_groups]
+
+
+def _set_examples(group: TyperInfo, path: str) -> None:
+    """Sets the example of each command below a group; path: the words by which the group is called."""
+    assert group.typer_instance is not None
+    for info in _commands_of(group.typer_instance):
+        name = f"{path} {name_of(info)}"
+        if isinstance(info, TyperInfo):
+            _set_examples(info, name)
+        for text in SUBCOMMANDS:
+            if f"{text} ".startswith(f"{name} ") and isinstance(info, CommandInfo):
+                info.epilog = f"Example: skidpad {text}"
 
 
 def name_of(info: CommandInfo | TyperInfo) -> str:

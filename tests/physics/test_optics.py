@@ -1,5 +1,6 @@
 from dataclasses import replace
-from math import exp
+from math import exp, log
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -19,6 +20,7 @@ from skidpad.physics.optics import (
     transmission,
 )
 from skidpad.physics.presets import preset
+from skidpad.sensors.object_level.objects import SIGHT
 
 percent = floats(0.0, 100.0)
 
@@ -85,3 +87,21 @@ def test_night_sight_needs_headlights():
     assert 70 < label_range(night) < 110
     assert label_range(preset("rain-night")) < label_range(night)
     assert label_range(preset("clear-noon"), Beam.OFF) > 1000
+
+
+def test_the_page_tells_how_far_the_contrast_detector_sees():
+    """By hand: ln(0.5 / 0.05) / ln(1 / 0.05) of the optical range; the object level looks no farther."""
+    text = (Path(__file__).parents[2] / "docs" / "rendering.md").read_text(encoding="utf-8")
+    shown = [{}, *({"fog_density": v} for v in (50.0, 75.0, 100.0))]
+    shown += [{"precipitation": v} for v in (50.0, 100.0)]
+    for fields in shown:
+        weather = Weather(**fields)
+        far = sight(weather) * log(10.0) / log(20.0)
+        assert label_range(weather) == pytest.approx(far)
+        name = " ".join(f"`{k}` {v:g}" for k, v in fields.items()) or "clear"
+        numbers = (sight(weather), label_range(weather), min(label_range(weather), SIGHT))
+        assert f"| {name} | " + " | ".join(f"{v:.0f}" for v in numbers) + " |" in text
+    night = Weather(sun_altitude_deg=-30.0)
+    at = label_range(night)
+    assert f"at {at:.0f} m in clear air" in text
+    assert 10_000.0 / at**2 * exp(-at * log(20.0) / sight(night)) == pytest.approx(1.0, rel=1e-6)

@@ -92,7 +92,7 @@ class StateFiles:
             raise CheckpointError("a checkpoint as a file needs the embedded simulator")
         if run.spec.inputs:
             raise CheckpointError("a run in which a person took part is driven from its beginning")
-        self.run = run
+        self.run, self.run_hash = run, run_hash(run.spec)
         self.ground = Ground(run.parts(), FIXED)
 
     def write(self, path: Path) -> None:
@@ -103,7 +103,7 @@ class StateFiles:
             format=FORMAT,
             skidpad=fingerprint().skidpad,
             fingerprint=fingerprint().short,
-            run=run_hash(self.run.spec),
+            run=self.run_hash,
             begin=self.ground.digest,
             tick=self.run.tick,
             state=sha256(state).hexdigest(),

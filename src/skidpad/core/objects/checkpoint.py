@@ -290,3 +290,17 @@ COPIERS: dict[type, Copier] = {
     FunctionType: _copy_function,
     CellType: _copy_cell,
 }
+SHARING = (_copy_tuple, _copy_view, _copy_method, _copy_partial, _copy_function, _copy_frozen)
+
+
+def may_change(copier: Copier) -> bool:
+    """Returns whether objects of a copier have contents to put back."""
+    return getattr(copier, "func", copier) not in SHARING
+
+
+def slots_copied(copier: Copier) -> tuple[str, ...] | None:
+    """Returns the slots that a copier of attributes keeps beside `__dict__`; None: it is no such copier."""
+    if isinstance(copier, partial) and copier.func is _copy_object:
+        slots: tuple[str, ...] = copier.args[0]
+        return slots
+    return None

@@ -27,13 +27,16 @@ from numpy.lib.format import descr_to_dtype, dtype_to_descr
 
 from skidpad.core.errors import CheckpointError
 from skidpad.core.objects.checkpoint import (
+    Copier,
     Copiers,
     copiers_of,
+    may_change,
     put_array,
     put_cell,
     put_items,
     put_list,
     put_object,
+    slots_copied,
     slots_of,
 )
 
@@ -41,6 +44,7 @@ Plain = Any  # what msgpack holds: None, numbers, texts, bytes, lists of them
 PACKAGE = __name__.partition(".")[0]
 SCALARS = (bool, float, str, bytes, type(None))
 VALUES = (int, *SCALARS, Enum, np.generic)  # that are not numbered
+WRITTEN_AS_THEY_ARE = frozenset(SCALARS)
 CONTAINERS = {"list": list, "set": set, "dict": dict, "bytearray": bytearray}
 INT_BITS = 63
 
@@ -75,6 +79,11 @@ class Ground:
             self.objects.append(found)
             digest.update(f"{name_class(type(found))}\n".encode())
         self.digest = digest.hexdigest()[:16]
+        self.changing = [
+            (number, found, copier)
+            for number, found in enumerate(self.objects)
+            if (copier := self.copiers[type(found)]) is not None and may_change(copier)
+        ]
         self.classes = {name_class(type(found)): type(found) for found in self.objects}
 
     def write(self) -> Plain:
@@ -142,35 +151,45 @@ class _Writer:
     def write(self) -> Plain:
         """Returns the state as plain data."""
         there: list[Plain] = []
-        found: Any
-        for number, found in enumerate(self.ground.objects):
-            if hasattr(type(found), "copy_place"):  # its copy would hold its whole history
-                there.append([number, self._write_copy(found.copy_place())])
-                continue
-            copier = self.ground.copiers[type(found)]
-            put_back, state, _ = (None, None, ()) if copier is None else copier(found)
-            if put_back is not None:
-                there.append([number, self._contents_of(found, put_back, state)])
+        for number, found, copier in self.ground.changing:
+            contents = self._contents_of(found, copier)
+            if contents is not None:
+                there.append([number, contents])
         came: list[Plain] = []
         while len(came) < len(self.new):  # it grows meanwhile
             came.append(self._describe(self.new[len(came)]))
         return {"there": there, "came": came}
 
-    def _contents_of(self, found: Any, put_back: object, state: Any) -> Plain:
-        """Returns the contents of an object, of which `state` is the copy that a checkpoint keeps."""
+    def _contents_of(self, found: Any, copier: Copier) -> Plain | None:
+        """Returns the contents of an object as a checkpoint keeps them; None where they cannot change."""
+        kind = type(found)
+        if kind is np.ndarray:
+            fixed = not (found.flags.writeable or found.dtype.hasobject)
+            return None if fixed else _write_array(found)
+        if kind is list:
+            return [self.value(item) for item in found]
+        if kind is dict:
+            return [[self.value(key), self.value(value)] for key, value in found.items()]
+        if hasattr(kind, "copy_place"):  # its copy would hold its whole history
+            return self._write_copy(found.copy_place())
+        if (slots := slots_copied(copier)) is not None:
+            held = {name: getattr(found, name) for name in slots if hasattr(found, name)}
+            return self._attributes(found, held | getattr(found, "__dict__", {}))
+        put_back, state, _ = copier(found)
+        if put_back is None:
+            return None
         if put_back is put_array:
             return _write_array(found)
         if put_back is put_list or (put_back is put_items and not isinstance(found, dict)):
             return [self.value(item) for item in state]
         if put_back is put_items:
             return [[self.value(key), self.value(value)] for key, value in state.items()]
-        if put_back is put_cell:
-            return self.value(state)
-        if put_back is put_object:
-            unsaved = getattr(found, "UNSAVED", ())
-            named = {**state[1], **state[2]}
-            return [[k, self.value(v)] for k, v in named.items() if k not in unsaved]
-        return self._write_copy(found.copy_place() if isinstance(found, KeepsPlace) else state)
+        return self.value(state) if put_back is put_cell else self._write_copy(state)
+
+    def _attributes(self, found: Any, named: dict[str, Any]) -> Plain:
+        """Returns attributes of an object without those that its class leaves out."""
+        unsaved = getattr(found, "UNSAVED", ())
+        return [[name, self.value(value)] for name, value in named.items() if name not in unsaved]
 
     def _write_copy(self, state: Any) -> Plain:
         """Returns a state that an object gave of itself: its containers are copies, not objects."""
@@ -184,17 +203,18 @@ class _Writer:
 
     def value(self, value: Any) -> Plain:
         """Returns a value: itself, or where the object stands that it is."""
-        if isinstance(value, SCALARS) and type(value) in SCALARS:
+        kind = type(value)
+        if kind in WRITTEN_AS_THEY_ARE:
             return value
-        if type(value) is int:
+        if kind is int:
             return value if value.bit_length() <= INT_BITS else ["int", str(value)]
-        if isinstance(value, Enum):
-            return ["enum", name_class(type(value)), value.name]
-        if isinstance(value, np.generic):
-            return ["number", dtype_to_descr(value.dtype), value.tobytes()]
         number = self.ground.number.get(id(value))
         if number is not None:
             return ["there", number]
+        if isinstance(value, Enum):
+            return ["enum", name_class(kind), value.name]
+        if isinstance(value, np.generic):
+            return ["number", dtype_to_descr(value.dtype), value.tobytes()]
         if isinstance(value, PurePath):
             return ["path", str(value)]
         if type(value) is tuple:
@@ -216,7 +236,6 @@ class _Writer:
         kind, copier = type(found), self.ground.copiers[type(found)]
         if copier is None or issubclass(kind, (FunctionType, MethodType, CellType, partial)):
             raise CheckpointError(f"a {name_class(kind)} cannot be written, as it is no data")
-        put_back, state, _ = copier(found)
         if kind in CONTAINERS.values():
             about: Plain = [kind.__name__]
         elif kind is deque:
@@ -227,9 +246,9 @@ class _Writer:
             about = ["generator"]
         else:
             about = ["object", self._class(found)]
-            if put_back is None:  # it is frozen
-                put_back, state = put_object, ((), {}, attributes_of(found))
-        return [about, self._contents_of(found, put_back, state)]
+            if not may_change(copier):  # it is frozen
+                return [about, self._attributes(found, attributes_of(found))]
+        return [about, self._contents_of(found, copier)]
 
     def _place_of(self, array: np.ndarray) -> Plain:
         """Returns an array's type and shape, and where it lies if it is a part of another one."""

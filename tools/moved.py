@@ -10,10 +10,7 @@ import polars as pl
 from skidpad.core.text.wording import count_text
 
 APART = ("outcome", "version", "log_hash", "motion_hash", "fingerprint")  # columns that name no run
-KEYS = (
-    "config", "weather", "scenario", "cutin", "friction", "variant", "controller", "driver",
-    "actors", "headway", "deceleration", "level", "road_mu", "seed", "profile", "sensors", "arm",
-)  # fmt: skip
+MEASURED = "outcome"  # the first column that a run had; those before it say which run it is
 SHOWN = 12  # columns, those that moved most
 
 
@@ -29,7 +26,8 @@ def read_rows(path: Path) -> pl.DataFrame:
 
 def what_moved(before: pl.DataFrame, after: pl.DataFrame) -> list[str]:
     """Lines for people: rows that are new or gone, rows whose numbers moved, and columns by their means."""
-    keys = [k for k in KEYS if k in before.columns and k in after.columns]
+    named = before.columns[: before.columns.index(MEASURED)]
+    keys = [k for k in named if k in after.columns]
     numbers = [
         c
         for c, kind in before.schema.items()

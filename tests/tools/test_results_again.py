@@ -19,8 +19,9 @@ from moved import read_rows, what_moved  # noqa: E402
 
 ROWS = pl.DataFrame(
     {
-        "config": ["1", "1", "2"], "seed": [1, 2, 1], "log_hash": ["a", "b", "c"],
-        "fatal_collisions": [0, 2, 4], "mean_speed_kmh": [40.0, None, 30.0], "map": ["m"] * 3,
+        "config": ["1", "1", "2"], "seed": [1, 2, 1], "map": ["m"] * 3, "outcome": ["completed"] * 3,
+        "log_hash": ["a", "b", "c"], "fatal_collisions": [0, 2, 4],
+        "mean_speed_kmh": [40.0, None, 30.0],
     }
 )  # fmt: skip
 
@@ -34,6 +35,12 @@ def test_rows_that_moved_are_counted_and_means_are_told_from_the_largest_change_
         "  fatal_collisions: 2 -> 3",
         "  mean_speed_kmh: 35 -> 35.5",
     ]
+
+
+@pytest.mark.parametrize("name", ["study-speed", "grip-camera", "grip-threshold", "matrix-figure8"])
+def test_every_frozen_row_counts_whatever_sets_its_run_apart(name):
+    rows = read_rows(ROOT / "docs" / "results" / name)
+    assert what_moved(rows, rows)[0] == f"0 of {len(rows):,} rows moved; 0 gone, 0 new"
 
 
 def test_equal_results_move_nothing_whatever_their_hashes_and_missing_runs_are_told():

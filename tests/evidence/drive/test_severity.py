@@ -9,7 +9,12 @@ import pytest
 
 from skidpad.core.states import ContactEvent
 from skidpad.core.vocabulary import ActorKind, RelocationReason, Supervision
-from skidpad.evidence.drive.collisions import CrashKind, find_crashes, shown_crashes
+from skidpad.evidence.drive.collisions import (
+    CrashKind,
+    contact_crashes,
+    find_crashes,
+    shown_crashes,
+)
 from skidpad.evidence.drive.metrics import run_metrics, weather_metrics
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.evidence.drive.severity import Contact, Measure, Severity, graded_contacts
@@ -272,3 +277,21 @@ def test_a_card_shows_the_contact_that_decides_the_class_and_counts_stay(
     assert counted.kind is CrashKind.STATIC, "the larger impulse is counted, as published"
     m = metrics(log)
     assert (m.interventions, m.collisions_static, m.collisions_vehicle) == (1, 1, 0)
+
+
+@pytest.mark.req("T-4")
+def test_without_a_supervisor_a_body_touched_twice_is_shown_by_its_harder_touch() -> None:
+    def rows(k: int) -> list[dict[str, float]]:
+        gained = (k >= TICK) * 3.0 + (k >= TICK + 5) * 30.0  # km/h: a brush, then a crash
+        return [{"x": 50.0, "vx": 20.0}, {"x": 54.0, "vx": gained / KMH}]
+
+    rail = ContactEvent(TICK + 2, -1, "guardrail", 9000.0, 1.0, 0.0, 0.0)
+    touches = [touch(tick=TICK + k) for k in (0, 5, 8)]
+    log = drive(40, rows, contacts=[touches[0], rail, *touches[1:]], table=actor_table(2))
+    found = contact_crashes(prepare(log, straight_map()))
+    assert [(c.tick, c.kind) for c in found] == [
+        (TICK + 2, CrashKind.STATIC),
+        (TICK + 5, CrashKind.VEHICLE),
+    ]
+    assert found[1].contact is not None
+    assert found[1].contact.severity is Severity.HEAVY

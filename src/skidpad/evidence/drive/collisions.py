@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 
 import numpy as np
 
@@ -95,16 +96,17 @@ def find_crashes(drive: Drive) -> tuple[Crash, ...]:
 
 
 def shown_crashes(drive: Drive) -> tuple[Crash, ...]:
-    """Returns the events of `find_crashes`, each by the contact that decides its class (T-4).
+    """Returns the events of `find_crashes`, each by the contact that decides its class (T-4)."""
+    return _find_crashes(drive, partial(_rank, drive))
+
+
+def _rank(drive: Drive, contact: ContactEvent) -> tuple[float, ...]:
+    """Returns what orders contacts by how much they decide a class (T-4), the deciding one largest.
 
     A person or two wheels come first, then what was hit hardest, then the larger impulse.
     """
-
-    def rank(contact: ContactEvent) -> tuple[float, ...]:
-        graded = grade(drive, contact)
-        return graded.is_vulnerable, graded.v_graded, contact.impulse
-
-    return _find_crashes(drive, rank)
+    graded = grade(drive, contact)
+    return graded.is_vulnerable, graded.v_graded, contact.impulse
 
 
 def _find_crashes(
@@ -122,11 +124,17 @@ def _find_crashes(
 
 
 def contact_crashes(drive: Drive) -> tuple[Crash, ...]:
-    """Returns a crash for the first contact with each other body, for drives without a supervisor."""
-    first: dict[tuple[int, str], ContactEvent] = {}
+    """Returns a crash for each body touched, by its hardest contact (T-4), in order.
+
+    It is for drives without a supervisor.
+    """
+    hardest: dict[tuple[int, str], ContactEvent] = {}
     for contact in drive.log.contacts:
-        first.setdefault((contact.actor, contact.static), contact)
-    return tuple(_crash(drive, drive.row(c.tick), c) for c in first.values())
+        body = contact.actor, contact.static
+        touches = hardest.get(body, contact), contact
+        hardest[body] = max(touches, key=partial(_rank, drive))
+    ordered = sorted(hardest.values(), key=lambda contact: contact.tick)
+    return tuple(_crash(drive, drive.row(c.tick), c) for c in ordered)
 
 
 def _culprit(

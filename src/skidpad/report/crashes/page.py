@@ -19,7 +19,7 @@ SHOWN = 20  # cards at most
 
 
 def find_contacts(log: RunLog, road: RoadMap, run: Path) -> list[Found]:
-    """Returns the ego's first contact with each other body as a crash; empty without contacts.
+    """Returns the ego's hardest contact with each other body as a crash; empty without contacts.
 
     run: the folder of the log.
     """

@@ -206,7 +206,9 @@ def test_the_command_says_whether_hashes_may_be_compared(tmp_path, place, told):
 @pytest.mark.parametrize(
     ("before", "after", "told"),
     [
-        (rows(), rows(), "Nothing changed: every run is the same drive in both."),
+        (rows(), rows(), "Nothing changed: both runs of every pair are the same drive."),
+        (rows(), rows()[:-1], "Nothing changed: both runs of every pair are the same drive."),
+        (rows(), rows(outcome="crashed"), "No run was finished in both: nothing can be compared."),
         (
             rows(seeds=range(1, 4)), rows(extra=2, seeds=range(1, 4)),
             "Of 6 differences none is shown: all may be chance.",
@@ -217,7 +219,7 @@ def test_the_command_says_whether_hashes_may_be_compared(tmp_path, place, told):
             "(configuration 2, +2)."),
         ),
     ],
-    ids=["same", "few", "many"],
+    ids=["same", "one alone", "none finished", "few", "many"],
 )  # fmt: skip
 def test_the_command_ends_with_one_sentence_of_answer(tmp_path, before, after, told):
     MATRIX.write(tmp_path / "a", before)

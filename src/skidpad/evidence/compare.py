@@ -122,8 +122,10 @@ def judge_rules(
 
 def summarise_changes(changes: Sequence[Change]) -> str:
     """Returns one sentence on which columns changed beyond chance, two-sided, adjusted for all (Holm)."""
+    if not changes:
+        return "No run was finished in both: nothing can be compared."
     if all(c.same == c.runs for c in changes):
-        return "Nothing changed: every run is the same drive in both."
+        return "Nothing changed: both runs of every pair are the same drive."
     tested = [c for c in changes if c.comparison.p is not None]
     adjusted = holm([c.comparison.p for c in tested if c.comparison.p is not None])
     sure = [c for c, p in zip(tested, adjusted, strict=True) if p <= ALPHA]

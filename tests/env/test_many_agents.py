@@ -19,12 +19,16 @@ AT = {quantity.name: i for i, quantity in enumerate(OBSERVED)}
 TERM = {name: i for i, name in enumerate(TERMS)}
 
 
-def begin(make, *, seed=1, **options):
+def begin_by(make, **options):
     defaults = {
         "map": "figure8", "weather": "clear-noon", "grip": "physical", "vehicles": 20,
         "traffic": "fixed", "duration": 20.0, "seeds": None, "profile": "recommended",
     }  # fmt: skip
-    return Episodes(make, **{**defaults, **options}).begin(seed, None, None)
+    return Episodes(make, **{**defaults, **options})
+
+
+def begin(make, **options):
+    return begin_by(make, **options).begin(1, None, None)
 
 
 def keep_lane(seen, pedal=0.6):
@@ -81,6 +85,33 @@ def test_what_cannot_be_of_a_vector_is_said_at_once():
         many.step(np.zeros((2, 1)))
     with pytest.raises(ConfigError, match="seed: 2 are needed, got 3"):
         many.reset(seed=[1, 2, 3])
+
+
+class Unmoved:
+    """An episode without a world."""
+
+    def __init__(self, spec):
+        self.closed = False
+
+    def restart(self):
+        """Has nothing to go back to."""
+
+    def close(self):
+        self.closed = True
+
+
+def test_a_reset_that_fails_leaves_the_present_episode_to_its_environment():
+    kept, fresh = begin_by(Unmoved, seeds=(1, 2)), begin_by(Unmoved)
+    for episodes in (kept, fresh):
+        present = episodes.begin(1, None, None)
+        with pytest.raises(ConfigError, match="nonsense"):
+            episodes.begin(2, {"grip": "nonsense"}, present)
+        assert not present.closed
+        assert episodes.begin(1, None, None) is not present, "two environments would share it"
+    present = kept.begin(2, None, None)
+    assert kept.begin(2, None, present) is present
+    other = kept.begin(1, None, present)
+    assert kept.begin(2, None, other) is present
 
 
 @pytest.mark.parametrize(

@@ -99,20 +99,23 @@ class Episodes(Generic[E]):
     def begin(self, seed: int, options: Mapping[str, Any] | None, last: E | None) -> E:
         """Returns an episode at its first tick: a new one, or a kept one that goes back to it.
 
-        last: the one that it follows, whose world may be taken again.
+        last: the one that it follows, whose world may be taken again. It stays as it is where this fails.
         """
         options = options or {}
-        if last is not None:
-            self.put_aside(last)
-        key = (seed, *(chosen for chosen in (self.outside | dict(options)).values()))
+        key = (seed, *(self.outside | dict(options)).values())
+        if last is not None and self._keys.get(id(last)) == key:
+            last.restart()
+            return last
         if idle := self._idle.get(key):
             found = idle.pop()
             found.restart()
-            return found
-        made = self.make(self.spec(seed, options))
-        if self.seeds is not None and seed in self.seeds:
-            self._keys[id(made)] = key
-        return made
+        else:
+            found = self.make(self.spec(seed, options))
+            if self.seeds is not None and seed in self.seeds:
+                self._keys[id(found)] = key
+        if last is not None:
+            self.put_aside(last)
+        return found
 
     def put_aside(self, last: E) -> None:
         """Keeps a world for another episode of its seed where seeds are listed, else releases it."""

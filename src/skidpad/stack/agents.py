@@ -1,7 +1,7 @@
 """Agents written for CARLA's leaderboard as stacks (decision G-6): `--stack agent:PATH:CLASS`.
 
 An agent has `setup`, `sensors`, `set_global_plan`, `run_step(input_data, timestamp)` and `destroy`.
-It lives in CARLA's axes, so everything that goes in or out passes `core.lefthanded`. Its control is
+It lives in CARLA's axes, so everything that goes in or out passes `core.maths.lefthanded`. Its control is
 read by attribute; nothing here imports carla.
 """
 

@@ -1,7 +1,7 @@
 """The nine quantities of the friction study, and what they say, from the log of one run.
 
 B-100 to B-106, B-144, B-145, B-149. The series stand in road coordinates of a straight road along
-the world's x axis; steering is CARLA-handed as published, converted by `core.lefthanded`.
+the world's x axis; steering is CARLA-handed as published, converted by `core.maths.lefthanded`.
 """
 
 from __future__ import annotations

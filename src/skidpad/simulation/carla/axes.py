@@ -1,4 +1,4 @@
-"""The wheel's transforms and vectors to ours and back, through `core.lefthanded` (decision X-4)."""
+"""The wheel's transforms and vectors to ours and back, through `core.maths.lefthanded` (decision X-4)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The shapes that travel in calls: readers that refuse wrong ones, and writers.
 
 Structs are positional arrays; poses cross here from CARLA's axes to ISO 8855 and back, by
-`core.lefthanded` alone.
+`core.maths.lefthanded` alone.
 """
 
 from __future__ import annotations

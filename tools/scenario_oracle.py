@@ -97,7 +97,11 @@ def _run_until_recorded(command: Sequence[str], record: Path) -> int:
             long = record.exists() and record.stat().st_size > RECORD_MAX
             if long or time.monotonic() > end:
                 running.send_signal(signal.SIGINT)
-                return running.wait(WALL_MAX)
+                try:
+                    return running.wait(WALL_MAX)
+                except subprocess.TimeoutExpired:
+                    running.kill()
+                    raise
     return running.returncode
 
 

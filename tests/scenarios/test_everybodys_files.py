@@ -186,6 +186,20 @@ def test_an_offset_that_is_none_is_read_as_no_offset_when_asked_to_be_lenient(tm
     assert play_ideal(scenario, 6.0).of("other")[-1].y == pytest.approx(-5.25, abs=0.01)
 
 
+def test_an_offset_that_is_none_may_be_given_from_outside_and_share_its_beginning(tmp_path):
+    """A value from outside is no `None`; `$end` is not used where `$ending` is."""
+    change = lane_change('<AbsoluteTargetLane value="-2"/>').replace('"0.0"', '"$end"', 1)
+    declared = '<ParameterDeclaration name="{}" parameterType="double" value="{}"/>'.format
+    file = write(
+        tmp_path, stories=story(event("e", private(change), time("$ending"))), end=6.0,
+        parameters=declared("end", "None") + declared("ending", "0.1"),
+    )  # fmt: skip
+    assert "read as no offset" in notes(compile_scenario(file, lenient=True))
+    given = compile_scenario(file, {"end": 0.5}, lenient=True)
+    assert "read as no offset" not in notes(given)
+    assert play_ideal(given, 6.0).of("other")[-1].y == pytest.approx(-4.75, abs=0.01)
+
+
 def test_a_file_of_the_domain_specific_language_is_called_so(tmp_path):
     (tmp_path / "x.osc").write_text("scenario top: do parallel()")
     with pytest.raises(FileError, match=r"OpenSCENARIO DSL \(2.x, .osc\) is not supported"):

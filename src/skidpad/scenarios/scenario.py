@@ -135,7 +135,7 @@ def check(
     scenario = None
     try:
         findings += violations(root.element, file.name, _minor_revision(root))
-        findings += fill_in(root) if lenient else ()
+        findings += fill_in(root, parameters) if lenient else ()
         scenario = _compile_scenario(
             root, _Wish(parameters, ego, maps, allowed, names or Names()), findings
         )

@@ -12,9 +12,9 @@ from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.warming import (
-    EverybodyListens,
-    contacts_of_nobody,
-    vehicles_of_nobody,
+    ProducingHub,
+    contact_arguments,
+    vehicle_arguments,
 )
 from skidpad.simulation.world import step
 
@@ -26,13 +26,13 @@ def types(*values):
 def test_parts_are_compiled_for_the_types_of_a_step(served: Served) -> None:
     """Else the machine code of the child would be of no use to the server."""
     world = served.episode.moving
-    states, bodies, segments, _law, dt, touching = contacts_of_nobody()
+    states, bodies, segments, _law, dt, touching = contact_arguments()
     assert types(states, bodies, segments, touching) == types(
         world.states, world.bodies, world.obstacles.segments, world.touching
     )
     (
         states, wheels, params, commands, mu, grade, bank, active, wind, dt, substeps
-    ) = vehicles_of_nobody()  # fmt: skip
+    ) = vehicle_arguments()  # fmt: skip
     assert types(wheels, params, commands, mu, grade, bank, active) == types(
         world.fleet.wheels,
         world.fleet.params,
@@ -80,7 +80,7 @@ def test_a_later_start_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_sensors_wait_for_the_child_once() -> None:
-    served = Served(ServerOptions(map="straight"), EverybodyListens())
+    served = Served(ServerOptions(map="straight"), ProducingHub())
     calls: list[int] = []
     served.before_sensing = lambda: calls.append(1)
     served.tick()

@@ -40,7 +40,7 @@ class Line:
     """Points with their lengths and headings, and with times where all have one.
 
     Headings that the vertices do not name are those of the motion from point to point, and so are
-    pitches that are None. A closed line goes back to its first point, at a time that nobody says: its
+    pitches that are None. A closed line goes back to its first point, at a time that is not said: its
     times end before that.
     tangential: the headings of the vertices are those of the line, and say nothing about the entity.
     """
@@ -84,7 +84,11 @@ class Line:
         return self.named[k] is not None and not self.tangential
 
     def rear_first(self, s: float) -> Pose:
-        """Returns the pose at length s in m of what looks back along the line where that names nothing."""
+        """Returns the pose at length s in m of an entity that goes backwards.
+
+        It looks against the line where that names no heading, and then has the pitch of the climb the
+        other way round.
+        """
         pose, (k, _) = self.at_length(s), self._find(self.s, s)
         pitch = -pose.pitch if self.pitch[k] is None else pose.pitch
         return (
@@ -211,7 +215,7 @@ class Line:
         return atan2(self.y[j] - self.y[k], self.x[j] - self.x[k])
 
     def _climb(self, k: int) -> float:
-        """Returns the pitch in rad of the segment at point k, nose down, as `_course` its direction."""
+        """Returns the pitch in rad of the segment at point k, nose down positive; 0 if none has a length."""
         k, j = self._apart(k)
         way = hypot(self.x[j] - self.x[k], self.y[j] - self.y[k])
         return atan2(self.z[k] - self.z[j], way) if way >= NEAR else 0.0

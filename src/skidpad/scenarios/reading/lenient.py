@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Collection, Iterator, Mapping
 
 from lxml import etree
 
@@ -19,9 +20,12 @@ NOTHING = "None"  # a value that some generators write for one that they do not 
 OFFSET = "targetLaneOffset"  # of a lane change, which may be absent
 
 
-def fill_in(root: Node) -> Iterator[Finding]:
-    """Adds what is missing to the tree, and yields a warning for each; only as far as it is iterated."""
-    yield from _without_offsets(root)
+def fill_in(root: Node, given: Collection[str]) -> Iterator[Finding]:
+    """Adds what is missing to the tree, and yields a warning for each; only as far as it is iterated.
+
+    given: parameters that have a value from outside, whatever the file says.
+    """
+    yield from _without_offsets(root, given)
     for element in root.element.iter("ManeuverGroup", *ZERO):
         node = Node(element, root.file, root.values)
         if node.tag == "ManeuverGroup":
@@ -36,20 +40,22 @@ def fill_in(root: Node) -> Iterator[Finding]:
                 yield node.finding(f"has no attribute {name}: read as 0", Kind.SCHEMA)
 
 
-def _without_offsets(root: Node) -> Iterator[Finding]:
+def _without_offsets(root: Node, given: Collection[str]) -> Iterator[Finding]:
     """Takes away offsets of lane changes that are `None`, and the parameters that are nothing else."""
     declared = root.element.findall("ParameterDeclarations/ParameterDeclaration")
     nothing = {
-        f"${d.get('name', '').lstrip('$')}": d for d in declared if d.get("value") == NOTHING
+        d.get("name", "").removeprefix("$"): d for d in declared if d.get("value") == NOTHING
     }
+    nothing = {name: d for name, d in nothing.items() if name not in given}
     for element in root.element.iter("LaneChangeAction"):
-        if element.get(OFFSET) in (NOTHING, *nothing):
+        if element.get(OFFSET) in (NOTHING, *(f"${name}" for name in nothing)):
             del element.attrib[OFFSET]
             node = Node(element, root.file, root.values)
             yield node.finding(f"{OFFSET} is {NOTHING}: read as no offset", Kind.SCHEMA)
     others = [e for e in root.element.iter("*") if e not in declared]
-    used = {str(value) for element in others for value in element.attrib.values()}
+    values = {str(value) for element in others for value in element.attrib.values()}
+    used = {name for value in values if value.startswith("$") for name in re.findall(r"\w+", value)}
     for name, declaration in nothing.items():
         above = declaration.getparent()
-        if above is not None and not any(name in value for value in used):
+        if above is not None and name not in used:
             above.remove(declaration)

@@ -44,7 +44,7 @@ LIMIT = 600.0  # s that the child may take
 Say = Callable[[str], object]
 
 
-class EverybodyListens(StreamHub):
+class ProducingHub(StreamHub):
     """Produces all streams, though no client listens."""
 
     def has_listeners(self, stream: int) -> bool:
@@ -79,7 +79,7 @@ def a_tick(
 
     before_step: called before the parts of a step are needed.
     """
-    served = Served(options, EverybodyListens())
+    served = Served(options, ProducingHub())
     episode = served.episode
     name = next(id for id, b in served.stock.catalogue.items() if b.family is Family.VEHICLE)
     # compiled while the helper compiles parts of a step, for which this process then waits
@@ -137,7 +137,7 @@ def _help(pipe: Connection, options: ServerOptions) -> None:
     a_tick(options, sensors=True)
 
 
-def vehicles_of_nobody() -> tuple[Any, ...]:
+def vehicle_arguments() -> tuple[Any, ...]:
     """Returns what `step_vehicles` is called with for no vehicles."""
     rows = Rows.of([], 0)
     fleet = Fleet([], DT, states=rows.states)
@@ -148,7 +148,7 @@ def vehicles_of_nobody() -> tuple[Any, ...]:
     )  # fmt: skip
 
 
-def contacts_of_nobody() -> tuple[Any, ...]:
+def contact_arguments() -> tuple[Any, ...]:
     """Returns what `resolve_contacts` is called with for no bodies and no obstacles."""
     nothing = static_segments(np.zeros((0, 4)), np.zeros(0), np.zeros(0))
     return Rows.of([], 0).states, bodies_of([]), nothing, CONTACT_LAW, DT, Contacts.room()
@@ -159,5 +159,5 @@ def compile_parts() -> None:
 
     Machine code goes to the disk by the types of the arguments, so these are those of a step.
     """
-    resolve_contacts(*contacts_of_nobody())
-    step_vehicles(*vehicles_of_nobody())
+    resolve_contacts(*contact_arguments())
+    step_vehicles(*vehicle_arguments())

@@ -51,7 +51,7 @@ def read_crg(path: Path, *, friction: bool = False) -> tuple[SurfacePatch, ...]:
     try:
         import pyopencrg
     except ImportError as error:
-        raise MissingExtra("--surface FILE.crg", "crg") from error
+        raise MissingExtra(f"{path} (OpenCRG)", "crg") from error
     try:
         road = pyopencrg.read(path, apply_mods=False, check=False)
     except Exception as error:  # the package raises what its own readers raise

@@ -73,7 +73,7 @@ def test_puddles_lie_where_the_hollows_are():
 
 def test_without_the_package_one_sentence_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyopencrg", None)
-    with pytest.raises(MissingExtra, match="crg"):
+    with pytest.raises(MissingExtra, match=r"road\.crg \(OpenCRG\) needs an optional part: .*crg"):
         read_surface(tmp_path / "road.crg")
 
 

@@ -212,6 +212,8 @@ def test_all_agents_have_what_they_are_rewarded_for():
     env = TrafficEnv(vehicles=8, duration=10.0, rewards={"distance_km": 1000.0, "contacts": -5.0})
     observations, infos = env.reset(seed=2, options={"weather": "icy_70"})
     assert infos["ego"] == {"seed": 2}
+    with pytest.raises(ConfigError, match="action of traffic_02 must be two numbers"):
+        env.step({"traffic_02": np.array([np.nan, 0.0])})
     sums, metrics = dict.fromkeys(env.agents, 0.0), {}
     while env.agents:
         seen = np.array([observations[agent] for agent in env.agents])

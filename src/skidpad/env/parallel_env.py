@@ -141,6 +141,10 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
         asked = np.zeros((len(crowd.names), 2))
         for agent, action in actions.items():
             asked[self._rows[agent]] = action
+            if not np.isfinite(action).all():
+                raise ConfigError(
+                    f"action of {agent} must be two numbers from -1 to 1, got {action}"
+                )
         crowd.step(asked)
         seen, ended = crowd.observations[rows], crowd.ended[rows].tolist()
         rewards = (crowd.terms @ self._rewards)[rows].tolist()

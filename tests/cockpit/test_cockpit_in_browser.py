@@ -47,6 +47,7 @@ LATE = """() => { const real = window.createImageBitmap; window.late = 'not yet'
     window.createImageBitmap = async (blob) => { window.createImageBitmap = real; window.late = 'soon';
         await new Promise((done) => setTimeout(done, 6000)); window.late = 'now'; return real(blob); }; }"""
 THROTTLE = "parseFloat(document.querySelector('.pedals .throttle').style.height)"  # percent
+BRAKE_PAD = "parseFloat(document.querySelector('[data-touch=brake] i').style.height)"  # percent
 FINGER = """([name, type, x, y]) => { const pad = document.querySelector(`[data-touch=${name}]`);
     const box = pad.getBoundingClientRect(); pad.setPointerCapture = () => {};
     pad.dispatchEvent(new PointerEvent(type, { bubbles: true, cancelable: true, pointerId: 7,
@@ -397,6 +398,9 @@ def test_a_person_drives_by_pedals_and_wheel_on_a_touch_screen(browser, tmp_path
         for name in ("throttle", "steer"):
             page.evaluate(FINGER, [name, "pointerup", 0.5, 0.5])
         until(page, f"() => {THROTTLE} === 0")
+        page.evaluate(FINGER, ["brake", "pointerdown", 0.5, 0.5])
+        page.evaluate("() => window.dispatchEvent(new Event('blur'))")  # the page is left
+        until(page, f"() => {BRAKE_PAD} === 0")
         page.get_by_role("button", name="end").tap()
         status, said = command.ended()
         context.close()

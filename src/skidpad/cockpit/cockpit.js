@@ -68,7 +68,7 @@ export default {
     this.keys = {}; this.touched = {}; this.history = []; this.pressed = false; this.shownAt = []; this.waiting = {};
     for (const name of this.tiers) this.$refs.tiers.append(Object.assign(document.createElement("li"), { textContent: name }));
     this.down = (e) => this.key(e, true); this.up = (e) => this.key(e, false);
-    this.away = () => { this.keys = {}; this.touched = {}; this.beat(); };
+    this.away = () => { this.keys = {}; Object.keys(this.touched).forEach((pad) => this.release(pad)); this.beat(); };
     document.addEventListener("keydown", this.down); document.addEventListener("keyup", this.up);
     window.addEventListener("blur", this.away); document.addEventListener("visibilitychange", this.away);
     this.beating = setInterval(() => this.beat(), HEARTBEAT);
@@ -246,7 +246,7 @@ export default {
     },
     beat(now = false) {
       if (this.kind !== "drive" || !this.socket) return;
-      const pedals = this.gamepad() || this.fingers() || this.keyboard(), pressed = pedals.throttle > 0 || pedals.brake > 0 || Math.abs(pedals.steer) > 0 || pedals.handbrake;
+      const pedals = this.gamepad() || this.touchPedals() || this.keyboard(), pressed = pedals.throttle > 0 || pedals.brake > 0 || Math.abs(pedals.steer) > 0 || pedals.handbrake;
       if (pressed || this.pressed || now) this.say("pedals", pedals);
       this.pressed = pressed;
     },
@@ -263,16 +263,16 @@ export default {
       else if (!(name in this.touched)) return;
       const box = e.currentTarget.getBoundingClientRect(), clip = (v, low) => Math.round(100 * Math.max(low, Math.min(1, v))) / 100;
       this.touched[name] = name === "steer" ? clip(1 - 2 * (e.clientX - box.left) / box.width, -1) : clip((box.bottom - e.clientY) / box.height, 0);
-      this.lean(name); if (e.type === "pointerdown") this.beat(true);
+      this.drawPad(name); if (e.type === "pointerdown") this.beat(true);
     },
-    release(name) { delete this.touched[name]; this.lean(name); this.beat(true); },
-    lean(name) {  // the wheel turns and a pedal fills as they are touched
+    release(name) { delete this.touched[name]; this.drawPad(name); this.beat(true); },
+    drawPad(name) {  // the wheel turns and a pedal fills as they are touched
       const v = this.touched[name] || 0, mark = this.$refs.pads[this.touchpads.indexOf(name)];
       if (name === "steer") mark.style.transform = `rotate(${-90 * v}deg)`; else mark.style.height = `${100 * v}%`;
     },
-    fingers() {
-      const t = this.touched; if (Object.keys(t).length) this.fingered = true; else if (!this.fingered) return null;
-      if (!Object.keys(t).length) this.fingered = false;
+    touchPedals() {
+      const t = this.touched; if (Object.keys(t).length) this.wasTouched = true; else if (!this.wasTouched) return null;
+      if (!Object.keys(t).length) this.wasTouched = false;
       return { throttle: t.throttle || 0, brake: t.brake || 0, steer: t.steer || 0, handbrake: false, method: "touch" };
     },
     trodden(pad, i) {  // 1 is released; a browser says exactly 0, half the way, until a pedal is first moved

@@ -130,7 +130,7 @@ def summarise_changes(changes: Sequence[Change]) -> str:
     adjusted = holm([c.comparison.p for c in tested if c.comparison.p is not None])
     sure = [c for c, p in zip(tested, adjusted, strict=True) if p <= ALPHA]
     if not sure:
-        return f"Of {count_text(len(changes), 'difference')} none is shown: all may be chance."
+        return f"{count_text(len(changes), 'difference')} compared: none is beyond chance."
     named = list_text([f"{c.column} ({c.subject}, {c.comparison.mean:+.3g})" for c in sure])
     return f"Changed beyond chance: {named}."
 

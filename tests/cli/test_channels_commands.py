@@ -255,7 +255,7 @@ def test_a_drive_with_its_monitor_says_what_it_found_how_late_and_draws_it(tmp_p
     refused = invoke_failing(tmp_path)
     assert refused == {
         "--pin gives the monitor a processor and needs --monitor",
-        "unknown --publish 'ros1'; choose one of: ros2, foxglove",
+        "unknown --publish 'ros1'; choose one of: ros2, foxglove; did you mean 'ros2'?",
         "--listen needs --mapping FILE, which says which topics are what",
         "monitor takes a FILE or --listen ros2, and one of them",
     }

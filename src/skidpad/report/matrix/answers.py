@@ -143,14 +143,18 @@ def _beside_reference(
     rates: dict[WeatherGroup, dict[str, Rate]], judged: dict[WeatherGroup, dict[str, Rate]]
 ) -> str:
     """Returns a sentence with the rates of the reference driver where it is not judged; "" otherwise."""
-    told = [
-        f"{r[REFERENCE].rate:.2f} in {g.name}"
-        for g, r in rates.items()
-        if REFERENCE in r and REFERENCE not in judged[g]
-    ]
-    if not told:
+    found = {
+        g: r[REFERENCE] for g, r in rates.items() if REFERENCE in r and REFERENCE not in judged[g]
+    }
+    if not found:
         return ""
-    return f" The reference driver, a model of a careful human, had {list_text(told)}."
+    told = list_text([f"{rate.rate:.2f} in {group.name}" for group, rate in found.items()])
+    share = 100 * max(rate.most_runs for rate in found.values())
+    allowed = f", which still allows a {EVENT} in up to {share:.0f} % of seeds"
+    never = not any(rate.events for rate in found.values())
+    return (
+        f" The reference driver, a model of a careful human, had {told}{allowed if never else ''}."
+    )
 
 
 def _too_few_seeds(seeds: int, least: int) -> str:

@@ -118,8 +118,8 @@ def _first(
     return [
         *matrix.missing(),
         Text(GRADED if matrix.has_grades else UNGRADED),
-        answers(matrix, judged, crashes),
         *baseline_text(matrix),
+        answers(matrix, judged, crashes),
         headline_numbers(matrix),
         *headline_tables(matrix),
         matrix_figures.speed_figure(matrix),

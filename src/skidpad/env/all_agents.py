@@ -116,7 +116,6 @@ class AllAgentsEpisode:
         assert self.run.stepper is not None
         truth, terms = self.run.stepper.truth, self.terms
         look(self.world.arena, self.observations, self.dt, self._last, self._lies, terms)
-        terms[self.ended] = 0.0
         before = self.ended.copy()
         for event in truth.contacts:
             self._touch(0, event.actor)

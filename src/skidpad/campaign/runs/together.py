@@ -43,8 +43,10 @@ def drive_together(stack: VectorStack, specs: Mapping[int, RunSpec]) -> dict[int
     A failure in `tick` is the outcome of all runs that were going on, one in `begin` of its run alone.
     """
     answers = Answers(stack)
-    runs = {k: OpenRun(spec, _seat(answers, k)) for k, spec in specs.items()}
+    runs: dict[int, OpenRun] = {}
     try:
+        for k, spec in specs.items():
+            runs[k] = OpenRun(spec, _seat(answers, k))
         while going := [k for k, run in runs.items() if run.sense()]:
             answers.ask({k: _frame_of(runs[k]) for k in going})
             for k in going:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import polars as pl
 
@@ -120,11 +120,10 @@ def _without_crashes(judged: dict[WeatherGroup, dict[str, Rate]]) -> list[str]:
     configs = list(dict.fromkeys(c for by_config in judged.values() for c in by_config))
     weathers = " or ".join(group.name for group in judged)
     fewest = min(rate.runs for rate in rates)
-    share = 100 * max(rate.most_runs for rate in rates)
-    allowed = f"still allows one in up to {share:.0f} % of seeds (95 % confidence)"
+    allowed = _allow("one", rates)
     return [
         f"{capitalize_first(config_list(configs))} had no {EVENT} in {weathers}.",
-        f"No {EVENT} in {count_text(fewest, 'seed')} {allowed}.",
+        f"No {EVENT} in {count_text(fewest, 'seed')} {allowed} (95 % confidence).",
     ]
 
 
@@ -149,12 +148,15 @@ def _beside_reference(
     if not found:
         return ""
     told = list_text([f"{rate.rate:.2f} in {group.name}" for group, rate in found.items()])
-    share = 100 * max(rate.most_runs for rate in found.values())
-    allowed = f", which still allows a {EVENT} in up to {share:.0f} % of seeds"
-    never = not any(rate.events for rate in found.values())
-    return (
-        f" The reference driver, a model of a careful human, had {told}{allowed if never else ''}."
-    )
+    if not any(rate.events for rate in found.values()):
+        told += f", which {_allow(f'a {EVENT}', found.values())}"
+    return f" The reference driver, a model of a careful human, had {told}."
+
+
+def _allow(what: str, rates: Iterable[Rate]) -> str:
+    """Returns what rates without an event still allow, at 95 % confidence, of the widest of them."""
+    share = 100 * max(rate.most_runs for rate in rates)
+    return f"still allows {what} in up to {share:.0f} % of seeds"
 
 
 def _too_few_seeds(seeds: int, least: int) -> str:
@@ -198,10 +200,9 @@ def _sureness(
     if same:
         told.append(f"it drove exactly as {config_list(same)}")
     if not rate.events:
-        share = 100 * rate.most_runs
         told.append(
-            f"none of its {count_text(rate.runs, 'seed')} had a {EVENT}, which still allows one in up "
-            f"to {share:.0f} % of seeds (95 % confidence)"
+            f"none of its {count_text(rate.runs, 'seed')} had a {EVENT}, which {_allow('one', [rate])} "
+            "(95 % confidence)"
         )
     return (
         f"{capitalize_first(group.name)}, {config_list([best])}: {'; '.join(told)}." if told else ""

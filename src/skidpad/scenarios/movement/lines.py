@@ -89,13 +89,12 @@ class Line:
         It looks against the line where that names no heading, and then has the pitch of the climb the
         other way round.
         """
-        pose, (k, _) = self.at_length(s), self._find(self.s, s)
+        pose = self.at_length(s)
+        if self.names_heading(s):
+            return pose
+        k, _ = self._find(self.s, s)
         pitch = -pose.pitch if self.pitch[k] is None else pose.pitch
-        return (
-            pose
-            if self.names_heading(s)
-            else replace(pose, pitch=pitch, yaw=wrap_angle(pose.yaw + pi))
-        )
+        return replace(pose, pitch=pitch, yaw=wrap_angle(pose.yaw + pi))
 
     def at_time(self, t: float) -> Pose:
         """Returns the pose at time t s, clamped to the line; linear between points."""

@@ -331,12 +331,14 @@ class Episode:
 
     def follow(self) -> None:
         """Moves each attached actor to its mount on its parent."""
+        moved = False  # whether a trigger did
         for actor in self.actors:
             carrier = self.actors.carrier(actor) if actor.parent else None
             if carrier is not None:
                 actor.pose = self.actors.pose(carrier) @ actor.mount
-                if actor.family is Family.TRIGGER:
-                    self._mark_zones()
+                moved |= actor.family is Family.TRIGGER
+        if moved:
+            self._mark_zones()
 
     def fill_rows(self, dt: float) -> None:
         """The snapshot's columns as of now, dt s after the last time."""

@@ -154,10 +154,15 @@ def record(programs: Path, folders: Sequence[Path]) -> int:
     return 0
 
 
-def play_without_controllers(file: Path) -> PlayedScenario:
-    """Plays a file as esmini does with --disable_controllers: no name of a controller is known."""
+def play_without_controllers(
+    file: Path, end: float = CORPUS_END, maps: Sequence[Path] = ()
+) -> PlayedScenario:
+    """Plays a file as esmini does with --disable_controllers: no name of a controller is known.
+
+    end: s after which it stops; maps: folders with roads.
+    """
     with patch.dict(registry.BUILT_IN, clear=True):
-        return play_ideal(compile_scenario(file), CORPUS_END, STEP)
+        return play_ideal(compile_scenario(file, maps=maps), end, STEP)
 
 
 def compare(folders: Sequence[Path]) -> int:

@@ -6,7 +6,7 @@
 Each folder inside FOLDER is one repository, named OWNER+NAME, with its scenarios and roads. `choose`
 takes the files that are valid (see openscenario_corpus) and whose content is not in `--known`, of
 files whose names differ in numbers alone the first eight; it plays nothing. `count` plays the files of
-a list, each for 20 s, and compares them with esmini.
+a list, each for 20 s, and compares those that play with esmini, both without controllers.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import sys
 import traceback
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 
@@ -26,13 +27,13 @@ ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tools")]
 
 from openscenario_corpus import breaks, content, lacking  # noqa: E402
-from scenario_oracle import LEAST_WAY, run_esmini  # noqa: E402
+from scenario_oracle import LEAST_WAY, play_without_controllers, run_esmini  # noqa: E402
 from skidpad.core.errors import SkidpadError  # noqa: E402
-from skidpad.scenarios.playing.stage import PlayedScenario, play_ideal  # noqa: E402
+from skidpad.scenarios.playing.stage import play_ideal  # noqa: E402
 from skidpad.scenarios.reading.document import parse  # noqa: E402
 from skidpad.scenarios.reading.findings import HARMLESS  # noqa: E402
 from skidpad.scenarios.scenario import check  # noqa: E402
-from support.oracle.reference import deviations, file_hash  # noqa: E402
+from support.oracle.reference import Deviation, deviations, file_hash  # noqa: E402
 
 STEP, END = 0.05, 20.0  # s
 MOST = 60  # files of one repository
@@ -121,18 +122,36 @@ def folder_of(file: Path, folders: Iterable[Path]) -> Path:
     return above / file.relative_to(above).parts[0]
 
 
-def play(file: Path, maps: Sequence[Path]) -> tuple[str, PlayedScenario | None]:
-    """Returns what became of a file, and its trajectories where it plays."""
+def play(file: Path, maps: Sequence[Path]) -> str:
+    """Plays a file with its controllers; returns `played`, or what became of it after a colon."""
     try:
         compiled = check(file, maps=maps)
         if compiled.scenario is None:
             first = next(f for f in compiled.findings if f.kind not in HARMLESS)
-            return f"refused: {first}", None
-        return "played", play_ideal(compiled.scenario, END, STEP)
+            return f"refused: {first}"
+        play_ideal(compiled.scenario, END, STEP)
     except SkidpadError as error:
-        return f"failed: {str(error).splitlines()[0]}", None
+        return f"failed: {str(error).splitlines()[0]}"
     except Exception:
-        return f"traceback: {traceback.format_exc(limit=-1)}", None
+        return f"traceback: {traceback.format_exc(limit=-1)}"
+    return "played"
+
+
+def beside_esmini(
+    file: Path, maps: Sequence[Path], given: argparse.Namespace
+) -> dict[str, Deviation] | None:
+    """Returns how far each entity of a file is from esmini's; None where esmini does not play it.
+
+    Both play the first 20 s without controllers.
+    """
+    try:
+        reference = run_esmini(given.esmini, file, given.towns)
+    except (RuntimeError, subprocess.SubprocessError, StopIteration, ValueError):
+        return None
+    states = {n: {t: s for t, s in e.items() if t <= END * 1000.0}
+              for n, e in reference.entities.items()}  # fmt: skip
+    told = play_without_controllers(file, END, maps)
+    return deviations(told, replace(reference, entities=states))
 
 
 def count(given: argparse.Namespace) -> None:
@@ -145,32 +164,25 @@ def count(given: argparse.Namespace) -> None:
         if names_empty_road(file):
             outcomes["road missing"] += 1
             continue
-        outcome, told = play(file, road_folders(folder_of(file, given.folders), given.maps))
+        maps = road_folders(folder_of(file, given.folders), given.maps)
+        outcome = play(file, maps)
         kind = outcome.partition(":")[0]
         print(f"{kind}: {repository} {file.name}", flush=True)
         outcomes[kind] += 1
         by_owner.setdefault(repository, Counter())[kind] += 1
-        if told is None:
+        if kind != "played":
             print(f"{repository} {file.name}: {outcome}", flush=True)
             continue
-        if given.esmini is None:
-            continue
-        try:
-            reference = run_esmini(given.esmini, file, given.towns)
-        except (RuntimeError, subprocess.SubprocessError, StopIteration, ValueError):
+        found = beside_esmini(file, maps, given) if given.esmini is not None else None
+        if found is None:
             continue
         compared += 1
-        states = {n: {t: s for t, s in e.items() if t <= END * 1000.0}
-                  for n, e in reference.entities.items()}  # fmt: skip
-        reference = type(reference)(reference.version, reference.options, "", states)
-        for name, d in deviations(told, reference).items():
+        for name, d in found.items():
             if d.way >= LEAST_WAY:
                 places.append(d.place)
-                if not d.place <= 0.5:
-                    print(
-                        f"{repository} {file.name} {name}: {d.place:.2f} m from {d.since} s",
-                        flush=True,
-                    )
+                if not d.place <= 0.1:
+                    print(f"{repository} {file.name} {name}: {d.place:.2f} m from {d.since} s",
+                          flush=True)  # fmt: skip
     missing = outcomes.pop("road missing", 0)
     total = sum(outcomes.values())
     for repository, counts in by_owner.items():

@@ -16,15 +16,15 @@ from skidpad.cli.campaigns.adas_plan import plan
 from skidpad.cli.options.asked import Climate, Drivers
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import AdasDriver, Function, ReferenceDriver, Roads, RunSpec
-from skidpad.core.settings.stack import CapScope
+from skidpad.core.settings.stack import StackSettings
 from skidpad.core.vocabulary import Outcome, SensorLevel, TrafficStart
 from skidpad.physics.presets import find_weather
 from skidpad.recording.campaign.results import read_results
 from skidpad.recording.run.log_files import log_hash, read_log
 from skidpad.recording.run.motion import motion_hash
 from skidpad.report.matrix.page import write_report
-from skidpad.stack.adas import SpeedCaps
 from skidpad.stack.configurations import functions_of
+from skidpad.stack.control.caps import cap_rules
 
 ONE = Climate(weather="clear-noon")
 
@@ -69,8 +69,8 @@ def test_a_wrong_target_is_named(text: str, word: str) -> None:
 
 def test_a_limiter_never_raises_the_target() -> None:
     for target, limit, expected in ((60.0, 80.0, 60.0), (150.0, 80.0, 80.0)):
-        caps = SpeedCaps(functions_of(4), target, limit, CapScope.GLOBAL)
-        assert caps.cruise_kmh(resume_active=False) == expected
+        caps = cap_rules(functions_of(4), target, limit, StackSettings(), 0.05)
+        assert caps.cruise_kmh == expected
 
 
 def test_the_columns_say_what_was_varied() -> None:

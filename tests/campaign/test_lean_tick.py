@@ -9,6 +9,7 @@ from skidpad.recording.run import ticks
 from skidpad.sensors.object_level import objects
 from skidpad.simulation import recovery
 from skidpad.simulation.world import feel, step
+from skidpad.stack import think
 from skidpad.stack.perception import radar
 from support.refcounts import counts_references
 from support.runs import adas_run
@@ -39,7 +40,7 @@ def test_a_kernel_of_the_tick_counts_nothing(compiled: object) -> None:
 
 def test_kernels_in_which_arrays_are_made_count() -> None:
     """Else the test above could not fail."""
-    assert counts_references(radar.first_in_lane)
+    assert counts_references(think.think)
 
 
 def test_the_supervisors_kernel_counts_nothing() -> None:

@@ -1,6 +1,7 @@
 """Studies: every arm differs in one thing, and that thing acts."""
 
 from dataclasses import asdict, replace
+from math import nan
 
 import numpy as np
 import polars as pl
@@ -21,6 +22,7 @@ from skidpad.evidence.verdicts import judge
 from skidpad.recording.run.log_files import log_hash
 from skidpad.roads.bundled import load_map
 from skidpad.sensors.published_sensors import twelve_sensors
+from skidpad.stack.control.tiers import Situation, decide
 
 FIGURE8 = load_map("figure8")
 STUDIES = study_arms.STUDIES
@@ -90,10 +92,13 @@ def test_the_plain_arm_is_our_own_stack():
 
 def test_without_the_coast_phase_a_lost_lead_is_not_coasted_after():
     for stack, coasts in (("Changed", True), ("Coastless", False)):
-        cruise = changed(stack).stack.hierarchy.cruise
-        cruise.conclude(Tier.ACC_HOLD)
-        assert cruise.ticks_since_lead < 20
-        assert (cruise.ticks_since_lead < cruise.coast_ticks) is coasts
+        found = changed(stack).stack
+        m, rules = found.memory[0], found.rules.tiers
+        free = Situation(10.0, 36.0, nan, nan, False, nan, 150.0, 1e9)
+        decide(m, rules, free._replace(distance=25.0, gap=2.5, confirmed=True))
+        assert m["tier"] == Tier.ACC_HOLD
+        assert m["ticks_since_lead"] == 0
+        assert (decide(m, rules, free).tier == Tier.COAST) is coasts
 
 
 def test_the_handbrake_is_pulled_in_tiers_1_to_3_only(monkeypatch):

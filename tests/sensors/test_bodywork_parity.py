@@ -21,10 +21,10 @@ from skidpad.stack.perception.fusion import (
     CameraPair,
     bumper_corridor,
     camera_pair,
-    fuse,
     roof_corridor,
 )
 from support.sensors.worlds import states_at, straight
+from support.stack_parts import fuse, read_pair
 
 DISTANCES = np.geomspace(4.0, 74.0, 9)  # m between the bumpers
 PLACES = [(left, yaw) for left in (0.0, 1.0) for yaw in (0.0, 0.12)]
@@ -67,7 +67,7 @@ def read_all(bodywork, type):
                 SimpleNamespace(images=images, segments={}),
                 SimpleNamespace(images={}, segments=boxes.segments(states)),
             ):
-                one = fuse(bumper.read(frame, 0.0, 0.0), roof.read(frame, 0.0, 0.0))
+                one = fuse(read_pair(bumper, frame), read_pair(roof, frame))
                 row.append(np.nan if one is None else one)
             found.append(row)
     return np.array(found).T

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from support.guards import Guard, module_of, run, survivors_of
+from support.guards import STACK, Guard, interpret, module_of, run, survivors_of
 
 TIERS, DETAILS = "stack/control/test_tiers.py", "stack/control/test_tier_details.py"
 CAPS, FUSION = "stack/control/test_lateral_and_caps.py", "stack/perception/test_fusion.py"
@@ -89,14 +89,14 @@ GUARDS = (
         "SMOOTHING_TIME SMOOTHING_RATE",
     ),
     Guard(
-        "adas",
+        "control.caps",
         f"{CAPS}::test_timer_counts_from_the_last_tick_at_a_stop",
         "STOPPED_BELOW_KMH",
     ),
-    Guard("adas", f"{CAPS}::test_cap_ends_after_15_s_whatever_happens",
+    Guard("control.caps", f"{CAPS}::test_cap_ends_after_15_s_whatever_happens",
           "RESUME_DURATION"),
-    Guard("adas", f"{CAPS}::test_caps_by_configuration", "RESUME_KMH"),
-    Guard("adas", f"{CAPS}::test_spatial_cap_ends_behind_the_first_curve", "CURVE"),
+    Guard("control.caps", f"{CAPS}::test_caps_by_configuration", "RESUME_KMH"),
+    Guard("control.caps", f"{CAPS}::test_spatial_cap_ends_behind_the_first_curve", "CURVE"),
     Guard("perception.lane_view", f"{CORRIDOR}::test_curvature_is_read_at_one_point_30_m_ahead",
           "REFERENCE_DISTANCE"),
     Guard(
@@ -128,9 +128,9 @@ GUARDS = (
         f"{FUSION}::test_verification_asks_for_vehicle_pixels_near_the_distance",
         "VERIFY_TOLERANCE",
     ),
-    Guard("perception.front", f"{RADAR}::test_the_stack_keeps_4_m_about_the_path", "HALF_WIDTH"),
+    Guard("perception.radar", f"{RADAR}::test_the_stack_keeps_4_m_about_the_path", "HALF_WIDTH"),
     Guard(
-        "perception.front",
+        "perception.radar",
         f"{RADAR}::test_compatibility_corridor_is_1_6_m_and_asks_no_map",
         "PARABOLA_HALF_WIDTH",
     ),
@@ -219,7 +219,7 @@ CASES = [(g, constant) for g in GUARDS for constant in g.constants.split()]
     ("guard", "constant"), CASES, ids=[f"{g.module}.{constant}" for g, constant in CASES]
 )
 def test_a_changed_constant_is_noticed(guard, constant, monkeypatch):
-    survivors = survivors_of(guard, constant, monkeypatch, "skidpad.stack.")
+    survivors = survivors_of(guard, constant, monkeypatch, STACK)
     assert not survivors, f"{constant}: {guard.test} accepts {survivors}"
 
 
@@ -243,8 +243,9 @@ FORMULAS = {
 def test_a_scaled_formula_is_noticed(formula, factor, monkeypatch):
     place, _, name = formula.rpartition(".")
     module = import_module(f"skidpad.stack.{place}")
-    exact = getattr(module, name)
     run(FORMULAS[formula])
+    interpret(monkeypatch, [module_of(FORMULAS[formula].partition("::")[0])])
+    exact = getattr(module, name)
     monkeypatch.setattr(module, name, lambda *args: factor * exact(*args))
     with pytest.raises(AssertionError):
         run(FORMULAS[formula])
@@ -269,11 +270,11 @@ def test_guards_are_marked_with_a_requirement():
 
 
 @pytest.mark.req("M-14")
-@pytest.mark.parametrize("module", sorted({g.module for g in GUARDS} - {"perception.front"}))
+@pytest.mark.parametrize("module", sorted({g.module for g in GUARDS}))
 def test_every_number_of_a_module_has_a_guard(module):
     """But for what is ours, or a mere bound of a search."""
-    bounds = {"LANE_STEP", "MAX_LANES", "MAX_SHIFTS", "HALF_WIDTH", "PARABOLA_HALF_WIDTH"}
-    bounds |= {"KEYS"}  # names of settings
+    bounds = {"LANE_STEP", "MAX_LANES", "MAX_SHIFTS"}
+    bounds |= {"KEYS", "COASTED_FROM"}  # names of settings and of tiers
     bounds |= {"EMERGENCY_BRAKE_MIN"}  # out of reach: tier 3 starts at 0.75 s (D-041)
     loaded = import_module(f"skidpad.stack.{module}")
     own = Path(loaded.__file__).read_text(encoding="utf-8")

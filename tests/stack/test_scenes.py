@@ -211,14 +211,14 @@ def test_a_relocation_clears_everything_that_was_seen_and_summed():
     stack = stack_on(ArcMap(lights=((7, 0, 60.0),)))
     for k in range(8):
         stack.tick(frame(k, [Car(30.0)], ego_at(20.0, v=15.0), lights={7: RED}))
-    hierarchy = stack.hierarchy
-    hierarchy.speed_pid.update(5.0)
-    hierarchy.distance_pid.update(5.0)
-    assert stack.front.persistence.is_confirmed
+    m, sums = stack.memory[0], ["speed_previous", "speed_integral", "distance_previous",
+                                "distance_integral", "steady_integral"]  # fmt: skip
+    for name in sums:
+        m[name] = 5.0
+    assert m["seen_ticks"] >= 2
     assert stack.lock.signal == 7
     stack.tick(frame(9, [], ego_at(400.0), supervision=Supervision.WARM_UP))
-    for pid in (hierarchy.speed_pid, hierarchy.distance_pid):
-        assert (pid.previous, pid.integral) == (0.0, 0.0)
-    assert not stack.front.persistence.is_confirmed
+    assert [m[name] for name in sums] == [0.0] * 5
+    assert m["seen_ticks"] == 0
     assert stack.lock.signal is None
     assert stack.report.tier is Tier.NONE, "the supervisor drives"

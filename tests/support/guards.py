@@ -14,6 +14,9 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from support.interpreted import interpret
+
+STACK = "skidpad.stack."
 TESTS = Path(__file__).parents[1]
 
 
@@ -29,9 +32,10 @@ class Guard(NamedTuple):
 def mutants(value: Any) -> Iterator[Any]:
     """`value` with one number in it 10 % smaller or larger; whole numbers stay whole."""
     if isinstance(value, tuple):
+        make = getattr(value, "_make", tuple)
         for i, part in enumerate(value):
             for other in mutants(part):
-                yield (*value[:i], other, *value[i + 1 :])
+                yield make((*value[:i], other, *value[i + 1 :]))
     elif is_dataclass(value):
         for f in fields(value):
             for other in mutants(getattr(value, f.name)):
@@ -73,6 +77,8 @@ def survivors_of(
     module = import_module(house + guard.module)
     value = getattr(module, constant)
     run(guard.test)
+    if house == STACK:
+        interpret(monkeypatch, [module_of(guard.test.partition("::")[0])])
     changed = list(guard.values or mutants(value))
     if constant.endswith("_GAINS"):  # limits of the output are tested with the tiers
         changed = changed[:6]

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf
+from math import inf, nan
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import require_choice, require_range
-from skidpad.core.frames import SensorFrame
-from skidpad.core.geometry import kmh_from_mps
+from skidpad.core.frames import Segments, SensorFrame
+from skidpad.core.kernels.jit import Held, hold
 from skidpad.core.run import Function
 from skidpad.core.settings.parts import load_profile
-from skidpad.core.settings.stack import BranchChoice, CapScope, ResumeEnd, StackSettings
+from skidpad.core.settings.stack import BranchChoice, StackSettings
 from skidpad.core.setup import DT
 from skidpad.core.specs import SensorSpec
 from skidpad.core.states import StackReport, VehicleCommand
@@ -26,34 +30,38 @@ from skidpad.stack.configurations import (
     functions_of,
     parse_functions,
 )
-from skidpad.stack.control.bends import BendSpeed, slow_for_bend
+from skidpad.stack.control.bends import BendSpeed
+from skidpad.stack.control.caps import cap_rules
 from skidpad.stack.control.steering import NoSmoothing, Smoothing, steering_of
 from skidpad.stack.control.text import mode_text
-from skidpad.stack.control.tiers import (
-    Hierarchy,
-    Lead,
-    Request,
-    Situation,
-    needs_verification,
-    time_gap,
-)
+from skidpad.stack.control.tiers import tier_rules
 from skidpad.stack.functions import AddedFunctions
-from skidpad.stack.perception.front import Front, Sight
+from skidpad.stack.memory import Memory, new_memory
+from skidpad.stack.perception.front import ROOM, VERIFIED_BY, Cameras
+from skidpad.stack.perception.fusion import (
+    MEDIAN_SAMPLES,
+    far_samples,
+    fusion_rules,
+    rate_samples,
+)
 from skidpad.stack.perception.hsv import LampCamera
 from skidpad.stack.perception.lane_view import (
     FirstBranchRoute,
     HighwayRoute,
     LaneTracker,
     LaneView,
+    Place,
 )
 from skidpad.stack.perception.lights import NO_LIGHT, LightReading, LightScan, StopLock
-from skidpad.stack.timing import ticks_to_reach
+from skidpad.stack.perception.persistence import detection_rules
+from skidpad.stack.perception.radar import radar_rules
+from skidpad.stack.think import Answer, Rules, act, forget_sight, forget_tiers, perceive, think
 
-STOPPED_BELOW_KMH = 5.0  # km/h (A-173)
-RESUME_DURATION = 15.0  # s (A-174)
-RESUME_KMH = 80.0  # km/h (A-174)
-CURVE = 1.0 / 500.0  # 1/m, sharper is a curve (A-177; ours, the source gives no figure)
 HELD = VehicleCommand(brake=1.0)  # while the supervisor drives; it overrides this anyway
+STATUSES, TIERS = tuple(DetectionStatus), tuple(Tier)  # by their numbers
+EMPTY = np.empty(0, np.float32)
+NO_SEGMENTS = Segments(EMPTY, EMPTY, EMPTY, EMPTY, EMPTY, np.empty(0, np.uint8))
+Rest = tuple[bool, float, float, float, float, float]
 KEYS = ("configuration", "functions", "profile", "set", "cruise_kmh", "limiter_kmh", "dt")
 
 
@@ -103,22 +111,25 @@ class AdasStack:
         self, specs: Sequence[SensorSpec], map: RoadMap, settings: Mapping[str, Any]
     ) -> None:
         self.config = AdasConfig.from_mapping(settings)
-        options = self.config.settings
+        options, dt = self.config.settings, self.config.dt
         route = HighwayRoute() if options.route is BranchChoice.HIGHWAY else FirstBranchRoute()
-        self.tracker = LaneTracker(map, route)
-        self.front = Front(specs, map, self.config.functions, options, self.config.dt)
+        self.map, self.tracker = map, LaneTracker(map, route)
+        self.cameras = Cameras(specs, self.config.functions, options)
+        self.memory = new_memory()
+        self._samples, self._history = far_samples(MEDIAN_SAMPLES), rate_samples(dt)
+        self._kept = np.empty(ROOM, dtype=np.int64)
         self.scan = LightScan(map)
         self.lamps = LampCamera(specs)
-        self.lock = StopLock(self.config.dt, options.hsv_required)
-        self.resume = ResumeProtocol(self.config.dt, options.resume_end)
+        self.lock = StopLock(dt, options.hsv_required)
         self.smoothing: Smoothing | NoSmoothing = (
-            Smoothing(self.config.dt) if options.steer_smoothing else NoSmoothing()
+            Smoothing(dt) if options.steer_smoothing else NoSmoothing()
         )
-        self.added = AddedFunctions(self.config.added, map, self.config.dt)
+        self.added = AddedFunctions(self.config.added, map, dt)
         self.supervision = Supervision.NONE
         self.verified_by = ""
         self.v_told = inf
         self.report = StackReport()
+        forget_sight(self.memory, self._samples, self._history)
         self.switch(self.config.functions)
 
     @property
@@ -138,11 +149,25 @@ class AdasStack:
         """
         c = self.config
         self.functions, self.assists = functions, Function.TLA in functions
-        self.hierarchy = Hierarchy(functions, c.settings, c.dt)
         self.steering = steering_of(functions, c.settings)
-        self.caps = SpeedCaps(functions, c.cruise_kmh, c.limiter_kmh, c.settings.cap_scope)
         self.bends = BendSpeed(c.dt) if Function.BEND in functions else None
-        self.front.switch(functions)
+        self.cameras.switch(functions)
+        s = c.settings
+        self.follow_rules(
+            Rules(
+                tier_rules(functions, s, c.dt),
+                cap_rules(functions, c.cruise_kmh, c.limiter_kmh, s, c.dt),
+                fusion_rules(s, c.dt),
+                detection_rules(s, c.dt),
+                radar_rules(s),
+                (self.cameras.bumper.keep, self.cameras.roof.keep),
+            )
+        )
+
+    def follow_rules(self, rules: Rules) -> None:
+        """Drives by these rules from now on; tiers start afresh."""
+        self.rules, self._held = rules, hold(rules)
+        forget_tiers(self.memory, self._held)
 
     def limit_speed(self, v: float) -> None:
         """Cruises no faster than v m/s until told otherwise: whatever governs this stack says so."""
@@ -150,8 +175,8 @@ class AdasStack:
 
     def relocated(self) -> None:
         """Forgets what was seen and summed before, as the ego now stands elsewhere (A-109)."""
-        self.front.reset()
-        self.hierarchy.reset()
+        forget_sight(self.memory, self._samples, self._history)
+        forget_tiers(self.memory, self._held)
         self.lock.reset()
         self.smoothing.reset()
         self.added.reset()
@@ -166,25 +191,60 @@ class AdasStack:
         self._follow_supervision(frame.supervision)
         v = frame.ego.speed
         view = self.tracker.update(frame.ego.pose)
-        sight = self.front.look(frame, v, view)
         light, hsv = self._light(frame, v, view)
         stop = self.lock.update(light, v, frame.lights, hsv) if self.assists else None
-        stop_distance = stop.distance if stop is not None else None
-        lane_curvature = view.ego.curvature if view.ego is not None else 0.0
-        self.resume.update(stop is not None, kmh_from_mps(v), lane_curvature)
-        v_bends = self._speed_for_bends(frame, v, view)
-        situation, sight = self._situation(frame, v, v_bends, view, sight, stop_distance)
-        supervised = frame.supervision is not Supervision.NONE
-        request = Request(Tier.NONE)
-        if not supervised:
-            request = slow_for_bend(self.hierarchy.decide(situation), v, v_bends)
-        self.front.conclude(sight, stop is not None)
-        self.report = self._report(view, sight, situation, request.tier, light, hsv)
-        if supervised:
+        drives = frame.supervision is Supervision.NONE
+        rest = (
+            drives, v, view.ego.curvature if view.ego is not None else 0.0,
+            nan if stop is None else stop.distance, self._speed_for_bends(frame, v, view), self.v_told,
+        )  # fmt: skip
+        told = (self._think if frame.segments else self._think_of_images)(frame, view, rest)
+        self.verified_by = VERIFIED_BY[told[4]]
+        self.report = self._report(told, view, light, stop is not None, hsv)
+        if not drives:
             return HELD
-        command = VehicleCommand(request.throttle, request.brake, self._steer(frame, v, view),
-                                 request.handbrake)  # fmt: skip
+        _, throttle, brake, handbrake, *_ = told
+        command = VehicleCommand(throttle, brake, self._steer(frame, v, view), handbrake)
         return self.added.update(frame, command)
+
+    def _think(self, frame: SensorFrame, view: LaneView, rest: Rest) -> Answer:
+        """Returns what the tick comes to, by the runs of pixels of the object level; rest: for `act`."""
+        pose, ego = frame.ego.pose, view.ego
+        bumper = frame.segments.get(self.cameras.bumper.depth_id, NO_SEGMENTS)
+        roof = frame.segments.get(self.cameras.roof.depth_id, NO_SEGMENTS)
+        told: Callable[..., Answer] = think  # mypy takes a named tuple for one of any length
+        return told(
+            *self._memories(frame), *bumper, *roof, *frame.radar, self.map.held,
+            self.tracker.on_highway, pose.x, pose.y, pose.z, pose.yaw,
+            -1 if ego is None else ego.lane, 0.0 if ego is None else ego.s, view.yaw_error,
+            view.kappa, *rest,
+        )  # fmt: skip
+
+    def _think_of_images(self, frame: SensorFrame, view: LaneView, rest: Rest) -> Answer:
+        """Returns what the tick comes to, by images; rest: for `act`."""
+        pose, ego = frame.ego.pose, view.ego
+        place = Place(
+            pose.x, pose.y, pose.z, pose.yaw, rest[1], -1 if ego is None else ego.lane,
+            0.0 if ego is None else ego.s, view.yaw_error, view.kappa,
+        )  # fmt: skip
+        remembered = self._memories(frame)
+        asks = perceive(
+            *remembered, *self.cameras.read(frame, view.yaw_error, view.kappa), frame.radar,
+            self.map.held, self.tracker.on_highway, place,
+        )  # fmt: skip
+        by = 0
+        if asks:
+            distance = float(self.memory["distance"][0])
+            by = self.cameras.verify(frame, distance, view.yaw_error, view.kappa)
+        return act(self.memory, self._held, by, *rest)
+
+    def _memories(
+        self, frame: SensorFrame
+    ) -> tuple[Memory, Held[Rules], Floats, Floats, NDArray[np.int64]]:
+        """Returns memory and rules, with room for the frame's radar points."""
+        if len(frame.radar.range) > len(self._kept):
+            self._kept = np.empty(len(frame.radar.range), dtype=np.int64)
+        return self.memory, self._held, self._samples, self._history, self._kept
 
     def _follow_supervision(self, phase: Supervision) -> None:
         """Notes which supervisor drives; forgets the old place where a warm-up begins (A-185)."""
@@ -217,36 +277,6 @@ class AdasStack:
 
         return self.bends.update(v, curvature)
 
-    def _situation(
-        self,
-        frame: SensorFrame,
-        v: float,
-        v_bends: float,
-        view: LaneView,
-        sight: Sight,
-        stop_distance: float | None,
-    ) -> tuple[Situation, Sight]:
-        """Returns what the tiers see, and the sight; a target not confirmed at standstill is in neither.
-
-        It is dropped before them, so that all tiers go on without it (A-116, D-043).
-        """
-        active, self.verified_by = self.resume.active, ""
-        told_kmh = kmh_from_mps(self.v_told)
-        s = Situation(
-            v=v,
-            v_kmh=kmh_from_mps(v),
-            lead=_lead(sight, v),
-            stop_distance=stop_distance,
-            cruise_kmh=min(self.caps.cruise_kmh(active), kmh_from_mps(v_bends), told_kmh),
-            follow_cap_kmh=min(self.caps.following_kmh(active), told_kmh),
-        )
-        if sight.distance is None or not (self.hierarchy.brakes and needs_verification(s)):
-            return s, sight
-        confirmed, self.verified_by = self.front.verify(frame, sight.distance, view)
-        if confirmed:
-            return s, sight
-        return s._replace(lead=None), sight._replace(distance=None)
-
     def _steer(self, frame: SensorFrame, v: float, view: LaneView) -> float:
         """Returns the smoothed steering command in -1..1 that follows the lane at v in m/s."""
         command = self.steering.steer(
@@ -256,114 +286,44 @@ class AdasStack:
 
     def _report(
         self,
+        told: Answer,
         view: LaneView,
-        sight: Sight,
-        s: Situation,
-        tier: Tier,
         light: LightReading,
+        stopping: bool,
         hsv: LightState | None,
     ) -> StackReport:
         """Returns the report of this tick: detections, tier, target speed, light and lane."""
-        radar = sight.radar
+        (
+            tier, _, _, _, _, cruise_kmh, status, distance, gap, bumper, roof, fused, radar_pre,
+            radar_lane, radar_velocity, radar_points, resume_ticks,
+        ) = told  # fmt: skip
+        ego = view.ego
         return StackReport(
-            status=sight.status,
-            tier=tier,
-            detected=sight.distance is not None,
-            distance=sight.distance,
-            time_gap=s.lead.gap if s.lead is not None else None,
-            bumper=sight.bumper,
-            roof=sight.roof,
-            fused=sight.fused,
-            radar_pre=radar.pre,
-            radar_lane=radar.lane,
-            radar_velocity=radar.velocity,
-            radar_points=radar.points,
-            v_target=s.cruise_kmh / 3.6,
+            status=STATUSES[status],
+            tier=TIERS[tier],
+            detected=distance == distance,
+            distance=_or_none(distance),
+            time_gap=_or_none(gap),
+            bumper=_or_none(bumper),
+            roof=_or_none(roof),
+            fused=_or_none(fused),
+            radar_pre=_or_none(radar_pre),
+            radar_lane=_or_none(radar_lane),
+            radar_velocity=_or_none(radar_velocity),
+            radar_points=radar_points,
+            v_target=cruise_kmh / 3.6,
             light_distance=light.distance,
             light_state=light.state,
             light_source=light.source if self.assists else None,
-            light_stop=s.stop_distance is not None,
+            light_stop=stopping,
             hsv=hsv,
-            lane_offset=view.ego.offset if view.ego is not None else None,
-            yaw_error=view.yaw_error if view.ego is not None else None,
-            curvature=view.curvature if view.ego is not None else None,
-            resume_timer=self.resume.timer,
+            lane_offset=None if ego is None else ego.offset,
+            yaw_error=None if ego is None else view.yaw_error,
+            curvature=None if ego is None else view.curvature,
+            resume_timer=None if resume_ticks < 0 else resume_ticks * self.config.dt,
         )
 
 
-def _lead(sight: Sight, v: float) -> Lead | None:
-    """Returns the lead with its distance in m and time gap in s; None where nothing is detected."""
-    if sight.distance is None:
-        return None
-    confirmed = sight.confirmed or sight.status is DetectionStatus.RADAR_ACTIVE
-    return Lead(sight.distance, time_gap(sight.distance, v), confirmed)
-
-
-# Speed caps: the limiter and the cap after a stop at a light (A-172 to A-178).
-
-
-class ResumeProtocol:
-    """Counts from the last stop at a light; its end is a time, or the end of the first curve."""
-
-    def __init__(self, dt: float, end: ResumeEnd) -> None:
-        self.dt, self.end = dt, end
-        self.duration = ticks_to_reach(RESUME_DURATION, dt)
-        self.reset()
-
-    def reset(self) -> None:
-        """Resets the protocol to no stop and no curve."""
-        self.ticks: int | None = None
-        self.in_curve = self.past_curve = False
-
-    @property
-    def timer(self) -> float | None:
-        """Seconds since the last tick at a stop; None: no stop yet, and none after `reset`."""
-        return None if self.ticks is None else self.ticks * self.dt
-
-    @property
-    def active(self) -> bool:
-        """Whether the cap after a stop holds, for a time or until the first curve ends (A-174, A-176)."""
-        if self.ticks is None:
-            return False
-        if self.ticks < self.duration:
-            return True
-        return self.end is ResumeEnd.FIRST_CURVE and not self.past_curve
-
-    def update(self, stop_requested: bool, v_kmh: float, curvature: float) -> None:
-        """Takes in one tick; the count starts anew in each at a requested stop below STOPPED_BELOW_KMH.
-
-        curvature: of the ego's lane in 1/m.
-        """
-        if stop_requested and v_kmh < STOPPED_BELOW_KMH:
-            self.ticks, self.in_curve, self.past_curve = 0, False, False
-        elif self.ticks is not None:
-            self.ticks += 1
-            bends = abs(curvature) > CURVE
-            self.past_curve = self.past_curve or (self.in_curve and not bends)
-            self.in_curve = bends
-
-
-class SpeedCaps:
-    """The speeds in km/h that cruise aims at and that following may not accelerate beyond."""
-
-    def __init__(
-        self, functions: Functions, v_cruise_kmh: float, v_limiter_kmh: float, scope: CapScope
-    ) -> None:
-        self.limiter = v_limiter_kmh if Function.LIMITER in functions else inf
-        self.v_cruise_kmh = min(v_cruise_kmh, self.limiter)
-        self.resumes = {Function.TLA, Function.RESUME} <= functions
-        self.scope = scope
-
-    def _resume(self, resume_active: bool) -> float:
-        """Returns the speed cap in km/h while resuming; inf where there is none."""
-        return RESUME_KMH if self.resumes and resume_active else inf
-
-    def cruise_kmh(self, resume_active: bool) -> float:
-        """Returns the target in km/h of cruise without a lead (A-135, A-174)."""
-        return min(self.v_cruise_kmh, self._resume(resume_active))
-
-    def following_kmh(self, resume_active: bool) -> float:
-        """Returns the km/h above which following gives no throttle; inf: no cap (A-129, A-178)."""
-        if self.scope is CapScope.CRUISE:
-            return inf
-        return min(self.limiter, self._resume(resume_active))
+def _or_none(value: float) -> float | None:
+    """Returns a number of a kernel, None for NaN."""
+    return value if value == value else None

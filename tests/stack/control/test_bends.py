@@ -13,8 +13,8 @@ from skidpad.core.run import AdasDriver, Function, Roads, RunSpec
 from skidpad.core.vocabulary import SensorLevel, Tier
 from skidpad.roads.bundled import load_map
 from skidpad.stack.adas import AdasStack
-from skidpad.stack.control.bends import BendSpeed, bend_speed, slow_for_bend, speed_before
-from skidpad.stack.control.tiers import Request
+from skidpad.stack.control.bends import BendSpeed, bend_speed, speed_before
+from support.stack_parts import Request, slow_for_bend
 from support.stackfakes import SPECS, ArcMap, ego_at, frame
 
 

@@ -14,7 +14,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.settings.parts import Settings
 from skidpad.core.settings.stack import CapScope, Lookahead, ResumeEnd, StackSettings
 from skidpad.core.vocabulary import Tier
-from skidpad.stack.adas import AdasStack, ResumeProtocol, SpeedCaps
+from skidpad.stack.adas import AdasStack
 from skidpad.stack.configurations import functions_of
 from skidpad.stack.control.steering import (
     LaneCentring,
@@ -26,6 +26,7 @@ from skidpad.stack.control.steering import (
     steering_of,
 )
 from skidpad.stack.perception.lane_view import FirstBranchRoute, HighwayRoute, LaneTracker
+from support.stack_parts import ResumeProtocol, speed_caps
 from support.stackfakes import LANE_WIDTH, RED, SPECS, ArcMap, Car, ego_at, frame
 
 approx = pytest.approx
@@ -229,12 +230,14 @@ def test_spatial_cap_ends_behind_the_first_curve():
     [(0, 150, 150, inf), (1, 150, 150, inf), (2, 150, 150, inf), (3, 150, 80, 80), (4, 80, 80, 80)],
 )
 def test_caps_by_configuration(configuration, free, resuming, following):
-    caps = SpeedCaps(functions_of(configuration), 150.0, 80.0, CapScope.GLOBAL)
-    assert (caps.cruise_kmh(False), caps.cruise_kmh(True)) == (free, resuming)
-    assert caps.following_kmh(True) == following
-    cruise_only = SpeedCaps(functions_of(configuration), 150.0, 80.0, CapScope.CRUISE)
-    assert cruise_only.following_kmh(True) == inf
-    assert cruise_only.cruise_kmh(True) == resuming
+    functions = functions_of(configuration)
+
+    def caps(resuming, scope=CapScope.GLOBAL):
+        return speed_caps(functions, 150.0, 80.0, scope, resuming)
+
+    assert caps(False)[0] == free
+    assert caps(True) == (resuming, following)
+    assert caps(True, CapScope.CRUISE) == (resuming, inf)
 
 
 @pytest.mark.req("A-178")

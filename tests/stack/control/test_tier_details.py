@@ -20,9 +20,18 @@ from skidpad.stack.configurations import (
     functions_of,
     parse_functions,
 )
-from skidpad.stack.control.pid import DISTANCE_GAINS, SPEED_GAINS, Pid
+from skidpad.stack.control.pid import DISTANCE_GAINS, SPEED_GAINS
 from skidpad.stack.control.text import LABELS, mode_text
-from skidpad.stack.control.tiers import Hierarchy, Lead, Request, Situation, time_gap, zones
+from support.interpreted import interpret
+from support.stack_parts import (
+    Hierarchy,
+    Lead,
+    Pid,
+    Request,
+    situation_of,
+    time_gap,
+    zones,
+)
 from support.stackfakes import GREEN, RED, SPECS, ArcMap, Car, ego_at, frame
 
 approx = pytest.approx
@@ -31,7 +40,7 @@ approx = pytest.approx
 def situation(v_kmh, distance=None, stop=None, confirmed=True, cap=1e9, cruise=150.0):
     v = v_kmh / 3.6
     lead = None if distance is None else Lead(distance, time_gap(distance, v), confirmed)
-    return Situation(v, v_kmh, lead, stop, cruise, cap)
+    return situation_of(v, v_kmh, lead, stop, cruise, cap)
 
 
 def hierarchy(configuration=4, **settings):
@@ -390,15 +399,16 @@ def test_functions_are_switched_while_driving():
 @pytest.mark.req("A-117")
 def test_emergency_begins_below_0_75_s():
     for gap, tier in ((0.74, Tier.EMERGENCY), (0.76, Tier.ACC_CLOSE)):
-        s = Situation(20.0, 72.0, Lead(20.0 * gap, gap, True), None, 150.0, 1e9)
+        s = situation_of(20.0, 72.0, Lead(20.0 * gap, gap, True), None, 150.0, 1e9)
         assert decide(s).tier is tier
 
 
 @pytest.mark.req("A-121")
 def test_approach_is_never_slower_than_1_5_m_s():
     """The floor shows where the hold does not: effective 2 m asks for more, so shorten the hold."""
-    alone = Hierarchy(frozenset({Function.TLA}), StackSettings(), 0.05)
     with pytest.MonkeyPatch.context() as patch:
+        interpret(patch)
+        alone = Hierarchy(frozenset({Function.TLA}), StackSettings(), 0.05)
         patch.setattr("skidpad.stack.control.tiers.LEAD_HOLD", 0.1)
         for v, throttle in ((1.45, 0.2), (1.55, 0.0)):
             r = alone.decide(situation(3.6 * v, 30.0, stop=0.3))

@@ -7,10 +7,10 @@ import pytest
 from skidpad.core.settings.stack import StackSettings
 from skidpad.core.vocabulary import Tier
 from skidpad.stack.configurations import functions_of
-from skidpad.stack.control.pid import DISTANCE_GAINS, SPEED_GAINS, Pid
+from skidpad.stack.control.pid import DISTANCE_GAINS, SPEED_GAINS
 from skidpad.stack.control.steering import lookahead_distance, steer_command, steering_gain
-from skidpad.stack.control.tiers import Hierarchy, Lead, Situation, time_gap, zones
 from skidpad.stack.timing import ticks_to_reach, ticks_within
+from support.stack_parts import Hierarchy, Lead, Pid, situation_of, time_gap, zones
 
 approx = pytest.approx
 
@@ -18,7 +18,7 @@ approx = pytest.approx
 def situation(v_kmh, distance=None, stop=None, confirmed=True, cap=1e9):
     v = v_kmh / 3.6
     lead = None if distance is None else Lead(distance, time_gap(distance, v), confirmed)
-    return Situation(v, v_kmh, lead, stop, 150.0, cap)
+    return situation_of(v, v_kmh, lead, stop, 150.0, cap)
 
 
 def decide(s, configuration=4):
@@ -69,7 +69,8 @@ def test_zones(gap, throttle, brake):
 @pytest.mark.req("A-117", "A-118", "A-140")
 def test_emergency_brake_values_and_configuration_zero():
     at = [
-        decide(Situation(10.0, 36.0, Lead(20.0, g, True), None, 150.0, 1e9)) for g in (0.7499, 0.7)
+        decide(situation_of(10.0, 36.0, Lead(20.0, g, True), None, 150.0, 1e9))
+        for g in (0.7499, 0.7)
     ]
     assert [r.brake for r in at] == approx([0.9002, 1.0])
     assert decide(situation(36.0, 5.5), configuration=0).tier is Tier.CRUISE

@@ -11,20 +11,13 @@ from hypothesis import strategies as st
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import CameraImage
+from skidpad.core.settings.stack import StackSettings
 from skidpad.core.specs import CameraSpec
-from skidpad.stack.perception.fusion import (
-    CameraPair,
-    MedianFilter,
-    RateFilter,
-    Verification,
-    bumper_corridor,
-    camera_pair,
-    fuse,
-    roof_corridor,
-)
+from skidpad.stack.configurations import functions_of
+from skidpad.stack.perception.front import Cameras
+from skidpad.stack.perception.fusion import CameraPair, camera_pair, roof_corridor
+from support.stack_parts import MedianFilter, RateFilter, confirm, fuse, read_pair
 from support.stackfakes import (
-    BUMPER_DEPTH,
-    BUMPER_SEMANTIC,
     ROOF_DEPTH,
     ROOF_SEMANTIC,
     SPECS,
@@ -33,8 +26,8 @@ from support.stackfakes import (
 )
 
 approx = pytest.approx
-BUMPER = CameraPair(BUMPER_DEPTH, BUMPER_SEMANTIC, bumper_corridor(BUMPER_SEMANTIC))
-ROOF = CameraPair(ROOF_DEPTH, ROOF_SEMANTIC, roof_corridor(ROOF_SEMANTIC))
+CAMERAS = Cameras(SPECS, functions_of(2), StackSettings())
+BUMPER, ROOF = CAMERAS.bumper, CAMERAS.roof
 
 
 @pytest.mark.req("A-055", "A-056", "A-057", "A-058")
@@ -113,11 +106,11 @@ def test_no_image_yet_is_no_target():
         {"depth_roof": CameraImage(), "semantic_roof": CameraImage()},
         {"depth_roof": CameraImage()},
     ):
-        assert ROOF.read(replace(empty, segments={}, images=images), 0.0, 0.0) is None
+        assert read_pair(ROOF, replace(empty, segments={}, images=images)) is None
     one_is_late = frame(cars=[Car(20.0)], level="pixels")
     images = {k: v for k, v in one_is_late.images.items() if k != "semantic_bumper"}
-    assert BUMPER.read(replace(one_is_late, images=images), 0.0, 0.0) is None
-    assert BUMPER.read(one_is_late, 0.0, 0.0) == approx(20.0, rel=1e-6)
+    assert read_pair(BUMPER, replace(one_is_late, images=images)) is None
+    assert read_pair(BUMPER, one_is_late) == approx(20.0, rel=1e-6)
 
 
 def test_cameras_of_a_pair_must_fit():
@@ -144,7 +137,7 @@ def test_cameras_of_a_pair_must_fit():
     ],
 )
 def test_verification_asks_for_vehicle_pixels_near_the_distance(level, cars, reported, answer):
-    found = Verification(BUMPER, ROOF).confirm(frame(cars=cars, level=level), reported, 0.0, 0.0)
+    found = confirm(CAMERAS, frame(cars=cars, level=level), reported)
     assert found == answer
 
 
@@ -153,8 +146,8 @@ def test_roof_verifies_without_its_minimum_depth_when_the_bumper_is_blind():
     seen = frame(cars=[Car(4.0)], level="pixels")
     roof_only = {k: v for k, v in seen.images.items() if "roof" in k}
     blind = replace(seen, images=roof_only)
-    assert Verification(BUMPER, ROOF).confirm(blind, 4.0, 0.0, 0.0) == (True, "roof")
-    assert ROOF.read(blind, 0.0, 0.0) is None  # as a tier it starts at 10 m
+    assert confirm(CAMERAS, blind, 4.0) == (True, "roof")
+    assert read_pair(ROOF, blind) is None  # as a tier it starts at 10 m
 
 
 @pytest.mark.req("A-055", "A-057")
@@ -163,8 +156,8 @@ def test_roof_verifies_without_its_minimum_depth_when_the_bumper_is_blind():
 def test_segments_read_as_the_pixels_that_they_stand_for(gap, left):
     cars = [Car(gap, left), Car(gap + 20.0, -left, label=15)]
     for pair in (BUMPER, ROOF):
-        pixels = pair.read(frame(cars=cars, level="pixels"), 0.0, 0.0)
-        segments = pair.read(frame(cars=cars), 0.0, 0.0)
+        pixels = read_pair(pair, frame(cars=cars, level="pixels"))
+        segments = read_pair(pair, frame(cars=cars))
         assert (pixels is None) is (segments is None)
         if pixels is not None:
             assert segments == approx(pixels, rel=1e-5)
@@ -187,7 +180,7 @@ def test_a_tier_reads_the_tenth_percentile(pair, nearest):
         pair.depth_id: CameraImage(inverse_depth=inverse),
         pair.semantic_id: CameraImage(labels=labels),
     }
-    found = pair.read(replace(frame(), segments={}, images=images), 0.0, 0.0)
+    found = read_pair(pair, replace(frame(), segments={}, images=images))
     expected = np.percentile([depth[row, middle] for row in rows], 10)
     assert found == approx(expected, rel=1e-5)
 
@@ -195,4 +188,4 @@ def test_a_tier_reads_the_tenth_percentile(pair, nearest):
 @pytest.mark.req("A-062")
 def test_rate_filter_lasts_0_17_s():
     f = RateFilter(0.001)
-    assert f.history.maxlen == 170
+    assert len(f.history) == 170

@@ -11,9 +11,7 @@ from hypothesis import strategies as st
 from skidpad.core.settings.stack import RadarCloseCheck
 from skidpad.core.vocabulary import DetectionStatus, Tier
 from skidpad.stack.adas import AdasStack
-from skidpad.stack.perception.fusion import MedianFilter
-from skidpad.stack.perception.persistence import NOTHING_DETECTED, Persistence
-from skidpad.stack.perception.radar import NO_RADAR, RadarReading
+from support.stack_parts import NO_RADAR, MedianFilter, Persistence, RadarReading
 from support.stackfakes import SPECS, ArcMap, Car, ego_at, frame
 
 approx = pytest.approx
@@ -27,7 +25,10 @@ NO, SEEN, HELD, RADAR, SAFE = (
 
 
 def persistence(dt=0.05, gate=60.0, check=RadarCloseCheck.BUMPER, safety=False, rejected=False):
-    return Persistence(dt, gate, check, safety, rejected)
+    return Persistence(
+        dt, detection_gate=gate, radar_close_check=check, safety_persist=safety,
+        rejected_stays_active=rejected,
+    )  # fmt: skip
 
 
 def at(distance, lane=True):
@@ -58,8 +59,7 @@ def test_status_words():
     assert {s.name for s in DetectionStatus} == {
         "NO_TARGET", "FUSION_DETECT", "FUSION_PERSIST", "RADAR_ACTIVE", "SAFETY_PERSIST",
     }  # fmt: skip
-    assert persistence().update(None, None, NO_RADAR) == NOTHING_DETECTED
-    assert NOTHING_DETECTED == (NO, None)
+    assert persistence().update(None, None, NO_RADAR) == (NO, None)
 
 
 @pytest.mark.req("A-087", "A-088")
@@ -238,7 +238,7 @@ def test_a_phantom_of_one_or_two_ticks_never_reaches_the_controller(length, leve
         stack.tick(frame(k, cars, ego_at(v=20.0), level=level))
         assert stack.report.tier is Tier.CRUISE
         assert not stack.report.detected
-    assert stack.front.persistence.seen_ticks == 0
+    assert stack.memory["seen_ticks"] == 0
 
 
 @pytest.mark.req("A-088", "A-091", "A-095", "A-097", "A-100")

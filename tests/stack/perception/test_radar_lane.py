@@ -13,26 +13,27 @@ from skidpad.roads.bundled import load_map
 from skidpad.stack.adas import AdasStack
 from skidpad.stack.perception.lane_view import HighwayRoute, LaneTracker, LaneView
 from skidpad.stack.perception.radar import (
-    FIRST_VELOCITY_LIMIT,
     HALF_WIDTH,
     MOUNT,
-    NO_RADAR,
     PARABOLA_HALF_WIDTH,
-    AnyPoint,
-    LaneMatch,
-    Radar,
+    RadarRules,
+    first_in_lane,
     velocity_limit,
 )
+from support.stack_parts import NO_RADAR, place_of, read_radar
 from support.stackfakes import LANE_WIDTH, SPECS, ArcMap, Car, ego_at, frame, radar_points
 
 approx = pytest.approx
 STRAIGHT = LaneView(None, None, 0.0, 0.0)
+MAP = ArcMap()
+NOWHERE = np.zeros(len(MAP.lanes.road), np.bool_)
 
 
 def prefilter(*points, v=20.0, view=STRAIGHT, tracking=False, half_width=HALF_WIDTH):
     """Nearest point that passes, with its number of companions; no lane check."""
-    radar = Radar(AnyPoint(), half_width, nearest_only=False)
-    return radar.update(radar_points(*points), Pose(0.0, 0.0), v, view, tracking)
+    rules = RadarRules(True, half_width, by_map=False, nearest_only=False)
+    at = place_of(Pose(0.0, 0.0), v, view)
+    return read_radar(rules, radar_points(*points), at, MAP, NOWHERE, tracking)
 
 
 def passes(*point, **options):
@@ -85,7 +86,7 @@ def test_keeps_altitudes_in_radians(altitude, kept):
 
 @pytest.mark.req("A-071", "A-074")
 def test_velocity_limit_is_that_of_standing_objects():
-    assert FIRST_VELOCITY_LIMIT == Radar(AnyPoint(), 4.0, False).velocity_limit == -15.6
+    assert AdasStack(SPECS, ArcMap(), {}).memory["velocity_limit"] == -15.6
     assert [velocity_limit(v) for v in (0.0, 20.0, 35.0)] == approx([0.5, -19.5, -34.5])
     v = 150 / 3.6  # the floor also rejects slow vehicles here (D-033)
     assert velocity_limit(v) == -35.0
@@ -124,16 +125,13 @@ def test_tracking_begins_the_tick_after_vision_confirmed():
 
 @pytest.mark.req("A-066", "A-075")
 def test_each_measurement_stands_alone():
-    radar = Radar(AnyPoint(), HALF_WIDTH, nearest_only=False)
     far, near, side = (50.0, 0.0, 0.0, -4.0), (30.0, 0.01, 0.0, -6.0), (30.0, 0.5, 0.0, 0.0)
 
-    def measure(*points):
-        return radar.update(radar_points(*points), Pose(0.0, 0.0), 20.0, STRAIGHT, False)
-
+    measure = prefilter
     two = measure(far, side, near)
     assert (two.pre, two.lane, two.velocity, two.points) == (30.0, 30.0, -6.0, 2)
-    assert measure() is NO_RADAR
-    assert measure(side) is NO_RADAR
+    assert measure() == NO_RADAR
+    assert measure(side) == NO_RADAR
     assert measure(far).pre == 50.0
     many = [(20.0 + 0.1 * i, 0.0, 0.0, -1.0) for i in range(400)]
     assert measure(*many[::-1]).points == 400
@@ -141,9 +139,9 @@ def test_each_measurement_stands_alone():
 
 
 def lane_match(map, pose, r, azimuth=0.0):
-    view = LaneTracker(map, HighwayRoute()).update(pose)
-    points = radar_points((r, azimuth, 0.0, 0.0))
-    return LaneMatch(map)(points, np.zeros(1, np.int64), pose, view) == 0
+    tracker = LaneTracker(map, HighwayRoute())
+    points, here = radar_points((r, azimuth, 0.0, 0.0)), place_of(pose, 0.0, tracker.update(pose))
+    return first_in_lane(map.held, tracker.on_highway, points, np.zeros(1, np.int64), here) == 0
 
 
 @pytest.mark.req("A-076")
@@ -216,13 +214,13 @@ LEFT = float(np.arcsin(LANE_WIDTH / 30.0))
 @pytest.mark.req("A-082")
 def test_all_points_are_matched_and_the_nearest_in_the_lane_counts():
     map, points = ArcMap(), radar_points((30.0, LEFT, 0.0, -3.0), (50.0, 0.0, 0.0, -5.0))
-    view = LaneTracker(map, HighwayRoute()).update(Pose(0.0, 0.0))
-    both = Radar(LaneMatch(map), HALF_WIDTH, nearest_only=False)
-    reading = both.update(points, Pose(0.0, 0.0), 20.0, view, False)
+    tracker = LaneTracker(map, HighwayRoute())
+    here = place_of(Pose(0.0, 0.0), 20.0, tracker.update(Pose(0.0, 0.0)))
+    both = RadarRules(True, HALF_WIDTH, by_map=True, nearest_only=False)
+    reading = read_radar(both, points, here, map, tracker.on_highway)
     assert (reading.pre, reading.lane, reading.velocity) == approx((30.0, 50.0, -5.0))
-    nearest = Radar(LaneMatch(map), HALF_WIDTH, nearest_only=True)
-    reading = nearest.update(points, Pose(0.0, 0.0), 20.0, view, False)
-    assert (reading.pre, reading.lane, reading.velocity) == approx((30.0, None, -3.0))
+    reading = read_radar(both._replace(nearest_only=True), points, here, map, tracker.on_highway)
+    assert (reading.pre, reading.lane, reading.velocity) == (30.0, None, -3.0)
 
 
 def status_of(settings, radar, cars=()):
@@ -329,7 +327,7 @@ def is_in_lane(map, pose, view, r, azimuth):
 def test_kernel_finds_the_point_that_the_map_s_own_answers_name(name):
     """Places all over the map, beside the highway, before forks and at ends of roads."""
     map, rng, found = load_map(name), np.random.default_rng(7), []
-    match, tracker = LaneMatch(map), LaneTracker(map, HighwayRoute())
+    tracker = LaneTracker(map, HighwayRoute())
     for _ in range(250):
         lane = int(rng.integers(len(map.lanes.road)))
         at = map.at(lane, float(rng.uniform(0.0, map.lanes.length[lane])))
@@ -343,6 +341,7 @@ def test_kernel_finds_the_point_that_the_map_s_own_answers_name(name):
             for k in range(4)
             if is_in_lane(map, pose, view, float(points.range[k]), float(points.azimuth[k]))
         ]
-        found.append(match(points, np.arange(4), pose, view))
+        here = place_of(pose, 0.0, view)
+        found.append(first_in_lane(map.held, tracker.on_highway, points, np.arange(4), here))
         assert found[-1] == (inside[0] if inside else -1)
     assert {-1, 0, 1} <= set(found)

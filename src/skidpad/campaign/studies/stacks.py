@@ -51,7 +51,8 @@ class Coastless(Changed):
         self, specs: Sequence[SensorSpec], map: RoadMap, settings: Mapping[str, Any]
     ) -> None:
         super().__init__(specs, map, settings)
-        self.stack.hierarchy.cruise.coast_ticks = 0
+        rules = self.stack.rules
+        self.stack.follow_rules(rules._replace(tiers=rules.tiers._replace(coast_ticks=0)))
 
 
 class Handbraked(Changed):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from math import atan2
+from math import atan2, nan
 from statistics import median
 from typing import Any
 
@@ -25,13 +25,15 @@ from skidpad.core.settings.stack import StackSettings
 from skidpad.core.setup import DT
 from skidpad.core.specs import SensorSpec
 from skidpad.core.states import StackReport, VehicleCommand
+from skidpad.core.vocabulary import Tier
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.camera.codes import AHEAD, Label, mosaic
 from skidpad.stack.camera.eyes import CAMERAS, images_of
 from skidpad.stack.camera.network import read_mosaic
 from skidpad.stack.control.bends import bend_speed, slow_for_bend
 from skidpad.stack.control.steering import Smoothing, lookahead_distance, steer_command
-from skidpad.stack.control.tiers import Hierarchy, Lead, Situation, time_gap
+from skidpad.stack.control.tiers import Situation, begin_tiers, decide, tier_rules, time_gap
+from skidpad.stack.memory import new_memory
 
 CRUISE_KMH = 80.0
 SAMPLES = 5  # of which the median counts, as in the published fusion
@@ -56,7 +58,8 @@ class CameraDriver:
             require_choice("camera driver option", key, ("cruise_kmh",))
         self.cruise_kmh = float(settings.get("cruise_kmh", CRUISE_KMH))
         require_range("cruise_kmh", self.cruise_kmh, 1.0, 400.0)
-        self.hierarchy = Hierarchy(FUNCTIONS, StackSettings(), DT)
+        self.tiers, self.memory = tier_rules(FUNCTIONS, StackSettings(), DT), new_memory()
+        begin_tiers(self.memory[0], self.tiers)
         self.smoothing = Smoothing(DT)
         self.gaps: deque[float | None] = deque(maxlen=SAMPLES)
         self.offsets: Floats | None = None
@@ -79,16 +82,19 @@ class CameraDriver:
         bend = curvature(offsets)
         allowed = bend_speed(bend)
         cruise = min(self.cruise_kmh, kmh_from_mps(allowed))
-        lead = None if gap is None else Lead(gap, time_gap(gap, v), confirmed=True)
-        request = self.hierarchy.decide(
-            Situation(v, kmh_from_mps(v), lead, None, cruise_kmh=cruise, follow_cap_kmh=cruise)
+        distance = nan if gap is None else gap
+        seconds = time_gap(distance, v)
+        request = decide(
+            self.memory[0],
+            self.tiers,
+            Situation(v, kmh_from_mps(v), distance, seconds, True, nan, cruise, cruise),
         )
         request = slow_for_bend(request, v, allowed)
         self.report = StackReport(
-            tier=request.tier,
+            tier=Tier(request.tier),
             detected=gap is not None,
             distance=gap,
-            time_gap=None if lead is None else lead.gap,
+            time_gap=None if gap is None else seconds,
             v_target=cruise / 3.6,
             curvature=bend,
         )

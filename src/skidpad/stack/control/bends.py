@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from math import inf, sqrt
 
-from skidpad.core.vocabulary import Tier
-from skidpad.stack.control.tiers import Request, clip, stopping_speed
+from skidpad.core.kernels.jit import kernel
+from skidpad.stack.control.tiers import BEND, Request, clip, stopping_speed
 from skidpad.stack.timing import ticks_to_reach
 
 # Lateral acceleration: of 2, 3 and 4 m/s^2 on a test track, 28 drivers often called the first too
@@ -59,11 +59,12 @@ class BendSpeed:
         return self.allowed
 
 
+@kernel
 def slow_for_bend(request: Request, v: float, v_allowed: float) -> Request:
     """Returns the request, or braking for a bend where that is harder; no throttle above v_allowed (m/s)."""
     if v <= v_allowed:
         return request
     brake = clip((v - v_allowed) / BRAKE_SPAN, 0.0, BRAKE_MAX)
     if brake > request.brake:
-        return Request(Tier.BEND, brake=brake)
-    return request._replace(throttle=0.0)
+        return Request(BEND, 0.0, brake, False)
+    return Request(request.tier, 0.0, request.brake, request.handbrake)

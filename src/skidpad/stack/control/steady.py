@@ -6,6 +6,8 @@ of 1 m/s^2 outweighs an error of 2 km/h, so that full throttle and brake take tu
 
 from __future__ import annotations
 
+from skidpad.core.kernels.jit import kernel
+
 # Ours. With 2.5 to 5 m/s^2 at full throttle the closed loop has 0.3 to 0.5 rad/s and a damping of 0.8
 # or more; a steady grade or wind is made up for within about 5 s.
 THROTTLE_GAIN = 0.06  # per km/h
@@ -14,23 +16,15 @@ COAST_BAND = 2.0  # km/h too fast, within which the engine's drag is brake enoug
 BRAKE_GAIN = 0.04  # per km/h beyond that
 
 
-class SteadySpeed:
-    """State: the integral, a share of throttle that holds the speed without error."""
+@kernel
+def hold_speed(dt: float, integral: float, error: float) -> tuple[float, float]:
+    """Returns throttle if positive, brake if negative, and the integral: the throttle that needs no error.
 
-    def __init__(self, dt: float) -> None:
-        self.dt = dt
-        self.reset()
-
-    def reset(self) -> None:
-        """Forgets what was learnt about wind and grade."""
-        self.integral = 0.0
-
-    def update(self, error: float) -> float:
-        """Returns throttle if positive, brake if negative, for an error wanted minus driven in km/h."""
-        if error < -COAST_BAND:
-            self.integral = max(self.integral + INTEGRAL_GAIN * error * self.dt, 0.0)
-            return BRAKE_GAIN * (error + COAST_BAND)
-        integral = self.integral + INTEGRAL_GAIN * error * self.dt
-        if 0.0 <= THROTTLE_GAIN * error + integral <= 1.0:  # no wind-up at the limits
-            self.integral = integral
-        return min(max(THROTTLE_GAIN * error + self.integral, 0.0), 1.0)
+    error: wanted minus driven speed in km/h.
+    """
+    summed = integral + INTEGRAL_GAIN * error * dt
+    if error < -COAST_BAND:
+        return BRAKE_GAIN * (error + COAST_BAND), max(summed, 0.0)
+    if 0.0 <= THROTTLE_GAIN * error + summed <= 1.0:  # no wind-up at the limits
+        integral = summed
+    return min(max(THROTTLE_GAIN * error + integral, 0.0), 1.0), integral

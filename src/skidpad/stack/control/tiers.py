@@ -1,13 +1,14 @@
 """The seven tiers: an ordered list of rules of which the first that makes a request wins.
 
-Distances in m, speeds in m/s unless the name says km/h. The rules know nothing of sensors.
+Distances in m, speeds in m/s unless the name says km/h. The rules know nothing of sensors. NaN: none.
 """
 
 from __future__ import annotations
 
-from math import sqrt
-from typing import NamedTuple, Protocol
+from math import isnan, sqrt
+from typing import NamedTuple
 
+from skidpad.core.kernels.jit import kernel
 from skidpad.core.run import Function
 from skidpad.core.settings.stack import (
     CruiseLaw,
@@ -18,8 +19,9 @@ from skidpad.core.settings.stack import (
 )
 from skidpad.core.vocabulary import Tier
 from skidpad.stack.configurations import Functions
-from skidpad.stack.control.pid import DISTANCE_GAINS, SPEED_GAINS, Pid
-from skidpad.stack.control.steady import SteadySpeed
+from skidpad.stack.control.pid import DISTANCE_GAINS, SPEED_GAINS, regulate
+from skidpad.stack.control.steady import hold_speed
+from skidpad.stack.memory import Record
 from skidpad.stack.timing import ticks_to_reach
 
 V_GAP_MIN = 0.1  # m/s, divisor of the time gap (A-110)
@@ -67,27 +69,14 @@ COAST_ABOVE_KMH = 15.0  # km/h (A-134)
 COAST_BRAKE = 0.10  # (A-134)
 CRUISE_BRAKE_MAX = 0.2  # (A-135)
 
+(
+    NONE, HARD_STOP, STOPPED_TOO_CLOSE, EMERGENCY, STOPPED_BEHIND_CAR, APPROACH, ACC_HOLD, ACC_OPEN,
+    ACC_CLOSE, LIGHT_STOP, HOLDING_AT_LINE, COAST, CRUISE, BEND,
+) = map(int, Tier)  # fmt: skip
 # Modes after which the car coasts before it accelerates again (A-136).
-COASTED_FROM = frozenset(
-    {
-        Tier.HARD_STOP,
-        Tier.STOPPED_TOO_CLOSE,
-        Tier.EMERGENCY,
-        Tier.STOPPED_BEHIND_CAR,
-        Tier.ACC_HOLD,
-        Tier.ACC_OPEN,
-        Tier.ACC_CLOSE,
-    }
-)
-RESET_BY = frozenset({Tier.HARD_STOP, Tier.EMERGENCY})  # (A-109)
-
-
-class Lead(NamedTuple):
-    """Holds the detected target ahead, and whether it is sure."""
-
-    distance: float
-    gap: float  # s, time gap
-    confirmed: bool  # seen for long enough, or by radar
+COASTED_FROM = (
+    HARD_STOP, STOPPED_TOO_CLOSE, EMERGENCY, STOPPED_BEHIND_CAR, ACC_HOLD, ACC_OPEN, ACC_CLOSE,
+)  # fmt: skip
 
 
 class Situation(NamedTuple):
@@ -95,8 +84,10 @@ class Situation(NamedTuple):
 
     v: float
     v_kmh: float
-    lead: Lead | None
-    stop_distance: float | None  # to the line where the light assist wants to stop
+    distance: float  # to the detected target ahead
+    gap: float  # s, time gap to it
+    confirmed: bool  # seen for long enough, or by radar
+    stop_distance: float  # to the line where the light assist wants to stop
     cruise_kmh: float
     follow_cap_kmh: float  # following gives no throttle above it
 
@@ -104,288 +95,236 @@ class Situation(NamedTuple):
 class Request(NamedTuple):
     """What a rule wants; every request starts from a fresh control (A-112)."""
 
-    tier: Tier
-    throttle: float = 0.0
-    brake: float = 0.0
-    handbrake: bool = False
+    tier: int  # Tier, or -1: the rule leaves it to the next one
+    throttle: float
+    brake: float
+    handbrake: bool
 
 
-NO_ACTION = Request(Tier.NONE)
+PASSED = Request(-1, 0.0, 0.0, False)
+NO_ACTION = Request(NONE, 0.0, 0.0, False)
 
 
-class SpeedControl(Protocol):
-    """Holds a speed: what any speed controller offers."""
+class TierRules(NamedTuple):
+    """Which tiers a stack has, and what they do where the sources leave a choice."""
 
-    def reset(self) -> None:
-        """Resets what the controller has summed up."""
-        ...
-
-    def update(self, error: float) -> float:
-        """Returns throttle if positive, brake if negative; error: wanted minus driven speed in km/h."""
-        ...
-
-
-class Rule(Protocol):
-    """Makes the request of one tier, or passes."""
-
-    def __call__(self, s: Situation) -> Request | None:
-        """Returns a request, or None to leave it to the next tier."""
-        ...
+    brakes: bool  # tiers 1 to 3: with ACC, or with emergency braking alone (A-140)
+    follows: bool  # tier 5
+    consumes: bool  # a target that is not confirmed ends the tick in tiers 1 and 3 (D-044)
+    by_distance: bool  # the distance PID follows, not the zones (D-039)
+    by_pid: bool  # the speed PID brakes before a line (D-047)
+    steady: bool  # smooth pedals hold the cruise speed
+    coast_ticks: int
+    dt: float  # s
 
 
+def tier_rules(functions: Functions, settings: StackSettings, dt: float) -> TierRules:
+    """Returns the tiers of a set of functions; dt: s, one tick."""
+    return TierRules(
+        brakes=bool(functions & {Function.ACC, Function.AEB}),
+        follows=Function.ACC in functions,
+        consumes=settings.unconfirmed is Unconfirmed.CONSUME,
+        by_distance=settings.follower is not Follower.ZONES,
+        by_pid=settings.light_braking is LightBraking.SPEED_PID,
+        steady=settings.cruise is CruiseLaw.STEADY,
+        coast_ticks=ticks_to_reach(COAST_DURATION, dt),
+        dt=dt,
+    )
+
+
+@kernel
 def clip(value: float, low: float, high: float) -> float:
     """Returns the value limited to [low, high]."""
     return min(max(value, low), high)
 
 
+@kernel
 def time_gap(distance: float, v: float) -> float:
     """Returns the s to cover a measured distance in m at the ego's speed, V_GAP_MIN at least (A-110)."""
     return distance / max(v, V_GAP_MIN)
 
 
+@kernel
 def stopping_speed(deceleration: float, distance: float) -> float:
     """Returns the m/s from which `deceleration` just stops within `distance` (eq. 17, A-170); 0 beyond it."""
     return sqrt(2.0 * deceleration * max(distance, 0.0))
 
 
-class HardStop:
-    """Tier 1: too close and moving (A-113). Returns `unconfirmed` before confirmation (D-044)."""
-
-    def __init__(self, unconfirmed: Request | None) -> None:
-        self.unconfirmed = unconfirmed
-
-    def __call__(self, s: Situation) -> Request | None:
-        """Returns full brake for a lead nearer than TOO_CLOSE; None for none and up to HARD_STOP_ABOVE_KMH.
-
-        `unconfirmed` for a lead that is not confirmed.
-        """
-        if s.lead is None or s.lead.distance >= TOO_CLOSE or s.v_kmh <= HARD_STOP_ABOVE_KMH:
-            return None
-        return Request(Tier.HARD_STOP, brake=1.0) if s.lead.confirmed else self.unconfirmed
-
-
-def low_speed_stop(s: Situation) -> Request | None:
-    """Returns tier 2, full brake, when too close and slow; None else.
-
-    The target of a standing ego was verified before (A-114).
-    """
-    if s.lead is None or s.lead.distance >= TOO_CLOSE or s.v_kmh > HARD_STOP_ABOVE_KMH:
-        return None
-    return Request(Tier.STOPPED_TOO_CLOSE, brake=1.0)
-
-
-def needs_verification(s: Situation) -> bool:
+@kernel
+def needs_verification(rules: TierRules, distance: float, v_kmh: float) -> bool:
     """Returns whether tier 2 at creeping speed needs the cameras to say that the target is real (A-115)."""
-    return s.lead is not None and s.lead.distance < TOO_CLOSE and s.v_kmh <= CREEP_KMH
+    return rules.brakes and distance < TOO_CLOSE and v_kmh <= CREEP_KMH
 
 
-class Emergency:
-    """Tier 3: the time gap is too short (eq. 11, A-117)."""
-
-    def __init__(self, unconfirmed: Request | None) -> None:
-        self.unconfirmed = unconfirmed
-
-    def __call__(self, s: Situation) -> Request | None:
-        """Returns braking by urgency for a time gap below EMERGENCY_GAP, else None.
-
-        `unconfirmed` for a lead that is not confirmed.
-        """
-        if s.lead is None or s.lead.gap >= EMERGENCY_GAP:
-            return None
-        if not s.lead.confirmed:
-            return self.unconfirmed
-        urgency = (EMERGENCY_FULL_GAP - s.lead.gap) / EMERGENCY_SPAN
-        return Request(Tier.EMERGENCY, brake=clip(urgency, EMERGENCY_BRAKE_MIN, 1.0))
+@kernel
+def hard_stop(rules: TierRules, s: Situation) -> Request:
+    """Tier 1: returns full brake when too close and moving (A-113); by D-044 before confirmation."""
+    if s.distance < TOO_CLOSE and s.v_kmh > HARD_STOP_ABOVE_KMH:
+        if s.confirmed:
+            return Request(HARD_STOP, 0.0, 1.0, False)
+        return NO_ACTION if rules.consumes else PASSED
+    return PASSED
 
 
-class LeadAtLight:
-    """Tier 4: a red light behind a lead (A-119 to A-122)."""
-
-    def __init__(self) -> None:
-        self.reset()
-
-    def reset(self) -> None:
-        """Releases the hold behind a lead at a red light."""
-        self.holding = False
-
-    def __call__(self, s: Situation) -> Request | None:
-        """Returns a hold, or the approach to the nearer of lead and line; None without a red light or a lead.
-
-        A hold lasts until no stop is asked for.
-        """
-        if s.stop_distance is None:
-            self.holding = False
-            return None
-        if s.lead is None or s.stop_distance >= LEAD_LIGHT_RANGE:
-            return None
-        effective = min(s.lead.distance - STAND_OFF, s.stop_distance)
-        if effective < LEAD_HOLD or self.holding:
-            self.holding = True
-            return Request(
-                Tier.STOPPED_BEHIND_CAR, brake=1.0, handbrake=s.v_kmh < HANDBRAKE_BELOW_KMH
-            )
-        v_required = max(stopping_speed(LEAD_DECELERATION, effective), LEAD_V_MIN)
-        if s.v > v_required:
-            brake = clip((s.v - v_required) / LEAD_BRAKE_SPAN, LEAD_BRAKE_MIN, 1.0)
-            return Request(Tier.APPROACH, brake=brake)
-        return Request(Tier.APPROACH, throttle=LEAD_THROTTLE)
+@kernel
+def low_speed_stop(s: Situation) -> Request:
+    """Tier 2: returns full brake when too close and slow; a standing ego's target was verified (A-114)."""
+    if s.distance < TOO_CLOSE and s.v_kmh <= HARD_STOP_ABOVE_KMH:
+        return Request(STOPPED_TOO_CLOSE, 0.0, 1.0, False)
+    return PASSED
 
 
+@kernel
+def emergency(rules: TierRules, s: Situation) -> Request:
+    """Tier 3: returns braking by urgency for a short time gap (eq. 11, A-117); by D-044 if not confirmed."""
+    if s.gap < EMERGENCY_GAP:
+        if s.confirmed:
+            urgency = (EMERGENCY_FULL_GAP - s.gap) / EMERGENCY_SPAN
+            return Request(EMERGENCY, 0.0, clip(urgency, EMERGENCY_BRAKE_MIN, 1.0), False)
+        return NO_ACTION if rules.consumes else PASSED
+    return PASSED
+
+
+@kernel
+def lead_at_light(m: Record, s: Situation) -> Request:
+    """Tier 4: returns a hold, or the approach to the nearer of lead and line (A-119 to A-122).
+
+    A hold lasts until no stop is asked for.
+    """
+    if isnan(s.stop_distance):
+        m.holding = False
+        return PASSED
+    if isnan(s.distance) or s.stop_distance >= LEAD_LIGHT_RANGE:
+        return PASSED
+    effective = min(s.distance - STAND_OFF, s.stop_distance)
+    if effective < LEAD_HOLD or m.holding:
+        m.holding = True
+        return Request(STOPPED_BEHIND_CAR, 0.0, 1.0, s.v_kmh < HANDBRAKE_BELOW_KMH)
+    v_required = max(stopping_speed(LEAD_DECELERATION, effective), LEAD_V_MIN)
+    if s.v > v_required:
+        brake = clip((s.v - v_required) / LEAD_BRAKE_SPAN, LEAD_BRAKE_MIN, 1.0)
+        return Request(APPROACH, 0.0, brake, False)
+    return Request(APPROACH, LEAD_THROTTLE, 0.0, False)
+
+
+@kernel
 def zones(gap: float) -> Request:
     """Returns the actuation of following for a time gap in s, by its error (A-124 to A-128)."""
     error = round(gap - TARGET_GAP, 9)  # 2.8 - 2.5 falls just short of 0.3 (A-128)
     if error >= DEAD_BAND:
         more = OPEN_THROTTLE_MORE * min(error / OPEN_SPAN, 1.0)
-        return Request(Tier.ACC_OPEN, throttle=OPEN_THROTTLE + more)
+        return Request(ACC_OPEN, OPEN_THROTTLE + more, 0.0, False)
     if error <= -DEAD_BAND:
         more = CLOSE_BRAKE_MORE * min(-error / CLOSE_SPAN, 1.0)
-        return Request(Tier.ACC_CLOSE, brake=CLOSE_BRAKE + more)
+        return Request(ACC_CLOSE, 0.0, CLOSE_BRAKE + more, False)
     if error > HOLD_MARGIN:
-        return Request(Tier.ACC_HOLD, throttle=HOLD_THROTTLE_OPENING)
+        return Request(ACC_HOLD, HOLD_THROTTLE_OPENING, 0.0, False)
     if error < -HOLD_MARGIN:
-        return Request(Tier.ACC_HOLD, brake=HOLD_BRAKE)
-    return Request(Tier.ACC_HOLD, throttle=HOLD_THROTTLE)
+        return Request(ACC_HOLD, 0.0, HOLD_BRAKE, False)
+    return Request(ACC_HOLD, HOLD_THROTTLE, 0.0, False)
 
 
-class Following:
-    """Tier 5: keep the time gap (A-123), by zones or by the distance PID (D-039)."""
+@kernel
+def following(m: Record, rules: TierRules, s: Situation) -> Request:
+    """Tier 5: returns throttle or brake that keep the time gap (A-123), no throttle above the cap (A-129).
 
-    def __init__(self, follower: Follower, distance_pid: Pid) -> None:
-        self.by_zones = follower is Follower.ZONES
-        self.pid = distance_pid
-
-    def __call__(self, s: Situation) -> Request | None:
-        """Returns throttle or brake by the gap, no throttle above the cap (A-129).
-
-        None without a lead in reach.
-        """
-        if s.lead is None or (s.lead.gap >= FOLLOW_GAP and s.lead.distance >= FOLLOW_DISTANCE):
-            return None
-        request = zones(s.lead.gap) if self.by_zones else self._by_distance(s, s.lead)
-        return request._replace(throttle=0.0) if s.v_kmh > s.follow_cap_kmh else request
-
-    def _by_distance(self, s: Situation, lead: Lead) -> Request:
-        """Returns throttle and brake that regulate the distance to TARGET_GAP in s of the own speed."""
-        u = self.pid.update(lead.distance - TARGET_GAP * s.v)
-        return zones(lead.gap)._replace(throttle=max(u, 0.0), brake=max(-u, 0.0))
-
-
-class LightStop:
-    """Tier 6: a red light without a lead in range (A-130 to A-133)."""
-
-    def __init__(self, braking: LightBraking, speed_pid: Pid) -> None:
-        self.by_pid = braking is LightBraking.SPEED_PID
-        self.pid = speed_pid
-
-    def __call__(self, s: Situation) -> Request | None:
-        """Returns what stops at the line, from approach to hold; None where no stop is asked for."""
-        d = s.stop_distance
-        if d is None:
-            return None
-        if d < LINE_HOLD:
-            return Request(Tier.HOLDING_AT_LINE, brake=1.0, handbrake=s.v_kmh < HANDBRAKE_BELOW_KMH)
-        if d < LINE_NEAR:
-            if s.v > stopping_speed(LINE_NEAR_DECELERATION, d):
-                return Request(Tier.LIGHT_STOP, brake=LINE_NEAR_BRAKE)
-            return Request(Tier.LIGHT_STOP, throttle=LINE_NEAR_THROTTLE)
-        v_required = stopping_speed(LINE_DECELERATION, d)
-        if s.v < v_required:
-            return Request(Tier.LIGHT_STOP, throttle=LINE_THROTTLE)
-        return Request(Tier.LIGHT_STOP, brake=self._brake(s.v, v_required))
-
-    def _brake(self, v: float, v_required: float) -> float:
-        """Returns the brake in 0..1 for a speed v that should be v_required, both in m/s."""
-        if self.by_pid:
-            return abs(self.pid.update((v_required - v) * 3.6))
-        return clip((v - v_required) / LINE_BRAKE_SPAN, LINE_BRAKE_MIN, 1.0)
-
-
-class Cruise:
-    """Tier 7: coast for a second after a lead, else hold the cruise speed (A-134 to A-136)."""
-
-    def __init__(self, speed: SpeedControl, dt: float) -> None:
-        self.speed = speed
-        self.coast_ticks = ticks_to_reach(COAST_DURATION, dt)
-        self.reset()
-
-    def reset(self) -> None:
-        """Resets the time since the last lead, so that no coasting is due."""
-        self.ticks_since_lead = self.coast_ticks
-
-    def __call__(self, s: Situation) -> Request:
-        """Returns a request in every case, so that the hierarchy is total: coasting, or the cruise speed."""
-        if self.ticks_since_lead < self.coast_ticks and s.v_kmh > COAST_ABOVE_KMH:
-            return Request(Tier.COAST, brake=COAST_BRAKE)
-        u = self.speed.update(s.cruise_kmh - s.v_kmh)
-        if u > 0.0:
-            return Request(Tier.CRUISE, throttle=min(u, 1.0))
-        return Request(Tier.CRUISE, brake=min(-u, CRUISE_BRAKE_MAX))
-
-    def conclude(self, winner: Tier) -> None:
-        """Counts the ticks since a tier that follows a lead has won; call it with each tick's winner."""
-        self.ticks_since_lead = 0 if winner in COASTED_FROM else self.ticks_since_lead + 1
-
-
-class Hierarchy:
-    """Tiers 1 to 7 for a set of functions (A-111)."""
-
-    def __init__(self, functions: Functions, settings: StackSettings, dt: float) -> None:
-        self.speed_pid = Pid(SPEED_GAINS, dt)
-        self.distance_pid = Pid(DISTANCE_GAINS, dt)
-        self.lead_at_light = LeadAtLight()
-        steady = settings.cruise is CruiseLaw.STEADY
-        self.speed_hold = SteadySpeed(dt) if steady else self.speed_pid
-        self.cruise = Cruise(self.speed_hold, dt)
-        self.last = Tier.NONE
-        self.brakes = bool(functions & {Function.ACC, Function.AEB})  # tiers 1 to 3 (A-140)
-        self.rules = self._rules(functions, settings)
-
-    def _rules(self, functions: Functions, settings: StackSettings) -> tuple[Rule, ...]:
-        """Returns the rules in order; tiers 1 to 3 come with ACC, or with emergency braking alone (A-140)."""
-        unconfirmed = NO_ACTION if settings.unconfirmed is Unconfirmed.CONSUME else None
-        following = Following(settings.follower, self.distance_pid)
-        braking: tuple[Rule, ...] = (
-            HardStop(unconfirmed),
-            low_speed_stop,
-            Emergency(unconfirmed),
+    By zones, or by the distance PID (D-039), which aims at TARGET_GAP times the own speed.
+    """
+    if not (s.gap < FOLLOW_GAP or s.distance < FOLLOW_DISTANCE):
+        return PASSED
+    tier, throttle, brake, _ = zones(s.gap)
+    if rules.by_distance:
+        error = s.distance - TARGET_GAP * s.v
+        u, m.distance_integral = regulate(
+            DISTANCE_GAINS, rules.dt, m.distance_previous, m.distance_integral, error
         )
-        light_stop = LightStop(settings.light_braking, self.speed_pid)
-        return (
-            *(braking if self.brakes else ()),
-            self.lead_at_light,
-            *((following,) if Function.ACC in functions else ()),
-            light_stop,
-            self.cruise,
-        )
+        m.distance_previous = error
+        throttle, brake = max(u, 0.0), max(-u, 0.0)
+    return Request(tier, 0.0 if s.v_kmh > s.follow_cap_kmh else throttle, brake, False)
 
-    def reset_pids(self) -> None:
-        """Resets the controllers after tiers 1 and 3 and after a relocation (A-109)."""
-        self.speed_pid.reset()
-        self.speed_hold.reset()
-        self.distance_pid.reset()
 
-    def reset(self) -> None:
-        """Forgets everything of the old place after a relocation."""
-        self.reset_pids()
-        self.lead_at_light.reset()
-        self.cruise.reset()
-        self.last = Tier.NONE
+@kernel
+def regulate_speed(m: Record, rules: TierRules, error: float) -> float:
+    """Returns the output of the speed PID for an error in km/h (A-107)."""
+    u, m.speed_integral = regulate(SPEED_GAINS, rules.dt, m.speed_previous, m.speed_integral, error)
+    m.speed_previous = error
+    return u
 
-    def decide(self, s: Situation) -> Request:
-        """Returns the first request in the order of the tiers; call it once per tick.
 
-        Tiers 1 and 3 reset the controllers, cruise that begins the distance controller.
-        """
-        request = NO_ACTION
-        for rule in self.rules:  # the last one always makes a request
-            found = rule(s)
-            if found is not None:
-                request = found
-                break
-        if request.tier in RESET_BY:
-            self.reset_pids()
-        elif request.tier is Tier.CRUISE and self.last is not Tier.CRUISE:
-            self.distance_pid.reset()
-        self.cruise.conclude(request.tier)
-        self.last = request.tier
-        return request
+@kernel
+def light_stop(m: Record, rules: TierRules, s: Situation) -> Request:
+    """Tier 6: returns what stops at a line without a lead, from approach to hold (A-130 to A-133)."""
+    d = s.stop_distance
+    if isnan(d):
+        return PASSED
+    if d < LINE_HOLD:
+        return Request(HOLDING_AT_LINE, 0.0, 1.0, s.v_kmh < HANDBRAKE_BELOW_KMH)
+    if d < LINE_NEAR:
+        if s.v > stopping_speed(LINE_NEAR_DECELERATION, d):
+            return Request(LIGHT_STOP, 0.0, LINE_NEAR_BRAKE, False)
+        return Request(LIGHT_STOP, LINE_NEAR_THROTTLE, 0.0, False)
+    v_required = stopping_speed(LINE_DECELERATION, d)
+    if s.v < v_required:
+        return Request(LIGHT_STOP, LINE_THROTTLE, 0.0, False)
+    if rules.by_pid:
+        brake = abs(regulate_speed(m, rules, (v_required - s.v) * 3.6))
+    else:
+        brake = clip((s.v - v_required) / LINE_BRAKE_SPAN, LINE_BRAKE_MIN, 1.0)
+    return Request(LIGHT_STOP, 0.0, brake, False)
+
+
+@kernel
+def cruise(m: Record, rules: TierRules, s: Situation) -> Request:
+    """Tier 7: returns coasting for a second after a lead, else what holds the cruise speed (A-134 to 136)."""
+    if m.ticks_since_lead < rules.coast_ticks and s.v_kmh > COAST_ABOVE_KMH:
+        return Request(COAST, 0.0, COAST_BRAKE, False)
+    error = s.cruise_kmh - s.v_kmh
+    if rules.steady:
+        u, m.steady_integral = hold_speed(rules.dt, m.steady_integral, error)
+    else:
+        u = regulate_speed(m, rules, error)
+    if u > 0.0:
+        return Request(CRUISE, min(u, 1.0), 0.0, False)
+    return Request(CRUISE, 0.0, min(-u, CRUISE_BRAKE_MAX), False)
+
+
+@kernel
+def reset_controllers(m: Record) -> None:
+    """Resets the controllers, as after tiers 1 and 3 and after a relocation (A-109)."""
+    m.speed_previous = m.speed_integral = m.steady_integral = 0.0
+    m.distance_previous = m.distance_integral = 0.0
+
+
+@kernel
+def begin_tiers(m: Record, rules: TierRules) -> None:
+    """Sets what the tiers remember to nothing: no hold, no coasting due, controllers at rest."""
+    reset_controllers(m)
+    m.holding, m.tier, m.ticks_since_lead = False, NONE, rules.coast_ticks
+
+
+@kernel
+def decide(m: Record, rules: TierRules, s: Situation) -> Request:
+    """Returns the first request in the order of the tiers (A-111); call it once per tick.
+
+    Tiers 1 and 3 reset the controllers, cruise that begins the distance controller (A-109).
+    """
+    request = hard_stop(rules, s) if rules.brakes else PASSED
+    if request.tier < 0 and rules.brakes:
+        request = low_speed_stop(s)
+    if request.tier < 0 and rules.brakes:
+        request = emergency(rules, s)
+    if request.tier < 0:
+        request = lead_at_light(m, s)
+    if request.tier < 0 and rules.follows:
+        request = following(m, rules, s)
+    if request.tier < 0:
+        request = light_stop(m, rules, s)
+    if request.tier < 0:
+        request = cruise(m, rules, s)  # it always makes a request, so that the hierarchy is total
+    if request.tier in (HARD_STOP, EMERGENCY):
+        reset_controllers(m)
+    elif request.tier == CRUISE and m.tier != CRUISE:
+        m.distance_previous = m.distance_integral = 0.0
+    m.ticks_since_lead = 0 if request.tier in COASTED_FROM else m.ticks_since_lead + 1
+    m.tier = request.tier
+    return request

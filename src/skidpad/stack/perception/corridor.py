@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.kernels.jit import Held, inner_kernel, kernel
+from skidpad.core.frames import Segments
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.vocabulary import SemanticClass
 
 
@@ -60,11 +61,15 @@ def half_width(z: float, c: Corridor) -> float:
 
 
 @kernel
+def in_width(z: float, u: float, c: Corridor, sin_yaw: float, kappa: float) -> bool:
+    """Returns whether column u at depth z m is strictly inside in width."""
+    return bool(abs(lateral_offset(z, u, c, sin_yaw, kappa)) < half_width(z, c))
+
+
+@kernel
 def in_corridor(z: float, u: float, c: Corridor, sin_yaw: float, kappa: float) -> bool:
     """Returns whether column u at depth z m is strictly inside in depth and width (A-054)."""
-    if not (c.near < z < c.far):
-        return False
-    return bool(abs(lateral_offset(z, u, c, sin_yaw, kappa)) < half_width(z, c))
+    return bool(c.near < z < c.far and in_width(z, u, c, sin_yaw, kappa))
 
 
 @inner_kernel
@@ -199,22 +204,19 @@ def read_pixels(
 
 @kernel
 def read_segments(
-    u: NDArray[np.float32],
-    width: NDArray[np.float32],
-    top: NDArray[np.float32],
-    bottom: NDArray[np.float32],
-    depth: NDArray[np.float32],
-    label: NDArray[np.uint8],
+    runs: Segments,
     c: Corridor,
+    near: float,
+    far: float,
     fraction: float,
     sin_yaw: float,
     kappa: float,
 ) -> float:
     """Returns the same distance from runs of pixels, each weighing as many pixels as it covers (M-3).
 
-    u (n,): middle column; width, top, bottom: px; depth: m.
+    near, far: m, instead of the corridor's.
     """
-    n = len(u)
+    n = len(runs.u)
     z = np.empty(n, dtype=np.float64)
     weight = np.empty(n, dtype=np.float64)
     class_first, classes = np.uint8(c.wanted.first), np.uint8(c.wanted.size)
@@ -222,43 +224,21 @@ def read_segments(
     kept = 0
     total = 0.0
     for i in range(n):
-        rows = min(float(bottom[i]), float(c.row_end)) - max(float(top[i]), float(c.row_first))
-        if rows <= 0.0 or not _is_one(label[i], class_first, classes):
+        top, bottom = float(runs.top[i]), float(runs.bottom[i])
+        rows = min(bottom, float(c.row_end)) - max(top, float(c.row_first))
+        if rows <= 0.0 or not _is_one(runs.label[i], class_first, classes):
             continue
-        pixels = rows * float(width[i])
+        pixels = rows * float(runs.width[i])
         vehicle += pixels
-        if in_corridor(float(depth[i]), float(u[i]), c, sin_yaw, kappa):
-            z[kept] = depth[i]
+        depth = float(runs.depth[i])
+        if near < depth < far and in_width(depth, float(runs.u[i]), c, sin_yaw, kappa):
+            z[kept] = depth
             weight[kept] = pixels
             total += pixels
             kept += 1
     if vehicle < c.min_vehicle or total < c.min_kept or kept == 0:
         return np.nan
     return weighted_percentile(z[:kept], weight[:kept], fraction)
-
-
-@kernel
-def read_held_segments(
-    u: NDArray[np.float32],
-    width: NDArray[np.float32],
-    top: NDArray[np.float32],
-    bottom: NDArray[np.float32],
-    depth: NDArray[np.float32],
-    label: NDArray[np.uint8],
-    held: Held[Corridor],
-    near: float,
-    far: float,
-    fraction: float,
-    sin_yaw: float,
-    kappa: float,
-) -> float:
-    """Returns what `read_segments` does, between the depths `near` and `far`; the corridor is held."""
-    h = held.value
-    c = Corridor(
-        h.focal, h.cx, h.row_first, h.row_end, h.half_width, h.widening, h.half_width_max,
-        near, far, h.min_vehicle, h.min_kept, h.wanted,
-    )  # fmt: skip
-    return read_segments(u, width, top, bottom, depth, label, c, fraction, sin_yaw, kappa)
 
 
 @kernel

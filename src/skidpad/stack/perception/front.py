@@ -3,147 +3,123 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from math import sin
 
-from skidpad.core.frames import SensorFrame
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.arrays import Floats
+from skidpad.core.frames import RadarPoints, Segments, SensorFrame
+from skidpad.core.kernels.jit import Held, kernel
 from skidpad.core.run import Function
-from skidpad.core.settings.stack import (
-    RadarCandidates,
-    RadarCorridor,
-    RoofCorridor,
-    StackSettings,
-    Targets,
-)
+from skidpad.core.settings.stack import RoofCorridor, StackSettings, Targets
 from skidpad.core.specs import SensorSpec
-from skidpad.core.vocabulary import DetectionStatus
-from skidpad.roads.queries import RoadMap
+from skidpad.roads.kernels import LaneArrays
 from skidpad.stack.configurations import Functions
-from skidpad.stack.perception.corridor import ROAD_USERS, VEHICLES
+from skidpad.stack.memory import Record
+from skidpad.stack.perception.corridor import ROAD_USERS, VEHICLES, Corridor, read_segments
 from skidpad.stack.perception.fusion import (
+    PERCENTILE,
     CameraPair,
-    MedianFilter,
-    RateFilter,
-    Verification,
+    FusionRules,
     bumper_corridor,
     camera_pair,
     fuse,
+    limit_rate,
+    median,
+    push,
     roof_corridor,
+    verified_depths,
 )
-from skidpad.stack.perception.lane_view import LaneView
-from skidpad.stack.perception.persistence import Persistence
-from skidpad.stack.perception.radar import (
-    HALF_WIDTH,
-    NO_RADAR,
-    PARABOLA_HALF_WIDTH,
-    AnyPoint,
-    LaneMatch,
-    Radar,
-    RadarReading,
-)
+from skidpad.stack.perception.lane_view import Place
+from skidpad.stack.perception.persistence import DetectionRules, detect, is_confirmed
+from skidpad.stack.perception.radar import RadarRules, read_radar
 
 ROOF = ("depth_roof", "semantic_roof")
 BUMPER = ("depth_bumper", "semantic_bumper")
+VERIFIED_BY = ("", "bumper", "roof", "none")  # not asked, or which pair bears the target out
+BY_BUMPER, BY_ROOF, BY_NONE = 1, 2, 3
+ROOM = 256  # radar points; more need a larger room
 
 
-class Sight(NamedTuple):
-    """What lies ahead in one tick; distances in m, None: no target."""
-
-    status: DetectionStatus
-    distance: float | None  # the measured distance that counts
-    confirmed: bool  # by vision, for long enough
-    bumper: float | None
-    roof: float | None
-    fused: float | None  # before the median
-    radar: RadarReading
-
-
-class Front:
-    """The forward perception of one vehicle."""
+class Cameras:
+    """Both camera pairs of one vehicle."""
 
     def __init__(
-        self,
-        specs: Sequence[SensorSpec],
-        map: RoadMap,
-        functions: Functions,
-        settings: StackSettings,
-        dt: float,
+        self, specs: Sequence[SensorSpec], functions: Functions, settings: StackSettings
     ) -> None:
         self.settings = settings
-        bumper_depth, bumper_semantic = camera_pair(specs, *BUMPER)
-        self.roof_depth, self.roof_semantic = camera_pair(specs, *ROOF)
         self.wanted = VEHICLES if settings.targets is Targets.VEHICLES else ROAD_USERS
-        self.bumper = CameraPair(
-            bumper_depth, bumper_semantic, bumper_corridor(bumper_semantic, self.wanted)
-        )
-        self.median = MedianFilter()
-        self.rate = RateFilter(dt) if settings.rate_filter else None
-        self.radar = _radar(map, settings) if settings.radar else None
-        self.persistence = Persistence(
-            dt,
-            settings.detection_gate,
-            settings.radar_close_check,
-            settings.safety_persist,
-            settings.rejected_stays_active,
-        )
+        bumper = camera_pair(specs, *BUMPER)
+        self.bumper = CameraPair(*bumper, bumper_corridor(bumper[1], self.wanted))
+        self._roof = camera_pair(specs, *ROOF)
         self.switch(functions)
 
     def switch(self, functions: Functions) -> None:
-        """Sets what perception evaluates for these driving functions: following, and the roof's corridor."""
-        self.follows = Function.ACC in functions
+        """Sets the roof's corridor for these driving functions (D-015)."""
         narrow = self.settings.roof_corridor is RoofCorridor.FLAT_WITHOUT_LCA
         flat = narrow and Function.LCA not in functions
-        self.roof = CameraPair(
-            self.roof_depth,
-            self.roof_semantic,
-            roof_corridor(self.roof_semantic, flat, self.wanted),
-        )
-        self.verification = Verification(self.bumper, self.roof)
+        self.roof = CameraPair(*self._roof, roof_corridor(self._roof[1], flat, self.wanted))
 
-    def reset(self) -> None:
-        """Resets all filters, as after a relocation of the ego."""
-        self.median.reset()
-        self.persistence.reset()
-        for part in (self.rate, self.radar):
-            if part is not None:
-                part.reset()
-
-    def look(self, frame: SensorFrame, v: float, view: LaneView) -> Sight:
-        """Returns what this frame shows; v in m/s. Call it once per tick: filters and memory move on."""
-        s = self.settings
-        bumper = self.bumper.read(frame, view.yaw_error, view.kappa)
-        roof = self.roof.read(frame, view.yaw_error, view.kappa)
-        fused = fuse(bumper, roof, s.bumper_alone, s.consistency_guard)
-        steady = fused if self.rate is None else self.rate.update(fused)
-        radar = NO_RADAR
-        if self.radar is not None:
-            tracking = self.persistence.is_confirmed
-            radar = self.radar.update(frame.radar, frame.ego.pose, v, view, tracking)
-        detection = self.persistence.update(self.median.update(steady), bumper, radar)
-        return Sight(
-            detection.status,
-            detection.distance,
-            self.persistence.is_confirmed,
-            bumper,
-            roof,
-            fused,
-            radar,
+    def read(self, frame: SensorFrame, yaw_error: float, kappa: float) -> tuple[float, float]:
+        """Returns what bumper and roof see in images, in m; NaN: no target."""
+        return (
+            self.bumper.read(frame, yaw_error, kappa),
+            self.roof.read(frame, yaw_error, kappa),
         )
 
-    def conclude(self, sight: Sight, stopping: bool) -> None:
-        """Passes the outcome of the tick on to the memory of detections.
+    def verify(self, frame: SensorFrame, distance: float, yaw_error: float, kappa: float) -> int:
+        """Returns which pair's images bear out a target at `distance` m (A-065).
 
-        stopping: a light asks for a stop.
+        The bumper is asked first, the roof without its minimum depth (D-009).
         """
-        self.persistence.conclude(sight.distance is not None, self.follows, stopping)
+        near, far = verified_depths(distance)
+        for by, pair in ((BY_BUMPER, self.bumper), (BY_ROOF, self.roof)):
+            if pair.read_between(near, far, frame, yaw_error, kappa) > 0.0:
+                return by
+        return BY_NONE
 
-    def verify(self, frame: SensorFrame, distance: float, view: LaneView) -> tuple[bool, str]:
-        """Returns whether wanted pixels near `distance` m bear the target out, and by which camera pair."""
-        return self.verification.confirm(frame, distance, view.yaw_error, view.kappa)
+
+@kernel
+def verify_runs(
+    bumper: Segments, roof: Segments, keep: tuple[Corridor, Corridor], distance: float, place: Place
+) -> int:
+    """Returns what `Cameras.verify` does, by runs of pixels; keep: corridors of bumper and roof."""
+    near, far = verified_depths(distance)
+    turn = sin(place.yaw_error)
+    if read_segments(bumper, keep[0], near, far, PERCENTILE, turn, place.kappa) > 0.0:
+        return BY_BUMPER
+    if read_segments(roof, keep[1], near, far, PERCENTILE, turn, place.kappa) > 0.0:
+        return BY_ROOF
+    return BY_NONE
 
 
-def _radar(map: RoadMap, settings: StackSettings) -> Radar:
-    """Returns the radar evaluation for the corridor and the candidates that the settings choose."""
-    nearest_only = settings.radar_candidates is RadarCandidates.NEAREST
-    if settings.radar_corridor is RadarCorridor.PARABOLA:
-        return Radar(AnyPoint(), PARABOLA_HALF_WIDTH, nearest_only)
-    return Radar(LaneMatch(map), HALF_WIDTH, nearest_only)
+@kernel
+def look_ahead(
+    m: Record,
+    fusion: FusionRules,
+    detection: DetectionRules,
+    radar: RadarRules,
+    samples: Floats,
+    history: Floats,
+    kept: NDArray[np.int64],
+    bumper: float,
+    roof: float,
+    points: RadarPoints,
+    place: Place,
+    map: Held[LaneArrays],
+    on_highway: NDArray[np.bool_],
+) -> None:
+    """Notes what this tick shows ahead; call it once per tick, as filters and memory move on.
+
+    bumper, roof: m; samples, history, kept: as `AdasStack` has them.
+    """
+    fused = fuse(fusion, bumper, roof)
+    tracking = is_confirmed(m, detection)
+    reading = read_radar(m, radar, points, kept, tracking, place, map, on_highway)
+    push(samples, limit_rate(m, fusion, history, fused) if fusion.limits_rate else fused)
+    found = detect(m, detection, median(samples), bumper, reading)
+    m.status, m.distance = found.status, found.distance
+    m.bumper, m.roof, m.fused = bumper, roof, fused
+    m.radar_pre, m.radar_lane, m.radar_velocity = reading.pre, reading.lane, reading.velocity
+    m.radar_points = reading.points

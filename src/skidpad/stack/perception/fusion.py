@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Mapping, Sequence
-from math import isnan, sin
-from statistics import median
+from math import inf, isnan, nan, sin
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import CameraImage, SensorFrame, image_rows
-from skidpad.core.kernels.jit import hold
+from skidpad.core.kernels.jit import kernel
+from skidpad.core.settings.stack import StackSettings
 from skidpad.core.specs import CameraSpec, Modality, SensorSpec
+from skidpad.stack.memory import Record
 from skidpad.stack.perception import corridor
 from skidpad.stack.perception.corridor import VEHICLES, Corridor, Labels
 from skidpad.stack.timing import ticks_within
@@ -73,7 +75,7 @@ def roof_corridor(camera: CameraSpec, flat: bool = False, wanted: Labels = VEHIC
 
 
 class CameraPair:
-    """A depth and a semantic camera with one view, read through a corridor."""
+    """A depth and a semantic camera with one view, whose images are read through a corridor."""
 
     UNSAVED = ("scratch",)
 
@@ -84,11 +86,10 @@ class CameraPair:
                 f"{depth.width}x{depth.height} and {semantic.width}x{semantic.height} px"
             )
         self.depth_id, self.semantic_id, self.keep = depth.id, semantic.id, keep
-        self._held = hold(keep)
         self.scratch = np.empty(depth.width * (keep.row_end - keep.row_first), dtype=np.float32)
 
-    def read(self, frame: SensorFrame, yaw_error: float, kappa: float) -> float | None:
-        """Returns the distance of the 10th percentile in m; None: no target, or no image yet (A-037).
+    def read(self, frame: SensorFrame, yaw_error: float, kappa: float) -> float:
+        """Returns the distance of the 10th percentile in m; NaN: no target, or no image yet (A-037).
 
         yaw_error: rad to the lane, left positive; kappa: half the lane's curvature.
         """
@@ -96,24 +97,15 @@ class CameraPair:
 
     def read_between(
         self, near: float, far: float, frame: SensorFrame, yaw_error: float, kappa: float
-    ) -> float | None:
+    ) -> float:
         """Returns what `read` does, between other depths in m."""
-        segments = frame.segments.get(self.depth_id)
-        if segments is not None:
-            if not len(segments.u):
-                return None
-            distance = corridor.read_held_segments(
-                *segments, self._held, near, far, PERCENTILE, sin(yaw_error), kappa
-            )
-        else:
-            images = self._pair(frame.images)
-            if images is None:
-                return None
-            keep = self.keep._replace(near=near, far=far)
-            distance = corridor.read_pixels(
-                *images, keep, PERCENTILE, sin(yaw_error), kappa, self.scratch
-            )
-        return None if isnan(distance) else distance
+        images = self._pair(frame.images)
+        if images is None:
+            return nan
+        keep = self.keep._replace(near=near, far=far)
+        return float(
+            corridor.read_pixels(*images, keep, PERCENTILE, sin(yaw_error), kappa, self.scratch)
+        )
 
     def _pair(
         self, images: Mapping[str, CameraImage]
@@ -143,82 +135,90 @@ def camera_pair(
     return cameras[depth_id], cameras[semantic_id]
 
 
-def fuse(
-    bumper: float | None,
-    roof: float | None,
-    bumper_alone: bool = True,
-    guard: float | None = None,
-) -> float | None:
-    """Returns one distance in m from both tiers, None: no target (eq. 9, A-055 to A-059).
+class FusionRules(NamedTuple):
+    """How both tiers are joined and filtered."""
 
-    bumper_alone: below 30 m the bumper reading counts when the roof sees nothing (D-017).
-    guard: where both see a target but differ by more than this, the nearer counts.
-    """
-    if bumper is None or bumper <= BLEND_FROM:
-        return roof if bumper is None else bumper
-    if roof is None:
-        return bumper if bumper_alone and bumper < BUMPER_ALONE_BELOW else None
-    if guard is not None and abs(bumper - roof) > guard:
+    bumper_alone: bool  # the bumper counts below 30 m when the roof sees nothing (D-017)
+    guard: float  # m, tiers that differ by more: the nearer counts; inf: off (A-059)
+    limits_rate: bool  # A-062
+    rate_step: float  # m per tick
+
+
+def fusion_rules(settings: StackSettings, dt: float) -> FusionRules:
+    """Returns how tiers are joined by these settings; dt: s, one tick."""
+    guard = settings.consistency_guard
+    return FusionRules(
+        bumper_alone=settings.bumper_alone,
+        guard=inf if guard is None else guard,
+        limits_rate=settings.rate_filter,
+        rate_step=RATE_LIMIT * dt,
+    )
+
+
+def far_samples(n: int) -> Floats:
+    """Returns the samples of a filter that has seen nothing."""
+    return np.full(n, NOTHING)
+
+
+def rate_samples(dt: float) -> Floats:
+    """Returns the samples of the rate filter's window (A-062); dt: s, one tick."""
+    return far_samples(max(1, ticks_within(RATE_WINDOW, dt)))
+
+
+@kernel
+def fuse(rules: FusionRules, bumper: float, roof: float) -> float:
+    """Returns one distance in m from both tiers, NaN: no target (eq. 9, A-055 to A-059)."""
+    if isnan(bumper) or bumper <= BLEND_FROM:
+        return roof if isnan(bumper) else bumper
+    if isnan(roof):
+        return bumper if rules.bumper_alone and bumper < BUMPER_ALONE_BELOW else nan
+    if abs(bumper - roof) > rules.guard:
         return min(bumper, roof)
     w = (bumper - BLEND_FROM) / BLEND_OVER
     return (1.0 - w) * bumper + w * roof if w < 1.0 else roof
 
 
-class MedianFilter:
-    """Median of the last five samples, absent ones counting as far away (A-061)."""
-
-    def __init__(self) -> None:
-        self.reset()
-
-    def reset(self) -> None:
-        """Resets the samples to no target."""
-        self.samples = deque([NOTHING] * MEDIAN_SAMPLES, maxlen=MEDIAN_SAMPLES)
-
-    def update(self, distance: float | None) -> float | None:
-        """Returns the filtered distance after one more sample; None, in and out: no target."""
-        self.samples.append(NOTHING if distance is None else distance)
-        middle = sorted(self.samples)[MEDIAN_SAMPLES // 2]
-        return middle if middle < NOTHING else None
+@kernel
+def push(samples: Floats, distance: float) -> None:
+    """Puts one more sample at the end, and drops the first; none counts as far away (A-061)."""
+    for k in range(samples.size - 1):
+        samples[k] = samples[k + 1]
+    samples[-1] = NOTHING if isnan(distance) else distance
 
 
-class RateFilter:
-    """Limits how fast the distance changes, then takes the median over a window (A-062)."""
-
-    def __init__(self, dt: float) -> None:
-        self.step = RATE_LIMIT * dt
-        self.length = max(1, ticks_within(RATE_WINDOW, dt))
-        self.reset()
-
-    def reset(self) -> None:
-        """Resets the smoothed distance and its history to no target."""
-        self.smoothed = NOTHING
-        self.history = deque([NOTHING] * self.length, maxlen=self.length)
-
-    def update(self, distance: float | None) -> float | None:
-        """Returns the filtered distance after one more sample; None, in and out: no target."""
-        change = (NOTHING if distance is None else distance) - self.smoothed
-        self.smoothed += min(max(change, -self.step), self.step)
-        self.history.append(self.smoothed)
-        middle = median(self.history)
-        return middle if middle < NOTHING else None
+@kernel
+def find_rank(samples: Floats, rank: int) -> float:
+    """Returns the sample of this rank, 0 for the smallest."""
+    for k in range(samples.size):
+        below = same = 0
+        for other in samples:
+            below += other < samples[k]
+            same += other == samples[k]
+        if below <= rank < below + same:
+            return float(samples[k])
+    return nan
 
 
-class Verification:
-    """Are there wanted pixels in the ego's corridor near the reported distance? (A-065)"""
+@kernel
+def median(samples: Floats) -> float:
+    """Returns the middle sample, the mean of two where their number is even; NaN: none is near."""
+    n = samples.size
+    middle = find_rank(samples, n // 2)
+    if n % 2 == 0:
+        middle = (find_rank(samples, n // 2 - 1) + middle) / 2
+    return middle if middle < NOTHING else nan
 
-    def __init__(self, bumper: CameraPair, roof: CameraPair) -> None:
-        self.pairs = (("bumper", bumper), ("roof", roof))
 
-    def confirm(
-        self, frame: SensorFrame, distance: float, yaw_error: float, kappa: float
-    ) -> tuple[bool, str]:
-        """Returns whether the pixels confirm a target at `distance` m, and by which pair, else "none".
+@kernel
+def limit_rate(m: Record, rules: FusionRules, history: Floats, distance: float) -> float:
+    """Returns the distance whose changes are limited, and then the median over a window (A-062)."""
+    change = (NOTHING if isnan(distance) else distance) - m.smoothed
+    m.smoothed += min(max(change, -rules.rate_step), rules.rate_step)
+    push(history, m.smoothed)
+    return median(history)
 
-        The bumper is asked first, the roof without its minimum depth (D-009).
-        """
-        for name, pair in self.pairs:
-            near = max(distance - VERIFY_TOLERANCE, BUMPER_DEPTHS[0])
-            far = distance + VERIFY_TOLERANCE
-            if pair.read_between(near, far, frame, yaw_error, kappa) is not None:
-                return True, name
-        return False, "none"
+
+@kernel
+def verified_depths(distance: float) -> tuple[float, float]:
+    """Returns the depths in m between which a pixel bears a target out (A-065)."""
+    return max(distance - VERIFY_TOLERANCE, BUMPER_DEPTHS[0]), distance + VERIFY_TOLERANCE

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple, Protocol
 
+import numpy as np
+
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.roads.queries import LanePoint, RoadMap
 
@@ -24,6 +26,20 @@ class LaneView(NamedTuple):
     def kappa(self) -> float:
         """Coefficient in 1/m of the parabola kappa Z^2: half the curvature (D-063)."""
         return 0.5 * self.curvature
+
+
+class Place(NamedTuple):
+    """The ego on its lane, as kernels take it."""
+
+    x: float  # world frame
+    y: float
+    z: float
+    yaw: float
+    v: float  # m/s
+    lane: int  # index; -1: off every lane
+    s: float  # m along it
+    yaw_error: float  # as in LaneView
+    kappa: float  # 1/m, half the curvature ahead
 
 
 class RouteRule(Protocol):
@@ -90,6 +106,7 @@ class LaneTracker:
     def __init__(self, map: RoadMap, route: RouteRule) -> None:
         self.map, self.route = map, route
         self.highway: frozenset[int] | None = None
+        self.on_highway = np.zeros(len(map.lanes.road), dtype=np.bool_)  # by lane
 
     def update(self, pose: Pose) -> LaneView:
         """Returns the view from `pose` (world frame, ego's origin).
@@ -101,6 +118,7 @@ class LaneTracker:
             return LaneView(None, None, 0.0, 0.0, self.highway or frozenset())
         if self.highway is None:
             self.highway = self.map.traced_roads(point)
+            self.on_highway = np.isin(self.map.lanes.road, list(self.highway))
         reference = self.route.reference(self.map, point, self.highway)
         ahead = self.route.ahead(self.map, reference, REFERENCE_DISTANCE, pose.yaw)
         return LaneView(

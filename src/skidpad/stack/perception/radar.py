@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from math import cos, sin
-from typing import NamedTuple, Protocol
+from math import cos, nan, sin
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.frames import RadarPoints
-from skidpad.core.geometry import Pose
 from skidpad.core.kernels.jit import Held, inner_kernel, kernel
+from skidpad.core.settings.stack import RadarCandidates, RadarCorridor, StackSettings
 from skidpad.roads.kernels import LaneArrays, neighbour_s, project_kernel
-from skidpad.roads.queries import RoadMap
-from skidpad.stack.perception.lane_view import MAX_SHIFTS, LaneView
+from skidpad.stack.memory import Record
+from skidpad.stack.perception.lane_view import MAX_SHIFTS, Place
 
 HALF_WIDTH = 4.0  # m, pre-filter (A-068)
 PARABOLA_HALF_WIDTH = 1.6  # m (A-084)
@@ -28,17 +28,22 @@ MOUNT = 2.0  # m ahead of the ego's origin (A-076)
 LOOK_BEYOND = 10.0  # m (A-078)
 
 
+@kernel
 def velocity_limit(v_ego: float) -> float:
     """Returns the slowest range rate in m/s that is not a standing object, negative closing (A-071)."""
     return max(VELOCITY_FLOOR, -v_ego + VELOCITY_MARGIN)
 
 
 @kernel
+def forget_radar(m: Record) -> None:
+    """Resets what radar points are compared with to that before any measurement."""
+    m.velocity_limit = FIRST_VELOCITY_LIMIT
+
+
+@kernel
 def retain(
     points: RadarPoints,
     half_width: float,
-    ranges: tuple[float, float],
-    altitudes: tuple[float, float],
     v_limit: float,
     keep_below: float,
     yaw_error: float,
@@ -54,9 +59,9 @@ def retain(
     for i in range(len(points.range)):
         r = float(points.range[i])
         altitude = float(points.altitude[i])
-        if not (ranges[0] < r < ranges[1]) or not (altitudes[0] < altitude < altitudes[1]):
+        if not (RANGES[0] < r < RANGES[1]) or not (ALTITUDES[0] < altitude < ALTITUDES[1]):
             continue
-        lateral = r * np.sin(float(points.azimuth[i]) + yaw_error) - kappa * r * r
+        lateral = r * sin(float(points.azimuth[i]) + yaw_error) - kappa * r * r
         if abs(lateral) >= half_width:
             continue
         if r < keep_below or float(points.velocity[i]) > v_limit:
@@ -70,53 +75,15 @@ def retain(
 
 
 class RadarReading(NamedTuple):
-    """What the radar says in one tick; None: no such point."""
+    """What the radar says in one tick; NaN: no such point."""
 
-    pre: float | None  # m, nearest point after the pre-filter
-    lane: float | None  # m, nearest point in the ego's lane
-    velocity: float | None  # m/s of the point in the lane, else of the nearest; negative closing
+    pre: float  # m, nearest point after the pre-filter
+    lane: float  # m, nearest point in the ego's lane
+    velocity: float  # m/s of the point in the lane, else of the nearest; negative closing
     points: int  # points after the pre-filter
 
 
-NO_RADAR = RadarReading(None, None, None, 0)
-
-
-class InLane(Protocol):
-    """Finds the nearest radar point in the ego's lane."""
-
-    def __call__(
-        self, points: RadarPoints, chosen: NDArray[np.int64], pose: Pose, view: LaneView, /
-    ) -> int:
-        """Returns the first of the chosen rows of `points` that lies in the ego's lane, or -1.
-
-        pose: of the ego.
-        """
-        ...
-
-
-class LaneMatch:
-    """Compares the lanes of target and ego on the map (A-076 to A-078, A-083)."""
-
-    def __init__(self, map: RoadMap) -> None:
-        self.map = map
-        self._traced: frozenset[int] | None = None
-
-    def __call__(
-        self, points: RadarPoints, chosen: NDArray[np.int64], pose: Pose, view: LaneView
-    ) -> int:
-        """Returns the first chosen row in the ego's lane or where it leads, or -1.
-
-        -1 also where the ego is on no lane.
-        """
-        if view.ego is None:
-            return -1
-        if view.highway is not self._traced:
-            self._traced = view.highway
-            self._on_highway = np.isin(self.map.lanes.road, list(view.highway))
-        return first_in_lane(
-            self.map.held, self._on_highway, points, chosen,
-            (pose.x, pose.y, pose.z, pose.yaw), view.ego.lane, view.ego.s, MOUNT, LOOK_BEYOND,
-        )  # fmt: skip
+NO_RADAR = RadarReading(nan, nan, nan, 0)
 
 
 @kernel
@@ -125,28 +92,26 @@ def first_in_lane(
     on_highway: NDArray[np.bool_],
     points: RadarPoints,
     chosen: NDArray[np.int64],
-    ego: tuple[float, float, float, float],
-    ego_lane: int,
-    ego_s: float,
-    mount: float,
-    look_beyond: float,
+    place: Place,
 ) -> int:
-    """Returns the first of the chosen rows of `points` in the ego's lane or where it leads, or -1.
+    """Returns the first of the chosen rows of `points` in the ego's lane or where it leads (A-076 to A-078).
 
-    on_highway: by lane; ego: x, y, z and yaw; mount, look_beyond: m, `MOUNT` and `LOOK_BEYOND`. The
-    look ahead reads one place per branch, the point's range + 10 m on, as A-078 is written: a target
-    whose road ends before that place is missed.
+    -1: none is, or the ego is on no lane (A-083). on_highway: by lane. The look ahead reads one place
+    per branch, the point's range + 10 m on, as A-078 is written: a target whose road ends before that
+    place is missed.
     """
+    if place.lane < 0:
+        return -1
     a = map.value
-    lane, s = _onto_highway(a, on_highway, ego_lane, ego_s)
-    x, y = ego[0] + mount * cos(ego[3]), ego[1] + mount * sin(ego[3])
+    lane, s = _onto_highway(a, on_highway, place.lane, place.s)
+    x, y = place.x + MOUNT * cos(place.yaw), place.y + MOUNT * sin(place.yaw)
     for i in chosen:
-        r, bearing = float(points.range[i]), ego[3] + float(points.azimuth[i])
-        target, at, _ = project_kernel(a, x + r * cos(bearing), y + r * sin(bearing), ego[2], True)
+        r, bearing = float(points.range[i]), place.yaw + float(points.azimuth[i])
+        target, at, _ = project_kernel(a, x + r * cos(bearing), y + r * sin(bearing), place.z, True)
         if target < 0:
             continue
         target, _ = _onto_highway(a, on_highway, target, at)
-        if _is_same(a, target, lane) or _leads_to(a, lane, s + (r + look_beyond), target):
+        if _is_same(a, target, lane) or _leads_to(a, lane, s + (r + LOOK_BEYOND), target):
             return int(i)
     return -1
 
@@ -195,45 +160,50 @@ def _leads_to(a: LaneArrays, lane: int, s: float, target: int) -> bool:
     return False
 
 
-class AnyPoint:
-    """The compatibility mode trusts its parabolic corridor alone (A-084)."""
+class RadarRules(NamedTuple):
+    """How a stack reads its radar."""
 
-    def __call__(self, points: RadarPoints, chosen: NDArray[np.int64], *_where: object) -> int:
-        """Returns the first point that passed the corridor."""
-        del points
-        return int(chosen[0])
+    takes_part: bool  # A-038
+    half_width: float  # m about the lane's path
+    by_map: bool  # the map tells the ego's lane, not the corridor alone (A-084)
+    nearest_only: bool  # one point is matched with the map (D-029)
 
 
-class Radar:
-    """Pre-filter and lane check; replaces its list at each measurement (A-066)."""
+def radar_rules(settings: StackSettings) -> RadarRules:
+    """Returns how the radar is read by these settings."""
+    by_map = settings.radar_corridor is not RadarCorridor.PARABOLA
+    return RadarRules(
+        takes_part=settings.radar,
+        half_width=HALF_WIDTH if by_map else PARABOLA_HALF_WIDTH,
+        by_map=by_map,
+        nearest_only=settings.radar_candidates is RadarCandidates.NEAREST,
+    )
 
-    def __init__(self, in_lane: InLane, half_width: float, nearest_only: bool) -> None:
-        self.in_lane, self.half_width, self.nearest_only = in_lane, half_width, nearest_only
-        self.kept = np.empty(256, dtype=np.int64)
-        self.reset()
 
-    def reset(self) -> None:
-        """Resets the limit of range rates to its value before any measurement."""
-        self.velocity_limit = FIRST_VELOCITY_LIMIT
+@kernel
+def read_radar(
+    m: Record, rules: RadarRules, points: RadarPoints, kept: NDArray[np.int64], tracking: bool, place: Place,
+    map: Held[LaneArrays], on_highway: NDArray[np.bool_],
+) -> RadarReading:  # fmt: skip
+    """Returns the readings of one measurement, NO_RADAR without a point that passes the pre-filter (A-066).
 
-    def update(
-        self, points: RadarPoints, pose: Pose, v_ego: float, view: LaneView, tracking: bool
-    ) -> RadarReading:
-        """Returns the readings of one measurement, NO_RADAR without a point that passes the pre-filter.
-
-        v_ego: m/s; tracking: vision has confirmed a lead (A-073).
-        """
-        if len(points.range) > len(self.kept):
-            self.kept = np.empty(len(points.range), dtype=np.int64)
-        self.velocity_limit = velocity_limit(v_ego)
-        n = retain(
-            points, self.half_width, RANGES, ALTITUDES, self.velocity_limit,
-            TRACKING_BELOW if tracking else ALWAYS_BELOW, view.yaw_error, view.kappa, self.kept,
-        )  # fmt: skip
-        if n == 0:
-            return NO_RADAR
-        chosen, nearest = self.kept[: 1 if self.nearest_only else n], self.kept[0]
-        found = self.in_lane(points, chosen, pose, view)
-        lane = None if found < 0 else float(points.range[found])
-        told = nearest if found < 0 else found
-        return RadarReading(float(points.range[nearest]), lane, float(points.velocity[told]), n)
+    kept: room for every point; tracking: vision has confirmed a lead (A-073).
+    """
+    if not rules.takes_part:
+        return NO_RADAR
+    m.velocity_limit = velocity_limit(place.v)
+    n = retain(
+        points, rules.half_width, m.velocity_limit,
+        TRACKING_BELOW if tracking else ALWAYS_BELOW, place.yaw_error, place.kappa, kept,
+    )  # fmt: skip
+    if n == 0:
+        return NO_RADAR
+    nearest = kept[0]
+    found = nearest
+    if rules.by_map:
+        chosen = 1 if rules.nearest_only else n
+        found = first_in_lane(map, on_highway, points, kept[:chosen], place)
+    lane = nan if found < 0 else np.float64(points.range[found])
+    told = nearest if found < 0 else found
+    pre, velocity = np.float64(points.range[nearest]), np.float64(points.velocity[told])
+    return RadarReading(pre, lane, velocity, n)

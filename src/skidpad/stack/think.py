@@ -1,0 +1,160 @@
+"""One tick of perception and control as a kernel: from distances and radar points to pedals."""
+
+from __future__ import annotations
+
+from math import isnan, nan, sin
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.arrays import Floats, Floats32
+from skidpad.core.frames import RadarPoints, Segments
+from skidpad.core.kernels.jit import Held, kernel
+from skidpad.core.vocabulary import DetectionStatus
+from skidpad.roads.kernels import LaneArrays
+from skidpad.stack.control.bends import slow_for_bend
+from skidpad.stack.control.caps import CapRules, caps_kmh, count_resume
+from skidpad.stack.control.tiers import (
+    NO_ACTION,
+    Situation,
+    TierRules,
+    begin_tiers,
+    decide,
+    needs_verification,
+    time_gap,
+)
+from skidpad.stack.memory import Memory
+from skidpad.stack.perception.corridor import Corridor, read_segments
+from skidpad.stack.perception.front import BY_NONE, look_ahead, verify_runs
+from skidpad.stack.perception.fusion import NOTHING, PERCENTILE, FusionRules
+from skidpad.stack.perception.lane_view import Place
+from skidpad.stack.perception.persistence import (
+    DetectionRules,
+    conclude,
+    forget_detections,
+    is_confirmed,
+)
+from skidpad.stack.perception.radar import RadarRules, forget_radar
+
+RADAR_ACTIVE = int(DetectionStatus.RADAR_ACTIVE)
+KMH = 3.6  # per m/s
+
+
+class Rules(NamedTuple):
+    """All that a stack's settings and functions decide, as kernels take it."""
+
+    tiers: TierRules
+    caps: CapRules
+    fusion: FusionRules
+    detection: DetectionRules
+    radar: RadarRules
+    keep: tuple[Corridor, Corridor]  # of bumper and roof
+
+
+# Tier, throttle, brake, handbrake, index of VERIFIED_BY, cruise target in km/h, DetectionStatus,
+# distance, time gap, then what bumper, roof, both, and radar saw (nearest, in the lane, range rate,
+# number of points), ticks since a stop (-1: none yet). NaN: none. A named tuple would cost twice as much.
+Answer = tuple[
+    int, float, float, bool, int, float, int, float, float, float, float, float, float, float,
+    float, int, int,
+]  # fmt: skip
+
+
+@kernel
+def forget_sight(memory: Memory, samples: Floats, history: Floats) -> None:
+    """Resets filters, radar and the memory of detections to no target."""
+    m = memory[0]
+    forget_detections(m)
+    forget_radar(m)
+    m.smoothed = NOTHING
+    samples.fill(NOTHING)
+    history.fill(NOTHING)
+
+
+@kernel
+def forget_tiers(memory: Memory, rules: Held[Rules]) -> None:
+    """Resets what the tiers remember."""
+    begin_tiers(memory[0], rules.value.tiers)
+
+
+@kernel
+def perceive(
+    memory: Memory, rules: Held[Rules], samples: Floats, history: Floats, kept: NDArray[np.int64],
+    bumper: float, roof: float, points: RadarPoints, map: Held[LaneArrays],
+    on_highway: NDArray[np.bool_], place: Place,
+) -> bool:  # fmt: skip
+    """Notes what two distances in m and the radar show; returns whether the target must be verified."""
+    m, r = memory[0], rules.value
+    look_ahead(
+        m, r.fusion, r.detection, r.radar, samples, history, kept, bumper, roof, points, place, map,
+        on_highway,
+    )  # fmt: skip
+    return bool(needs_verification(r.tiers, m.distance, place.v * KMH))
+
+
+@kernel
+def act(
+    memory: Memory, rules: Held[Rules], verified_by: int, drives: bool, v: float, curvature: float,
+    stop_distance: float, v_bends: float, v_told: float,
+) -> Answer:  # fmt: skip
+    """Returns the answer to what was noted ahead.
+
+    A target that no camera bears out is dropped before the tiers, so that all go on without it (A-116,
+    D-043). drives: no supervisor does; curvature: of the ego's lane in 1/m; stop_distance: m, NaN: no
+    stop; v_bends, v_told: m/s that bends and others allow, inf: any.
+    """
+    m, r = memory[0], rules.value
+    v_kmh, stopping = v * KMH, not isnan(stop_distance)
+    count_resume(m, stopping, v_kmh, curvature)
+    cruise_kmh, follow_kmh = caps_kmh(m, r.caps)
+    cruise_kmh = min(cruise_kmh, v_bends * KMH, v_told * KMH)
+    if verified_by == BY_NONE:
+        m.distance = nan
+    confirmed = is_confirmed(m, r.detection) or m.status == RADAR_ACTIVE
+    gap = time_gap(m.distance, v)
+    request = NO_ACTION
+    if drives:
+        situation = Situation(
+            v, v_kmh, m.distance, gap, confirmed, stop_distance, cruise_kmh,
+            min(follow_kmh, v_told * KMH),
+        )  # fmt: skip
+        request = slow_for_bend(decide(m, r.tiers, situation), v, v_bends)
+    conclude(m, r.detection, not isnan(m.distance), r.tiers.follows, stopping)
+    return (
+        request.tier, request.throttle, request.brake, request.handbrake, verified_by, cruise_kmh,
+        m.status, m.distance, gap, m.bumper, m.roof, m.fused, m.radar_pre, m.radar_lane,
+        m.radar_velocity, m.radar_points, m.resume_ticks,
+    )  # fmt: skip
+
+
+@kernel
+def think(
+    memory: Memory, rules: Held[Rules], samples: Floats, history: Floats, kept: NDArray[np.int64],
+    bumper_u: Floats32, bumper_width: Floats32, bumper_top: Floats32, bumper_bottom: Floats32,
+    bumper_depth: Floats32, bumper_label: NDArray[np.uint8],
+    roof_u: Floats32, roof_width: Floats32, roof_top: Floats32, roof_bottom: Floats32,
+    roof_depth: Floats32, roof_label: NDArray[np.uint8],
+    radar_range: Floats32, azimuth: Floats32, altitude: Floats32, velocity: Floats32,
+    map: Held[LaneArrays], on_highway: NDArray[np.bool_],
+    x: float, y: float, z: float, yaw: float, lane: int, s: float, yaw_error: float, kappa: float,
+    drives: bool, v: float, curvature: float, stop_distance: float, v_bends: float, v_told: float,
+) -> Answer:  # fmt: skip
+    """Returns what `act` does, from what the sensors of the object level see.
+
+    Arrays cross into a kernel one by one, as a named tuple of them takes twice as long.
+    """
+    r = rules.value
+    bumper = Segments(bumper_u, bumper_width, bumper_top, bumper_bottom, bumper_depth, bumper_label)
+    roof = Segments(roof_u, roof_width, roof_top, roof_bottom, roof_depth, roof_label)
+    place = Place(x, y, z, yaw, v, lane, s, yaw_error, kappa)
+    near, far = r.keep
+    turn = sin(yaw_error)
+    asks = perceive(
+        memory, rules, samples, history, kept,
+        read_segments(bumper, near, near.near, near.far, PERCENTILE, turn, kappa),
+        read_segments(roof, far, far.near, far.far, PERCENTILE, turn, kappa),
+        RadarPoints(radar_range, azimuth, altitude, velocity), map, on_highway, place,
+    )  # fmt: skip
+    by = verify_runs(bumper, roof, r.keep, memory[0].distance, place) if asks else 0
+    return act(memory, rules, by, drives, v, curvature, stop_distance, v_bends, v_told)

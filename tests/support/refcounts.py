@@ -15,9 +15,9 @@ from skidpad.core.kernels.refcounts import (
 
 
 def counts_references(compiled: Any) -> bool:
-    """Whether machine code of a kernel, wrappers aside, still counts."""
+    """Whether machine code of a kernel, wrappers aside, still counts, for any types of its arguments."""
     assert isinstance(compiled, Dispatcher)
-    (result,) = compiled.overloads.values()
-    text = str(result.library._get_module_for_linking())
-    kernels = (f[0] for f in FUNCTION.finditer(text) if not is_wrapper(f[0]))
+    assert compiled.overloads
+    texts = [str(o.library._get_module_for_linking()) for o in compiled.overloads.values()]
+    kernels = (f[0] for text in texts for f in FUNCTION.finditer(text) if not is_wrapper(f[0]))
     return any(COUNTING.search(f) for f in kernels if not is_runtime(f))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from skidpad.campaign.runs.run import run
@@ -10,7 +11,7 @@ from skidpad.sensors.object_level import objects
 from skidpad.simulation import recovery
 from skidpad.simulation.world import feel, step
 from skidpad.stack import think
-from skidpad.stack.perception import radar
+from skidpad.stack.perception import hsv
 from support.refcounts import counts_references
 from support.runs import adas_run
 
@@ -29,7 +30,7 @@ def drive() -> None:
         objects.look,
         objects.listen,
         objects.feel_slope,
-        radar.retain,
+        think.think,
         ticks.copy_actors,
     ],
     ids=lambda compiled: compiled.py_func.__name__,
@@ -40,7 +41,8 @@ def test_a_kernel_of_the_tick_counts_nothing(compiled: object) -> None:
 
 def test_kernels_in_which_arrays_are_made_count() -> None:
     """Else the test above could not fail."""
-    assert counts_references(think.think)
+    hsv.keep_large(np.zeros(1, np.int32), np.zeros((2, 2), np.uint8))
+    assert counts_references(hsv.keep_large)
 
 
 def test_the_supervisors_kernel_counts_nothing() -> None:

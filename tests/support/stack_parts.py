@@ -186,7 +186,14 @@ def read_pair(pair, frame, yaw_error=0.0, kappa=0.0):
     keep = pair.keep
     return known(
         corridor.read_segments(
-            segments, keep, keep.near, keep.far, fusion.PERCENTILE, np.sin(yaw_error), kappa
+            segments,
+            keep,
+            keep.near,
+            keep.far,
+            fusion.PERCENTILE,
+            np.sin(yaw_error),
+            kappa,
+            np.empty((len(segments.u), 2)),
         )
     )
 
@@ -197,7 +204,7 @@ def confirm(cameras, frame, distance):
         pairs = cameras.bumper, cameras.roof
         by = front.verify_runs(
             *(frame.segments[pair.depth_id] for pair in pairs), tuple(p.keep for p in pairs),
-            float(distance), place(),
+            float(distance), place(), np.empty((400, 2)),
         )  # fmt: skip
     else:
         by = cameras.verify(frame, float(distance), 0.0, 0.0)
@@ -216,6 +223,7 @@ class RadarReading(NamedTuple):
     points: int
 
 
+WAYS = np.empty((front.WAYS, 2))
 NO_RADAR = RadarReading(None, None, None, 0)
 
 
@@ -257,5 +265,10 @@ def place_of(pose, v, view):
 def read_radar(rules, points, at, map, on_highway, tracking=False):
     """One measurement of the radar."""
     m, kept = memory.new_memory()[0], np.empty(max(len(points.range), 1), np.int64)
-    found = radar.read_radar(m, rules, points, kept, tracking, at, map.held, on_highway)
+    found = radar.read_radar(m, rules, points, kept, tracking, at, map.held, on_highway, WAYS)
     return RadarReading(*(known(n) for n in found[:3]), found.points)
+
+
+def find_in_lane(map, on_highway, points, n, at):
+    """The first of n points that is in the ego's lane, or -1."""
+    return radar.first_in_lane(map.held, on_highway, points, np.arange(n), n, at, WAYS)

@@ -37,7 +37,7 @@ from skidpad.stack.control.text import mode_text
 from skidpad.stack.control.tiers import tier_rules
 from skidpad.stack.functions import AddedFunctions
 from skidpad.stack.memory import Memory, new_memory
-from skidpad.stack.perception.front import ROOM, VERIFIED_BY, Cameras
+from skidpad.stack.perception.front import ROOM, VERIFIED_BY, WAYS, Cameras
 from skidpad.stack.perception.fusion import (
     MEDIAN_SAMPLES,
     far_samples,
@@ -105,6 +105,7 @@ class AdasConfig:
 class AdasStack:
     """One vehicle's driver. Deterministic: its commands depend on the frames alone."""
 
+    UNSAVED = ("_kept", "_ways", "_room")
     report: StackReport
 
     def __init__(
@@ -117,7 +118,8 @@ class AdasStack:
         self.cameras = Cameras(specs, self.config.functions, options)
         self.memory = new_memory()
         self._samples, self._history = far_samples(MEDIAN_SAMPLES), rate_samples(dt)
-        self._kept = np.empty(ROOM, dtype=np.int64)
+        self._kept, self._ways = np.empty(ROOM, dtype=np.int64), np.empty((WAYS, 2))
+        self._room = np.empty((ROOM, 2))
         self.scan = LightScan(map)
         self.lamps = LampCamera(specs)
         self.lock = StopLock(dt, options.hsv_required)
@@ -213,8 +215,11 @@ class AdasStack:
         bumper = frame.segments.get(self.cameras.bumper.depth_id, NO_SEGMENTS)
         roof = frame.segments.get(self.cameras.roof.depth_id, NO_SEGMENTS)
         told: Callable[..., Answer] = think  # mypy takes a named tuple for one of any length
+        most = max(len(bumper.u), len(roof.u))
+        if most > len(self._room):
+            self._room = np.empty((most, 2))
         return told(
-            *self._memories(frame), *bumper, *roof, *frame.radar, self.map.held,
+            *self._memories(frame), self._room, *bumper, *roof, *frame.radar, self.map.held,
             self.tracker.on_highway, pose.x, pose.y, pose.z, pose.yaw,
             -1 if ego is None else ego.lane, 0.0 if ego is None else ego.s, view.yaw_error,
             view.kappa, *rest,
@@ -240,11 +245,11 @@ class AdasStack:
 
     def _memories(
         self, frame: SensorFrame
-    ) -> tuple[Memory, Held[Rules], Floats, Floats, NDArray[np.int64]]:
+    ) -> tuple[Memory, Held[Rules], Floats, Floats, NDArray[np.int64], Floats]:
         """Returns memory and rules, with room for the frame's radar points."""
         if len(frame.radar.range) > len(self._kept):
             self._kept = np.empty(len(frame.radar.range), dtype=np.int64)
-        return self.memory, self._held, self._samples, self._history, self._kept
+        return self.memory, self._held, self._samples, self._history, self._kept, self._ways
 
     def _follow_supervision(self, phase: Supervision) -> None:
         """Notes which supervisor drives; forgets the old place where a warm-up begins (A-185)."""

@@ -81,14 +81,14 @@ def forget_tiers(memory: Memory, rules: Held[Rules]) -> None:
 @kernel
 def perceive(
     memory: Memory, rules: Held[Rules], samples: Floats, history: Floats, kept: NDArray[np.int64],
-    bumper: float, roof: float, points: RadarPoints, map: Held[LaneArrays],
+    ways: Floats, bumper: float, roof: float, points: RadarPoints, map: Held[LaneArrays],
     on_highway: NDArray[np.bool_], place: Place,
 ) -> bool:  # fmt: skip
     """Notes what two distances in m and the radar show; returns whether the target must be verified."""
     m, r = memory[0], rules.value
     look_ahead(
         m, r.fusion, r.detection, r.radar, samples, history, kept, bumper, roof, points, place, map,
-        on_highway,
+        on_highway, ways,
     )  # fmt: skip
     return bool(needs_verification(r.tiers, m.distance, place.v * KMH))
 
@@ -131,6 +131,7 @@ def act(
 @kernel
 def think(
     memory: Memory, rules: Held[Rules], samples: Floats, history: Floats, kept: NDArray[np.int64],
+    ways: Floats, room: Floats,
     bumper_u: Floats32, bumper_width: Floats32, bumper_top: Floats32, bumper_bottom: Floats32,
     bumper_depth: Floats32, bumper_label: NDArray[np.uint8],
     roof_u: Floats32, roof_width: Floats32, roof_top: Floats32, roof_bottom: Floats32,
@@ -151,10 +152,10 @@ def think(
     near, far = r.keep
     turn = sin(yaw_error)
     asks = perceive(
-        memory, rules, samples, history, kept,
-        read_segments(bumper, near, near.near, near.far, PERCENTILE, turn, kappa),
-        read_segments(roof, far, far.near, far.far, PERCENTILE, turn, kappa),
+        memory, rules, samples, history, kept, ways,
+        read_segments(bumper, near, near.near, near.far, PERCENTILE, turn, kappa, room),
+        read_segments(roof, far, far.near, far.far, PERCENTILE, turn, kappa, room),
         RadarPoints(radar_range, azimuth, altitude, velocity), map, on_highway, place,
     )  # fmt: skip
-    by = verify_runs(bumper, roof, r.keep, memory[0].distance, place) if asks else 0
+    by = verify_runs(bumper, roof, r.keep, memory[0].distance, place, room) if asks else 0
     return act(memory, rules, by, drives, v, curvature, stop_distance, v_bends, v_told)

@@ -17,6 +17,7 @@ from skidpad.stack.perception.corridor import (
     Corridor,
     half_width,
     in_corridor,
+    insert,
     lateral_offset,
     percentile,
     reachable_columns,
@@ -205,8 +206,11 @@ def test_percentile_interpolates_as_numpy_does(values, times):
     expected = np.percentile(np.repeat(values, times), 10)
     array = np.repeat(np.array(values, np.float32), times)
     assert percentile(array.copy(), len(array), 0.10) == approx(expected, rel=1e-5)
-    weight = np.full(len(values), float(times))
-    assert weighted_percentile(np.array(values), weight, 0.10) == approx(expected, rel=1e-5)
+    rows = np.empty((len(values), 2))
+    for n, value in enumerate(values):
+        insert(rows, n, value, float(times))
+    position = 0.10 * (times * len(values) - 1)
+    assert weighted_percentile(rows, len(rows), position) == approx(expected, rel=1e-5)
 
 
 def tier_by_numpy(inverse, labels, c, yaw_error, kappa):

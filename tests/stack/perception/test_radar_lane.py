@@ -17,10 +17,9 @@ from skidpad.stack.perception.radar import (
     MOUNT,
     PARABOLA_HALF_WIDTH,
     RadarRules,
-    first_in_lane,
     velocity_limit,
 )
-from support.stack_parts import NO_RADAR, place_of, read_radar
+from support.stack_parts import NO_RADAR, find_in_lane, place_of, read_radar
 from support.stackfakes import LANE_WIDTH, SPECS, ArcMap, Car, ego_at, frame, radar_points
 
 approx = pytest.approx
@@ -141,7 +140,7 @@ def test_each_measurement_stands_alone():
 def lane_match(map, pose, r, azimuth=0.0):
     tracker = LaneTracker(map, HighwayRoute())
     points, here = radar_points((r, azimuth, 0.0, 0.0)), place_of(pose, 0.0, tracker.update(pose))
-    return first_in_lane(map.held, tracker.on_highway, points, np.zeros(1, np.int64), here) == 0
+    return find_in_lane(map, tracker.on_highway, points, 1, here) == 0
 
 
 @pytest.mark.req("A-076")
@@ -342,6 +341,6 @@ def test_kernel_finds_the_point_that_the_map_s_own_answers_name(name):
             if is_in_lane(map, pose, view, float(points.range[k]), float(points.azimuth[k]))
         ]
         here = place_of(pose, 0.0, view)
-        found.append(first_in_lane(map.held, tracker.on_highway, points, np.arange(4), here))
+        found.append(find_in_lane(map, tracker.on_highway, points, 4, here))
         assert found[-1] == (inside[0] if inside else -1)
     assert {-1, 0, 1} <= set(found)

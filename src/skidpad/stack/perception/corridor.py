@@ -6,11 +6,13 @@ Depth arrives as inverse depth, 0 where there is nothing.
 
 from __future__ import annotations
 
+from math import floor
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.frames import Segments
 from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.vocabulary import SemanticClass
@@ -211,19 +213,17 @@ def read_segments(
     fraction: float,
     sin_yaw: float,
     kappa: float,
+    room: Floats,
 ) -> float:
     """Returns the same distance from runs of pixels, each weighing as many pixels as it covers (M-3).
 
-    near, far: m, instead of the corridor's.
+    near, far: m, instead of the corridor's; room (n, 2) for every run.
     """
-    n = len(runs.u)
-    z = np.empty(n, dtype=np.float64)
-    weight = np.empty(n, dtype=np.float64)
     class_first, classes = np.uint8(c.wanted.first), np.uint8(c.wanted.size)
     vehicle = 0.0
     kept = 0
     total = 0.0
-    for i in range(n):
+    for i in range(len(runs.u)):
         top, bottom = float(runs.top[i]), float(runs.bottom[i])
         rows = min(bottom, float(c.row_end)) - max(top, float(c.row_first))
         if rows <= 0.0 or not _is_one(runs.label[i], class_first, classes):
@@ -232,33 +232,41 @@ def read_segments(
         vehicle += pixels
         depth = float(runs.depth[i])
         if near < depth < far and in_width(depth, float(runs.u[i]), c, sin_yaw, kappa):
-            z[kept] = depth
-            weight[kept] = pixels
+            insert(room, kept, depth, pixels)
             total += pixels
             kept += 1
     if vehicle < c.min_vehicle or total < c.min_kept or kept == 0:
         return np.nan
-    return weighted_percentile(z[:kept], weight[:kept], fraction)
+    return weighted_percentile(room, kept, fraction * max(total - 1.0, 0.0))
 
 
 @kernel
-def weighted_percentile(
-    values: NDArray[np.float64], weight: NDArray[np.float64], fraction: float
-) -> float:
-    """Returns the percentile of values that each stand `weight` times, interpolated as in `percentile`."""
-    order = np.argsort(values, kind="mergesort")
-    position = fraction * max(np.sum(weight) - 1.0, 0.0)
-    k = np.floor(position)
+def insert(sorted: Floats, n: int, value: float, weight: float) -> None:
+    """Inserts a row with value and weight into the first n rows, which are sorted by value."""
+    k = n
+    while k > 0 and sorted[k - 1, 0] > value:
+        sorted[k, 0], sorted[k, 1] = sorted[k - 1, 0], sorted[k - 1, 1]
+        k -= 1
+    sorted[k, 0], sorted[k, 1] = value, weight
+
+
+@kernel
+def weighted_percentile(sorted: Floats, n: int, position: float) -> float:
+    """Returns the value at a position among n values that each stand as often as their weight says.
+
+    Interpolated as in `percentile`; sorted: as `insert` leaves it; position: counted from 0.
+    """
+    k = floor(position)
     passed = 0.0
-    low = values[order[-1]]
+    low = sorted[n - 1, 0]
     high = low
     found = False
-    for i in order:
-        passed += weight[i]
+    for i in range(n):
+        passed += sorted[i, 1]
         if not found and passed > k:
-            low = values[i]
+            low = sorted[i, 0]
             found = True
         if passed > k + 1.0:
-            high = values[i]
+            high = sorted[i, 0]
             break
     return float(low + (position - k) * (high - low))

@@ -39,7 +39,8 @@ ROOF = ("depth_roof", "semantic_roof")
 BUMPER = ("depth_bumper", "semantic_bumper")
 VERIFIED_BY = ("", "bumper", "roof", "none")  # not asked, or which pair bears the target out
 BY_BUMPER, BY_ROOF, BY_NONE = 1, 2, 3
-ROOM = 256  # radar points; more need a larger room
+ROOM = 512  # radar points and runs of pixels; more need a larger room
+WAYS = 256  # branches of the lane ahead
 
 
 class Cameras:
@@ -82,14 +83,19 @@ class Cameras:
 
 @kernel
 def verify_runs(
-    bumper: Segments, roof: Segments, keep: tuple[Corridor, Corridor], distance: float, place: Place
+    bumper: Segments,
+    roof: Segments,
+    keep: tuple[Corridor, Corridor],
+    distance: float,
+    place: Place,
+    room: Floats,
 ) -> int:
     """Returns what `Cameras.verify` does, by runs of pixels; keep: corridors of bumper and roof."""
     near, far = verified_depths(distance)
     turn = sin(place.yaw_error)
-    if read_segments(bumper, keep[0], near, far, PERCENTILE, turn, place.kappa) > 0.0:
+    if read_segments(bumper, keep[0], near, far, PERCENTILE, turn, place.kappa, room) > 0.0:
         return BY_BUMPER
-    if read_segments(roof, keep[1], near, far, PERCENTILE, turn, place.kappa) > 0.0:
+    if read_segments(roof, keep[1], near, far, PERCENTILE, turn, place.kappa, room) > 0.0:
         return BY_ROOF
     return BY_NONE
 
@@ -109,14 +115,15 @@ def look_ahead(
     place: Place,
     map: Held[LaneArrays],
     on_highway: NDArray[np.bool_],
+    ways: Floats,
 ) -> None:
     """Notes what this tick shows ahead; call it once per tick, as filters and memory move on.
 
-    bumper, roof: m; samples, history, kept: as `AdasStack` has them.
+    bumper, roof: m; samples, history, kept, ways: as `AdasStack` has them.
     """
     fused = fuse(fusion, bumper, roof)
     tracking = is_confirmed(m, detection)
-    reading = read_radar(m, radar, points, kept, tracking, place, map, on_highway)
+    reading = read_radar(m, radar, points, kept, tracking, place, map, on_highway, ways)
     push(samples, limit_rate(m, fusion, history, fused) if fusion.limits_rate else fused)
     found = detect(m, detection, median(samples), bumper, reading)
     m.status, m.distance = found.status, found.distance

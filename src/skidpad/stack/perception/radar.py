@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.frames import RadarPoints
 from skidpad.core.kernels.jit import Held, inner_kernel, kernel
 from skidpad.core.settings.stack import RadarCandidates, RadarCorridor, StackSettings
@@ -91,27 +92,31 @@ def first_in_lane(
     map: Held[LaneArrays],
     on_highway: NDArray[np.bool_],
     points: RadarPoints,
-    chosen: NDArray[np.int64],
+    kept: NDArray[np.int64],
+    chosen: int,
     place: Place,
+    ways: Floats,
 ) -> int:
-    """Returns the first of the chosen rows of `points` in the ego's lane or where it leads (A-076 to A-078).
+    """Returns the first row of `points` in the ego's lane or where it leads (A-076 to A-078).
 
-    -1: none is, or the ego is on no lane (A-083). on_highway: by lane. The look ahead reads one place
-    per branch, the point's range + 10 m on, as A-078 is written: a target whose road ends before that
-    place is missed.
+    Of the rows that the first `chosen` of `kept` name; -1: none is, or the ego is on no lane (A-083).
+    on_highway: by lane; ways (n, 2): room for branches, beyond which none is followed. The look
+    ahead reads one place per branch, the point's range + 10 m on, as A-078 is written: a target whose
+    road ends before that place is missed.
     """
     if place.lane < 0:
         return -1
     a = map.value
     lane, s = _onto_highway(a, on_highway, place.lane, place.s)
     x, y = place.x + MOUNT * cos(place.yaw), place.y + MOUNT * sin(place.yaw)
-    for i in chosen:
+    for k in range(chosen):
+        i = kept[k]
         r, bearing = float(points.range[i]), place.yaw + float(points.azimuth[i])
         target, at, _ = project_kernel(a, x + r * cos(bearing), y + r * sin(bearing), place.z, True)
         if target < 0:
             continue
         target, _ = _onto_highway(a, on_highway, target, at)
-        if _is_same(a, target, lane) or _leads_to(a, lane, s + (r + LOOK_BEYOND), target):
+        if _is_same(a, target, lane) or _leads_to(a, lane, s + (r + LOOK_BEYOND), target, ways):
             return int(i)
     return -1
 
@@ -137,12 +142,12 @@ def _is_same(a: LaneArrays, one: int, other: int) -> bool:
 
 
 @inner_kernel
-def _leads_to(a: LaneArrays, lane: int, s: float, target: int) -> bool:
+def _leads_to(a: LaneArrays, lane: int, s: float, target: int, ways: Floats) -> bool:
     """Returns whether s, counted from the start of a lane, lies on the target's lane on some branch."""
-    lanes, places = [lane], [s]
-    k = 0
-    while k < len(lanes):
-        lane, s = lanes[k], places[k]
+    ways[0, 0], ways[0, 1] = lane, s
+    k, n = 0, 1
+    while k < n:
+        lane, s = int(ways[k, 0]), ways[k, 1]
         k += 1
         if s <= a.length[lane]:
             if _is_same(a, lane, target):
@@ -152,11 +157,12 @@ def _leads_to(a: LaneArrays, lane: int, s: float, target: int) -> bool:
         for j in range(a.next_start[lane], a.next_start[lane + 1]):
             following = int(a.next_lane[j])
             known = False  # branches that meet again are followed once
-            for m in range(len(lanes)):
-                known = known or (lanes[m] == following and places[m] == s)
-            if not known and (a.drivable[following] or not a.drivable[lane]):
-                lanes.append(following)
-                places.append(s)
+            for m in range(n):
+                known = known or (ways[m, 0] == following and ways[m, 1] == s)
+            drives_on = a.drivable[following] or not a.drivable[lane]
+            if not known and drives_on and n < len(ways):
+                ways[n, 0], ways[n, 1] = following, s
+                n += 1
     return False
 
 
@@ -183,11 +189,11 @@ def radar_rules(settings: StackSettings) -> RadarRules:
 @kernel
 def read_radar(
     m: Record, rules: RadarRules, points: RadarPoints, kept: NDArray[np.int64], tracking: bool, place: Place,
-    map: Held[LaneArrays], on_highway: NDArray[np.bool_],
+    map: Held[LaneArrays], on_highway: NDArray[np.bool_], ways: Floats,
 ) -> RadarReading:  # fmt: skip
     """Returns the readings of one measurement, NO_RADAR without a point that passes the pre-filter (A-066).
 
-    kept: room for every point; tracking: vision has confirmed a lead (A-073).
+    kept: room for every point; ways: as in `first_in_lane`; tracking: vision has confirmed a lead (A-073).
     """
     if not rules.takes_part:
         return NO_RADAR
@@ -202,7 +208,7 @@ def read_radar(
     found = nearest
     if rules.by_map:
         chosen = 1 if rules.nearest_only else n
-        found = first_in_lane(map, on_highway, points, kept[:chosen], place)
+        found = first_in_lane(map, on_highway, points, kept, chosen, place, ways)
     lane = nan if found < 0 else np.float64(points.range[found])
     told = nearest if found < 0 else found
     pre, velocity = np.float64(points.range[nearest]), np.float64(points.velocity[told])

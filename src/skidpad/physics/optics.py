@@ -150,19 +150,34 @@ def _reach(beta: float, start: float, budget: float) -> float:
     return start + budget / beta if beta > 0.0 else inf
 
 
-def depth_range(weather: Weather) -> float:
-    """Returns the distance in m to which a camera still measures depth and tells classes by day.
+def _contrast_range(weather: Weather, budget: float) -> float:
+    """Returns the distance in m at which fog and rain have used up `budget` nepers of contrast.
 
-    A car's contrast falls to the least seen one (Koschmieder); fog begins at fog_distance, rain at
-    the lens.
+    Fog begins at fog_distance, rain at the lens.
     """
-    budget = log(CONTRAST_CAR / CONTRAST_SEEN)
     rain, fog = rain_extinction(rain_rate(weather)), fog_extinction(weather)
     near = _reach(rain, 0.0, budget)
     if near <= weather.fog_distance:
         return near
     spent = rain * weather.fog_distance
     return _reach(rain + fog, weather.fog_distance, budget - spent)
+
+
+def seen_range(weather: Weather) -> float:
+    """Returns the distance in m to which people see traffic: `sight`, with fog only from fog_distance on.
+
+    Lamps may be seen farther; how much farther is not modelled.
+    """
+    return _contrast_range(weather, -log(CONTRAST_SEEN))
+
+
+def depth_range(weather: Weather) -> float:
+    """Returns the distance in m to which a camera still measures depth and tells classes by day.
+
+    A car's contrast falls to the least seen one (Koschmieder); fog begins at fog_distance, rain at
+    the lens.
+    """
+    return _contrast_range(weather, log(CONTRAST_CAR / CONTRAST_SEEN))
 
 
 def label_range(weather: Weather, beam: Beam = Beam.LOW) -> float:

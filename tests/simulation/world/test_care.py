@@ -17,6 +17,7 @@ from skidpad.core.states import ActorStates
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.grip import left_at, mu_at
+from skidpad.physics.optics import depth_range, sight, transmission
 from skidpad.physics.presets import find_weather
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
@@ -99,6 +100,30 @@ def test_one_stops_within_sight(weather: Weather, v: float) -> None:
 def test_fog_slows_whoever_minds_it() -> None:
     clear, fog = minding(DRY), minding(replace(DRY, fog_density=100.0))
     assert care_.sight_speed(fog, 20.0) < 0.7 * care_.sight_speed(clear, 20.0)
+
+
+@given(
+    fog=st.floats(0.0, 100.0),
+    rain=st.floats(0.0, 100.0),
+    begins=st.sampled_from([0.0, 20.0, 200.0]),
+)
+def test_sight_is_that_of_the_air_that_the_sensors_look_through(
+    fog: float, rain: float, begins: float
+) -> None:
+    weather = replace(DRY, fog_density=fog, precipitation=rain, fog_distance=begins)
+    seen = minding(weather).sight
+    assert transmission(weather, seen) == pytest.approx(0.05)
+    assert seen > depth_range(weather)  # a car's contrast is half of what people are taken to see
+    if begins == 0.0:
+        assert seen == sight(weather)
+
+
+def test_fog_that_begins_far_ahead_slows_nobody() -> None:
+    near, far = (
+        minding(replace(DRY, fog_density=100.0, fog_distance=begins)) for begins in (0.0, 200.0)
+    )
+    assert care_.sight_speed(far, 20.0) == care_.sight_speed(minding(DRY), 20.0)
+    assert care_.sight_speed(near, 20.0) < 20.0
 
 
 @pytest.mark.parametrize(("slide", "share"), [(0.0, 1.0), (0.017, 1.0), (0.04, 0.5), (-0.07, 0.0)])

@@ -25,7 +25,7 @@ from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.traffic.sight import DriverView, RoadLook, SeenActors
 from skidpad.core.vocabulary import ActorKind, LightState, RangeModel
 from skidpad.core.weather import Weather
-from skidpad.physics.optics import label_range, sight
+from skidpad.physics.optics import label_range, seen_range
 from skidpad.roads.roadside import Roadside
 from skidpad.sensors.object_level.boxes import Boxes, posts_of
 from skidpad.sensors.object_level.sight import ray_box
@@ -208,7 +208,7 @@ def road_look(weather: Weather) -> RoadLook:
 def _reach(table: ActorTable, weather: Weather) -> Floats:
     """Returns (n,) m at which each actor can be seen."""
     by_outline = label_range(weather)
-    by_lamps = sight(weather) if weather.is_night else 0.0
+    by_lamps = seen_range(weather) if weather.is_night else 0.0
     lit = table.kind <= int(ActorKind.MOTORCYCLE)
     reach: Floats = np.minimum(np.where(lit, max(by_outline, by_lamps), by_outline), FARTHEST)
     return reach

@@ -18,7 +18,7 @@ from skidpad.core.setup import Setup
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.grip import GripParams, grip_params, left_at, mu_at, road_of
-from skidpad.physics.optics import sight
+from skidpad.physics.optics import seen_range
 from skidpad.simulation.world.traffic.idm import (
     A_EMERGENCY,
     B_COMFORT,
@@ -79,7 +79,7 @@ def care_of(setup: Setup, slow_in_weather: bool) -> Care:
     if not slow_in_weather:
         return careless()
     grip = road_of(setup).params()
-    return Care(True, grip, sight(setup.weather), A_CHANGE, DRAWN)
+    return Care(True, grip, seen_range(setup.weather), A_CHANGE, DRAWN)
 
 
 @kernel

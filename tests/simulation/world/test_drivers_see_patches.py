@@ -13,7 +13,7 @@ from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.simulation.world.patches import Patches
-from skidpad.simulation.world.traffic.care import care_of, speed_choice
+from skidpad.simulation.world.traffic.care import care_of, sight_speed, speed_choice
 
 ROAD = load_map("straight")
 PLACE = ROAD.project(*(float(v[500]) for v in (ROAD.samples.x, ROAD.samples.y, ROAD.samples.z)))
@@ -22,13 +22,13 @@ ICE = SurfacePatch(ice_mm=3.0, road=PLACE.road, s=(S - 200.0, S - 150.0))
 WATER = SurfacePatch(water_mm=2.0, road=PLACE.road, s=(S - 200.0, S - 150.0))
 
 
-def drive(*surface, sees=True, minds=True, seconds=22.0):
+def drive(*surface, sees=True, minds=True, seconds=22.0, weather=Weather()):
     """Way along its lane in m, against the road, and speed in m/s of a background car, tick by tick."""
     lane = int(ROAD.lanes.lane_id[PLACE.lane])
     place = LanePosition(PLACE.road, lane, S)
     back = LanePosition(PLACE.road, lane, S + 100.0)
     setup = Setup(
-        map="straight", weather=Weather(), specs=(), patches=surface,
+        map="straight", weather=weather, specs=(), patches=surface,
         ego=ActorSetup(name="ego", type=EGO_TYPE, place=back),
         actors=(
             ActorSetup(name="car", type="hatchback", place=place, speed=20.0, driver=Control.AUTOPILOT),
@@ -73,6 +73,28 @@ def test_it_slows_as_the_factor_of_friction_says():
 def test_without_patches_without_care_and_unseen_nothing_changes(surface, options):
     plain = drive(*surface, **{**options, "sees": False}, seconds=6.0)
     assert np.array_equal(drive(*surface, **{"sees": True, **options}, seconds=6.0), plain)
+
+
+def test_materials_and_sheet_flow_are_part_of_what_drivers_see():
+    """They reach the tyres through the same shares as patches do."""
+    road = Road(Weather(), Setup.__dataclass_fields__["grip"].default)
+    key = (PLACE.road, int(ROAD.lanes.lane_id[PLACE.lane]))
+    shares = Patches(ROAD, [], road, {key: [(S - 200.0, S - 150.0, 0.5)]}).lane_shares()
+    here = ROAD.samples.lane == PLACE.lane
+    assert set(shares[~here]) == {1.0}
+    assert set(shares[here]) == {0.5, 1.0}
+
+
+@pytest.mark.parametrize("begins", [0.0, 200.0])
+def test_in_fog_it_drives_as_fast_as_it_can_stop_within_sight(begins):
+    fog = Weather(fog_density=100.0, fog_distance=begins)
+    clear, v = (drive(weather=w)[-1, 1] for w in (Weather(), fog))
+    care = care_of(Setup(map="straight", weather=fog, specs=(), ego=None), slow_in_weather=True)
+    if begins:
+        assert v == clear
+    else:
+        assert v < 0.9 * clear
+        assert v == pytest.approx(sight_speed(care, v), abs=0.3)
 
 
 def test_deep_water_is_seen_too():

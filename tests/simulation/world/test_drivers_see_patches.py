@@ -18,11 +18,12 @@ from skidpad.simulation.world.traffic.care import care_of, sight_speed, speed_ch
 ROAD = load_map("straight")
 PLACE = ROAD.project(*(float(v[500]) for v in (ROAD.samples.x, ROAD.samples.y, ROAD.samples.z)))
 S = ROAD.s_road(PLACE)
+CLEAR = Weather()
 ICE = SurfacePatch(ice_mm=3.0, road=PLACE.road, s=(S - 200.0, S - 150.0))
 WATER = SurfacePatch(water_mm=2.0, road=PLACE.road, s=(S - 200.0, S - 150.0))
 
 
-def drive(*surface, sees=True, minds=True, seconds=22.0, weather=Weather()):
+def drive(*surface, sees=True, minds=True, seconds=22.0, weather=CLEAR):
     """Way along its lane in m, against the road, and speed in m/s of a background car, tick by tick."""
     lane = int(ROAD.lanes.lane_id[PLACE.lane])
     place = LanePosition(PLACE.road, lane, S)
@@ -61,7 +62,7 @@ def test_a_driver_is_slower_on_ice_that_it_sees_and_as_fast_again_behind_it():
 def test_it_slows_as_the_factor_of_friction_says():
     road = Road(Weather(), Setup.__dataclass_fields__["grip"].default)
     share = float(Patches(ROAD, [ICE], road).lane_shares().min())
-    setup = Setup(map="straight", weather=Weather(), specs=(), ego=None)
+    setup = Setup(map="straight", weather=CLEAR, specs=(), ego=None)
     v, limit = (speed_at(found, 195.0) for found in (drive(ICE), drive(sees=False)))
     wanted = limit * speed_choice(care_of(setup, slow_in_weather=True), v, share)
     assert wanted < v < 1.2 * wanted  # it still slows, as little as ice lets it

@@ -56,7 +56,7 @@ class Eyes:
         self.spec, self.table, self.dt = spec, table, setup.dt
         self.road = road_look(setup.weather)
         physical = setup.range_model is RangeModel.PHYSICAL
-        self.visibility = min(sight(setup.weather), FARTHEST) if physical else FARTHEST
+        self.visibility = min(seen_range(setup.weather), FARTHEST) if physical else FARTHEST
         self._reach = _reach(table, setup.weather) if physical else np.full(len(table), FARTHEST)
         self._heads = roadside.heads
         self._fixed = posts_of(roadside)

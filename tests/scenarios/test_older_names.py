@@ -90,3 +90,29 @@ def test_a_trajectory_of_0_9_1_is_a_line(tmp_path):
     k = next(k for k, r in enumerate(rows) if r.y < -8.0)
     assert rows[k + 40].x - rows[k].x == pytest.approx(24.0, abs=0.7)
     assert rows[k + 40].speed == pytest.approx(12.0)
+
+
+def test_the_owner_of_a_story_is_meant_by_its_keyword(tmp_path):
+    """0.9.1 has `$owner` for the entity that the story names, as an actor and as a partner."""
+    slow = EVENT.format("slow", SLOW, NEAR.format(41).replace('"other"', '"$owner"'), "none")
+    told = played_file(tmp_path, slow)
+    text = (tmp_path / "old.xosc").read_text()
+    file = tmp_path / "owner.xosc"
+    file.write_text(
+        text.replace('<Actors><Entity name="other"/>', '<Actors><Entity name="$owner"/>')
+    )
+    owned = play_ideal(check(file).playable(), 20.0)
+    assert owned.of("other")[-1].speed == pytest.approx(4.0)
+    assert owned.rows == told.rows
+
+
+def test_a_place_on_a_route_of_0_9_1(tmp_path):
+    """60 m on from a waypoint at s = 100 on lane -1 of a straight road."""
+    route = """<Route name="r" closed="false"><Waypoint strategy="shortest"><Position><Lane roadId="1"
+laneId="-1" s="100"/></Position></Waypoint><Waypoint strategy="shortest"><Position><Lane roadId="1"
+laneId="-1" s="300"/></Position></Waypoint></Route>"""
+    place = f"""<Position><Route><RouteRef>{route}</RouteRef><Position><LaneCoord pathS="60"
+laneId="-1"/></Position></Route></Position>"""
+    there = EVENT.format("there", place, NEAR.format(41), "none")
+    row = played_file(tmp_path, there).of("other")[-1]
+    assert row.y == pytest.approx(-1.75, abs=0.01)

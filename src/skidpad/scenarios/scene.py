@@ -119,7 +119,7 @@ class Actor:
     seen: bool = False  # in a tick before
     handed: bool = True  # somebody else's controller is active, where mode is None
     word: ActorCommand | None = None  # appear or vanish, said once
-    appears: bool = False  # added in this step, in which it moves on already
+    goes_on: bool = False  # put somewhere in this step, in which it moves on already
     visible: bool = True  # to sensors
     assigned: Any = None  # a `registry.ControllerOf` that an action has given it
     towed_by: Actor | None = None  # the vehicle whose hitch draws it
@@ -242,9 +242,9 @@ class Actor:
             word, self.word = self.word, None
             if word.place is not None and self.placed_by_file:
                 word = replace(word, speed=self.guide.v)  # which this step may have set since
-            if self.appears and self.placed_by_file:
+            if self.goes_on and self.placed_by_file:
                 word = replace(self._place_command(t + dt, dt), present=True)
-            self.appears = False
+            self.goes_on = False
             return word
         if not self.present or not self.driven_by_file:
             return None

@@ -337,6 +337,9 @@ def begins() -> Iterator[Case]:
     yield case("teleport", "straight", teleport(on_lane(-2, 200)))
     both = f'{teleport(on_lane(-2, 200))}</PrivateAction></Action><Action name="v"><PrivateAction>'
     yield case("teleport_speed", "straight", both + speed(to(6)), when=time(1.125))
+    aside = f'{teleport(on_lane(-2, 200))}</PrivateAction></Action><Action name="l"><PrivateAction>'
+    change = lane_change('<AbsoluteTargetLane value="-1"/>', "linear", 3)
+    yield case("teleport_lane", "straight", aside + change)
     yield case("teleport_turned", "straight", teleport(turned(-1, 200, WEST)))
     yield case("teleport_across", "on_foot", teleport(turned(-1, 140, NORTH)))
     yield case(

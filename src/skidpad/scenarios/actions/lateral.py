@@ -127,7 +127,8 @@ class LaneChange:
     offset: float
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Begins the change from where the entity is now."""
+        """Begins the change from where the entity is now; put there in this step, it moves on at once."""
+        actor.goes_on = actor.goes_on or actor.word is not None
         actor.leave_track(scene.network)
         actor.catch_up(scene.network)
         guide = actor.guide

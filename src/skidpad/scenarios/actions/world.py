@@ -34,7 +34,7 @@ class AddEntity:
             scene.notice(f"<AddEntityAction> of {self.name} has no effect: it is there already")
             return DONE
         actor.put(scene.network, self.position.place(scene), actor.guide.v)
-        actor.appears = True
+        actor.goes_on = True
         return DONE
 
 

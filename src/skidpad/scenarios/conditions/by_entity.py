@@ -274,7 +274,7 @@ class Clearance:
             return False
         near = base  # the own lane on the road of the other one
         if there.road != base.road:
-            near = scene.network.map.ahead(base, way[0] if along else -way[0]) or base
+            near = scene.network.ahead(base, way[0] if along else -way[0]) or base
             if near.road != there.road:
                 return False
         if not self.opposite and (there.lane_id > 0) != (near.lane_id > 0):
@@ -337,7 +337,7 @@ def time_past_road(actor: Actor, network: Network, t: float) -> float:
     lane = network.place_of(actor.pose).lane
     if lane is not None:
         forward, _ = between(lane.pose, actor.pose.x, actor.pose.y)
-        past = abs(forward) > PAST and network.map.ahead(lane, forward) is None
+        past = abs(forward) > PAST and network.ahead(lane, forward) is None
         since = t if actor.out_since is None else actor.out_since
         actor.out_since = since if past else None
     return 0.0 if actor.out_since is None else t - actor.out_since

@@ -24,6 +24,7 @@ SLOPE_STEP = 0.5  # m to either side, over which a slope is taken
 ABREAST, ABREAST_STEPS = 1e-3, 6  # m ahead that still is abreast, and tries to get there
 STEP = 1e-3  # m into the next lane
 END_SLACK = 0.5  # m beyond the end of a road that still is its end
+EVEN = 1e-3  # rad, between two turns at a fork that are as far from straight
 
 
 @fill_slots
@@ -56,6 +57,7 @@ class Network:
     def __init__(self, map: RoadMap, name: str, *, stand_in: bool = False) -> None:
         self.map, self.name, self.stand_in = map, name, stand_in
         self._route_lengths: dict[tuple[int, int], float | None] = {}
+        self._default_next: dict[int, int | None] = {}
 
     @cached_property
     def roads(self) -> dict[int, RoadRecord]:
@@ -199,20 +201,22 @@ class Network:
         for _ in range(ABREAST_STEPS):
             dx, dy = x - near.x, y - near.y
             forward = dx * cos(near.heading) + dy * sin(near.heading)
-            further = self.map.ahead(near, forward) if abs(forward) > ABREAST else None
+            further = self.ahead(near, forward) if abs(forward) > ABREAST else None
             if further is None:
                 break
             near = further
         dx, dy = x - near.x, y - near.y
         return near, (dy * cos(near.heading) - dx * sin(near.heading)) / self.lean(near)
 
-    def ahead(self, point: LanePoint, distance: float, roads: tuple[int, ...]) -> LanePoint | None:
+    def ahead(
+        self, point: LanePoint, distance: float, roads: tuple[int, ...] = ()
+    ) -> LanePoint | None:
         """Returns the place `distance` m further along, negative: back; at forks towards the given roads.
 
-        Without roads it goes straight on at forks. None at the end of the road.
+        Without roads it goes straight on at forks, see `even_forks`. None at the end of the road.
         """
         if not roads:
-            return self.map.ahead(point, distance)
+            return self._ahead_by_default(point, distance)
         while True:
             length = float(self.map.lanes.length[point.lane])
             s = point.s + distance
@@ -221,10 +225,60 @@ class Network:
             forward = s > length
             following = self._next_lane(point.lane, forward, roads)
             if following is None:
-                return self.map.ahead(point, distance)
+                return self._ahead_by_default(point, distance)
             entry = 0.0 if forward else float(self.map.lanes.length[following])
             distance = s - length if forward else s
             point = self.map.at(following, entry)
+
+    @cached_property
+    def even_forks(self) -> dict[int, int]:
+        """Returns, by the lane before it, the lane that is taken at a fork without a straightest way.
+
+        Where two lanes turn as far to either side, it is the right one in right-hand traffic, else the
+        left one (OpenSCENARIO XML 6.8.1).
+        """
+        found = {}
+        starts = self.map.arrays.next_start
+        for lane in np.flatnonzero(np.diff(starts) > 1).tolist():
+            turns = {following: self._turn(lane, following) for following in self._exits(lane)}
+            least = min(map(abs, turns.values()), default=0.0)
+            even = [k for k, turn in turns.items() if abs(turn) < least + EVEN]
+            if min(turns[k] for k in even) < -EVEN and max(turns[k] for k in even) > EVEN:
+                left_hand = (self.map.lanes.lane_id[lane] > 0) == self.forward(
+                    self.map.at(lane, 0.0)
+                )
+                found[lane] = (max if left_hand else min)(even, key=lambda k: turns[k])
+        return found
+
+    def _exits(self, lane: int) -> list[int]:
+        """Returns the lanes after one: drivable ones, if it is drivable itself."""
+        drivable = self.map.arrays.drivable
+        return [k for k in map(int, self.map.successors(lane)) if drivable[k] or not drivable[lane]]
+
+    def _turn(self, lane: int, following: int) -> float:
+        """Returns the angle in rad from the end of a lane to the end of one after it, left positive."""
+        ends = [self.map.at(k, float(self.map.lanes.length[k])).heading for k in (lane, following)]
+        return wrap_angle(ends[1] - ends[0])
+
+    def _ahead_by_default(self, point: LanePoint, distance: float) -> LanePoint | None:
+        """Returns the place `distance` m further along without a route; None at the end of the road."""
+        if distance <= 0.0 or not self.even_forks:
+            return self.map.ahead(point, distance)
+        while (left := float(self.map.lanes.length[point.lane]) - point.s) < distance:
+            following = self._next_by_default(point.lane)
+            if following is None:
+                return None
+            point, distance = self.map.at(following, 0.0), distance - left
+        return self.map.at(point.lane, point.s + distance)
+
+    def _next_by_default(self, lane: int) -> int | None:
+        """Returns the lane that is taken after another one without a route; None at the end of the road."""
+        if lane not in self._default_next:
+            end = self.map.at(lane, float(self.map.lanes.length[lane]))
+            further = self.map.ahead(end, STEP)
+            straight = None if further is None else further.lane
+            self._default_next[lane] = self.even_forks.get(lane, straight)
+        return self._default_next[lane]
 
     def ahead_on_roads(
         self, point: LanePoint, distance: float, roads: tuple[int, ...]

@@ -151,7 +151,7 @@ class RelativeLane:
         sign = -1 if self.along_lane and not forward else 1
         way = -self.ds if backwards else self.ds
         if self.along_lane:
-            point = network.map.ahead(here, way) or here
+            point = network.ahead(here, way) or here
         else:
             point = network.ahead_on_roads(here, way, ())
         if self.lanes:

@@ -85,7 +85,13 @@ TAGS: Mapping[str, Mapping[str, str]] = {  # by the new name of what they stand 
     "GlobalAction": {"SetEnvironment": "EnvironmentAction", "Entity": "EntityAction"},
     "EntityAction": {"Add": "AddEntityAction", "Delete": "DeleteEntityAction"},
     "Position": POSITION,
+    "RoutePosition": {"Position": "InRoutePosition"},
+    "InRoutePosition": {
+        "Current": "FromCurrentEntity", "RoadCoord": "FromRoadCoordinates",
+        "LaneCoord": "FromLaneCoordinates",
+    },
 }  # fmt: skip
+OWNER = "$owner"  # in a story: the entity that its attribute `owner` names
 ATTRIBUTES: Mapping[str, Mapping[str, str]] = {  # by the new name of the element
     "ParameterDeclaration": {"type": "parameterType"},
     "Vehicle": {"category": "vehicleCategory"},
@@ -127,6 +133,8 @@ def renew(root: Element) -> None:
         parent = element.getparent()
         inside = "" if parent is None else str(parent.tag)
         old = str(element.tag)
+        if old == "Story":
+            _name_owner(element)
         if old == "Conditions" and inside == "Act":
             _lift(element)
             continue
@@ -135,6 +143,15 @@ def renew(root: Element) -> None:
         special = SPECIAL.get(str(element.tag))
         if special is not None:
             special(element)
+
+
+def _name_owner(story: Element) -> None:
+    """Puts the owner's name, in place, where something in a story is its keyword `$owner`."""
+    owner = str(story.get("owner", ""))
+    for element in story.iter("*") if owner else ():
+        for key, value in element.attrib.items():
+            if value == OWNER:
+                element.set(key, owner)
 
 
 def _rename(element: Element, old: str) -> None:

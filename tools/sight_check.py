@@ -56,7 +56,7 @@ CAR = sqrt(4.0 / pi * 1.8 * 1.5)  # m, diameter of a disc as large as a car's re
 LARGEST = 60.0  # arc minutes, larger targets count as this; validity of the time factor
 ROAD = 0.1  # reflectance of road and of a dark car: assumption
 NIGHT_ADAPTATION = 0.1  # cd/m^2, of a road lit by a low beam: assumption
-AGE, GLANCE, PROBABLE = 30.0, 0.2, 2.6  # years; s; Adrian's k for almost certain detection
+AGE, GLANCE, PROBABLE = 30.0, 0.2, 2.6  # years; s; k of the plots of that repository after Adrian
 NIGHT_LUX = 10.0  # less daylight is night, as in `optics.label_range`
 APPROACHES, FARTHEST, NEAREST, STEP = 20, 90.0, 6.0, 3.0  # gaps in m, bumper to bumper
 EMPTY_LOOKS = 10  # at a road without anybody
@@ -95,10 +95,10 @@ def visibility_level(weather: Weather, distance: float) -> float:
     if lux >= NIGHT_LUX:
         background = lux * ROAD / pi
         contrast = contrast_at(CONTRAST_CAR, weather, distance)
-        return contrast * background / eye_threshold(background, arc_minutes, True)
+        return float(contrast * background / eye_threshold(background, arc_minutes, True))
     left = transmission(weather, distance)
     lit = HEADLIGHT_CANDELA / distance**2 * left * ROAD / pi
-    return lit * left / eye_threshold(NIGHT_ADAPTATION, arc_minutes, False)
+    return float(lit * left / eye_threshold(NIGHT_ADAPTATION, arc_minutes, False))
 
 
 def eye_range(weather: Weather, level: float) -> float:

@@ -85,7 +85,7 @@ def eye_threshold(background: float, arc_minutes: float, is_darker: bool) -> flo
         by_size = 0.36 - 0.0972 * a * a / (a * a - 2.513 * a + 2.7895)
         by_light = 0.355 - 0.1217 * b * b / (b * b - 10.4 * b + 52.28)
         found *= (sqrt(by_size**2 + by_light**2) / 2.1 + GLANCE) / GLANCE
-    return found * ((AGE - 19.0) ** 2 / 2160.0 + 0.99)
+    return float(found * ((AGE - 19.0) ** 2 / 2160.0 + 0.99))
 
 
 def visibility_level(weather: Weather, distance: float) -> float:

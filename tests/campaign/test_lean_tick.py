@@ -10,7 +10,7 @@ from skidpad.recording.run import ticks
 from skidpad.sensors.object_level import objects
 from skidpad.simulation import recovery
 from skidpad.simulation.world import feel, step
-from skidpad.stack import think
+from skidpad.stack import road, think
 from skidpad.stack.perception import hsv
 from support.refcounts import counts_references
 from support.runs import adas_run
@@ -30,6 +30,7 @@ def drive() -> None:
         objects.look,
         objects.listen,
         objects.feel_slope,
+        road.read_road,
         think.think,
         ticks.copy_actors,
     ],

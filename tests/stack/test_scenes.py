@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from dataclasses import replace
+from math import atan2, pi
 from pathlib import Path
 
 import numpy as np
@@ -100,7 +101,7 @@ def mirrored_views(curvature, y, yaw, left):
     """What the stack does in a scene and in its mirror image."""
     rows = []
     for sign in (1.0, -1.0):
-        map = Centred(sign * curvature)
+        map = centred(sign * curvature)
         stack = AdasStack(SPECS, map, {"configuration": 2})
         cars = [Car(30.0, sign * left)]
         points = [(28.0, sign * left / 30.0, 0.0, -3.0)]
@@ -111,34 +112,9 @@ def mirrored_views(curvature, y, yaw, left):
     return rows
 
 
-class Centred(ArcMap):
-    """Lane 1, the middle one, passes the origin, so that a mirrored map is a map of this kind."""
-
-    def _point(self, s, left):
-        return super()._point(s, left - LANE_WIDTH)
-
-    def project(self, x, y, z, driving=True):
-        k = self.curvature
-        heading = 0.0 if k == 0.0 else float(np.arctan2(k * x, 1.0 - k * y))
-        s = x if k == 0.0 else heading / k
-        left = y if k == 0.0 else (1.0 - float(np.hypot(k * x, 1.0 - k * y))) / k
-        lane = min(max(round(left / LANE_WIDTH) + 1, 0), 2)
-        piece = int(s // self.piece)
-        if not 0 <= piece < self.pieces or abs(left) > 25.0:
-            return None
-        return replace(
-            self._at(piece * 3 + lane, s - piece * self.piece),
-            offset=left - (lane - 1) * LANE_WIDTH,
-        )
-
-    def _at(self, lane, s, offset=0.0):
-        piece, k = divmod(lane, 3)
-        point = ArcMap(self.curvature)._at(k, 0.0)
-        x, y, heading = self._point(piece * self.piece + s, k * LANE_WIDTH)
-        return replace(
-            point, lane=lane, s=s, x=x, y=y, heading=heading, curvature=self.curvature,
-            road=int(self.lanes.road[lane]), offset=offset,
-        )  # fmt: skip
+def centred(curvature):
+    """A road whose middle lane passes the origin, so that a mirrored map is a map of this kind."""
+    return ArcMap(curvature, rightmost=-LANE_WIDTH)
 
 
 @pytest.mark.req("A-016", "A-042", "A-068", "A-142", "X-4")
@@ -164,19 +140,12 @@ def test_a_mirrored_scene_gives_mirrored_steer_and_equal_pedals(curvature, y, ya
 
 @pytest.mark.req("A-154")
 def test_the_lateral_offset_is_reported_and_steers_nothing():
-    class Shifted(ArcMap):
-        def project(self, *place, **options):
-            point = super().project(*place, **options)
-            return replace(point, offset=point.offset + 1.3)
-
-    def drive(map):
-        stack = stack_on(map, configuration=2)
-        commands = [stack.tick(frame(k, (), ego_at(0.0, 0.4, 0.02, 15.0))) for k in range(5)]
-        return commands, stack.report.lane_offset
-
-    commands, offset = drive(ArcMap())
-    assert offset == approx(0.4)
-    assert drive(Shifted()) == (commands, approx(1.7))
+    stack = stack_on(ArcMap(), configuration=2)
+    angle = -atan2(0.4, 21.6) - 0.02  # to the point that lies 0.4 m per km/h on
+    for k in range(5):
+        command = stack.tick(frame(k, (), ego_at(0.0, 0.4, 0.02, 15.0)))
+        assert stack.report.lane_offset == approx(0.4)
+        assert command.steer == approx(angle * 1.088 * (1.0 - 0.3 * abs(angle) / pi))
 
 
 @pytest.mark.req("A-195", "A-109")

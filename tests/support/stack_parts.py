@@ -7,11 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from skidpad.core.geometry import Pose
+from skidpad.core.run import Function
 from skidpad.core.settings.stack import StackSettings
 from skidpad.core.vocabulary import DetectionStatus, Tier
-from skidpad.stack import memory
-from skidpad.stack.control import bends, caps, pid, tiers
-from skidpad.stack.perception import corridor, front, fusion, persistence, radar
+from skidpad.stack import memory, road
+from skidpad.stack.control import bends, caps, pid, steering, tiers
+from skidpad.stack.perception import corridor, front, fusion, lane_view, persistence, radar
 from skidpad.stack.perception.lane_view import Place
 
 time_gap = tiers.time_gap
@@ -204,7 +206,7 @@ def confirm(cameras, frame, distance):
         pairs = cameras.bumper, cameras.roof
         by = front.verify_runs(
             *(frame.segments[pair.depth_id] for pair in pairs), tuple(p.keep for p in pairs),
-            float(distance), place(), np.empty((400, 2)),
+            float(distance), 0.0, 0.0, np.empty((400, 2)),
         )  # fmt: skip
     else:
         by = cameras.verify(frame, float(distance), 0.0, 0.0)
@@ -223,7 +225,7 @@ class RadarReading(NamedTuple):
     points: int
 
 
-WAYS = np.empty((front.WAYS, 2))
+WAYS = np.empty((lane_view.WAYS, 4))
 NO_RADAR = RadarReading(None, None, None, 0)
 
 
@@ -257,9 +259,52 @@ def place(x=0.0, y=0.0, z=0.0, yaw=0.0, v=0.0, lane=-1, s=0.0, yaw_error=0.0, ka
 
 
 def place_of(pose, v, view):
-    ego = view.ego
-    lane, s = (-1, 0.0) if ego is None else (ego.lane, ego.s)
-    return place(pose.x, pose.y, pose.z, pose.yaw, v, lane, s, view.yaw_error, view.kappa)
+    return place(
+        pose.x, pose.y, pose.z, pose.yaw, v, view.lane, view.s, view.yaw_error, view.kappa
+    )  # fmt: skip
+
+
+class Lanes:
+    """A map as a stack with lane centring reads it."""
+
+    def __init__(self, map, first_branch=False, steering=None):
+        functions = frozenset({Function.LCA})
+        rules = road.road_rules(functions, StackSettings(), 0.05)._replace(
+            first_branch=first_branch
+        )
+        if steering is not None:
+            rules = rules._replace(steering=steering)
+        self.road = road.Road(map, memory.new_memory(), rules)
+        self.first_branch = first_branch
+
+    def view(self, pose):
+        """The ego against its lane."""
+        self.steer(pose, 0.0)
+        return lane_view.view_lane(
+            self.road.map.arrays, self.road.on_highway, self.first_branch, WAYS,
+            float(pose.x), float(pose.y), float(pose.z), float(pose.yaw),
+        )  # fmt: skip
+
+    def steer(self, pose, v):
+        """The steer of a tick, v in m/s."""
+        at = Pose(*map(float, (pose.x, pose.y, pose.z, pose.roll, pose.pitch, pose.yaw)))
+        return self.road.read(at, float(v), True)[4]
+
+    @property
+    def on_highway(self):
+        return self.road.on_highway
+
+
+class Smoothing:
+    """The steer command, smoothed."""
+
+    def __init__(self, dt, smooths=True):
+        settings = StackSettings(steer_smoothing=smooths)
+        self.m = memory.new_memory()[0]
+        self.rules = steering.steering_rules(frozenset(), settings, dt)
+
+    def update(self, command):
+        return steering.smooth(self.m, self.rules, float(command))
 
 
 def read_radar(rules, points, at, map, on_highway, tracking=False):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import atan2, cos, hypot, sin
 from types import SimpleNamespace
 
@@ -32,7 +32,7 @@ SPECS = (ROOF_DEPTH, ROOF_SEMANTIC, BUMPER_SEMANTIC, BUMPER_DEPTH, RadarSpec("ra
 class ArcMap:
     """A road of constant curvature through the origin along x, cut into pieces of equal length.
 
-    Lane i = piece * lanes + k with k = 0 the rightmost lane, whose centre passes the origin. Each
+    Lane i = piece * lanes + k with k = 0 the rightmost lane. Each
     piece has its own road id, lane ids run -lanes .. -1 from right to left.
     """
 
@@ -42,11 +42,11 @@ class ArcMap:
     pieces: int = 8
     off_highway: frozenset[int] = frozenset()
     lights: tuple[tuple[int, int, float], ...] = ()  # id, lane index, s
-    first_goes_left: bool = False  # all_ahead lists the left neighbour first, as at a fork
+    forks: bool = False  # each lane leads on into the next piece's lane to the right, too
+    rightmost: float = 0.0  # m by which the centre of the rightmost lane lies left of the origin
     leads_on: bool = True  # each piece into the next
     name: str = "arc"
     content_hash: str = "-"
-    queries: int = field(default=0, compare=False)
 
     def __post_init__(self) -> None:
         n = self.lanes_count * self.pieces
@@ -58,7 +58,7 @@ class ArcMap:
             section=np.zeros(n, np.int32),
             first=np.zeros(n, np.int32),
             size=np.full(n, 2, np.int32),
-            length=self.piece * (1.0 - self.curvature * k * LANE_WIDTH),
+            length=self.piece * (1.0 - self.curvature * self._left(k)),
             kind=np.zeros(n, np.uint8),
             junction=np.full(n, -1, np.int32),
             left=np.where(k < self.lanes_count - 1, np.arange(n) + 1, -1).astype(np.int32),
@@ -83,8 +83,12 @@ class ArcMap:
             group=np.full(len(heads), -1, np.int32),
         )
 
+    def _left(self, k):
+        """m by which the centre of the k-th lane from the right lies left of the origin."""
+        return self.rightmost + k * LANE_WIDTH
+
     def _point(self, s: float, left: float) -> tuple[float, float, float]:
-        """x, y, heading at road s, `left` m left of lane 0's centre."""
+        """x, y, heading at road s, `left` m left of the line through the origin."""
         k = self.curvature
         if k == 0.0:
             return s, left, 0.0
@@ -93,7 +97,7 @@ class ArcMap:
 
     def _at(self, lane: int, s: float, offset: float = 0.0) -> LanePoint:
         piece, k = divmod(lane, self.lanes_count)
-        left = k * LANE_WIDTH
+        left = self._left(k)
         stretch = 1.0 - self.curvature * left
         x, y, heading = self._point(piece * self.piece + s / stretch, left)
         return LanePoint(
@@ -102,10 +106,17 @@ class ArcMap:
         )  # fmt: skip
 
     @property
-    def held(self) -> Held[LaneArrays]:
+    def arrays(self) -> LaneArrays:
         """The lanes as kernels read them."""
         if getattr(self, "_packed", None) is not self.lanes:
-            self._packed, self._held = self.lanes, hold(lane_arrays(self._baked()))
+            self._packed, self._arrays = self.lanes, lane_arrays(self._baked())
+            self._held = hold(self._arrays)
+        return self._arrays
+
+    @property
+    def held(self) -> Held[LaneArrays]:
+        """The same behind a pointer."""
+        assert self.arrays
         return self._held
 
     def _baked(self) -> SimpleNamespace:
@@ -113,10 +124,10 @@ class ArcMap:
         lane = np.repeat(np.arange(n), size)
         piece, k = np.divmod(lane, self.lanes_count)
         share = np.tile(np.linspace(0.0, 1.0, size), n)
-        stretch = 1.0 - self.curvature * k * LANE_WIDTH
+        stretch = 1.0 - self.curvature * self._left(k)
         road_s = (piece + share) * self.piece
         x, y, heading = np.array(
-            [self._point(*place) for place in zip(road_s, k * LANE_WIDTH, strict=True)]
+            [self._point(*place) for place in zip(road_s, self._left(k), strict=True)]
         ).T
         flat = np.zeros(len(lane))
         marking = flat.astype(np.uint8)
@@ -126,16 +137,22 @@ class ArcMap:
             marking, lane.astype(np.int32),
         )  # fmt: skip
         first = np.arange(n) * size
-        following = np.arange(self.lanes_count if self.leads_on else n, n)
-        ends = np.minimum(np.arange(n + 1), len(following))
+        ways = [self._successors(i) if self.leads_on else [] for i in range(n)]
+        following = np.array([i for way in ways for i in way], np.int32)
+        ends = np.cumsum([0, *map(len, ways)])
         lanes = self.lanes._replace(
             first=first.astype(np.int32), size=np.full(n, size, np.int32),
-            next_start=ends.astype(np.int32), next_lane=following.astype(np.int32),
+            next_start=ends.astype(np.int32), next_lane=following,
         )  # fmt: skip
         return SimpleNamespace(samples=samples, lanes=lanes, signals=self.signals)
 
+    def _successors(self, lane: int) -> list[int]:
+        straight = lane + self.lanes_count
+        if straight >= len(self.lanes.road):
+            return []
+        return [straight, straight - 1] if self.forks and lane % self.lanes_count else [straight]
+
     def project(self, x, y, z, driving=True):
-        self.queries += 1
         if abs(z) > 4.0:
             return None
         k = self.curvature
@@ -145,43 +162,16 @@ class ArcMap:
             sign = 1.0 if k > 0 else -1.0
             heading = atan2(sign * x, sign * (1 / k - y))
             s, left = heading / k, 1 / k - sign * hypot(x, 1 / k - y)
-        lane = min(max(round(left / LANE_WIDTH), 0), self.lanes_count - 1)
+        lane = min(max(round((left - self.rightmost) / LANE_WIDTH), 0), self.lanes_count - 1)
         piece = int(s // self.piece)
-        if not 0 <= piece < self.pieces or abs(left - lane * LANE_WIDTH) > 20.0:
+        if not 0 <= piece < self.pieces or abs(left - self._left(lane)) > 20.0:
             return None
-        stretch = 1.0 - k * lane * LANE_WIDTH
+        stretch = 1.0 - k * self._left(lane)
         return self._at(
             piece * self.lanes_count + lane,
             (s - piece * self.piece) * stretch,
-            left - lane * LANE_WIDTH,
+            left - self._left(lane),
         )
-
-    def ahead(self, point, distance, heading=None):
-        lane, s = point.lane, point.s + distance
-        while s > self.lanes.length[lane]:
-            s -= self.lanes.length[lane]
-            lane += self.lanes_count
-            if lane >= len(self.lanes.road):
-                return None
-        return self._at(lane, s)
-
-    def behind(self, point, distance):
-        return self.ahead(point, -distance)
-
-    def all_ahead(self, point, distance):
-        straight = self.ahead(point, distance)
-        if straight is None:
-            return []
-        side = self.left(straight) if self.first_goes_left else None
-        return [straight] if side is None else [side, straight]
-
-    def left(self, point):
-        lane = int(self.lanes.left[point.lane])
-        return None if lane < 0 else self._at(lane, point.s)
-
-    def right(self, point):
-        lane = int(self.lanes.right[point.lane])
-        return None if lane < 0 else self._at(lane, point.s)
 
     def traced_roads(self, start, distance=5000.0, step=5.0):
         return frozenset(int(r) for r in self.lanes.road) - self.off_highway

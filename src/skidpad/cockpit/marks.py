@@ -18,7 +18,6 @@ from skidpad.roads.roadside import SignalHead
 from skidpad.roads.surface_outlines import PatchOutline
 from skidpad.sensors.published_sensors import RADAR_ID, twelve_sensors
 from skidpad.sensors.raster.view import camera_view
-from skidpad.stack.perception.lane_view import LaneView
 from skidpad.stack.perception.lights import LightScan
 
 CLOSING = -1.0  # m/s, below which a radar point is shown as closing
@@ -175,8 +174,8 @@ class LightAhead:
         """
         ego = moment.frame.ego
         here = self.map.project(ego.pose.x, ego.pose.y, ego.pose.z)
-        view = LaneView(here, None, 0.0, 0.0)
-        found = self.scan.look(ego.pose, ego.speed, view, moment.truth.lights)
+        lane, s = (-1, 0.0) if here is None else (here.lane, here.s)
+        found = self.scan.look(self.map, ego.pose, ego.speed, lane, s, moment.truth.lights)
         if found.signal is None or found.distance is None:
             return []
         agrees = abs(found.distance - distance) <= LIGHT_AGREES

@@ -6,13 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from skidpad.core.frames import SensorFrame
-from skidpad.core.geometry import kmh_from_mps
+from skidpad.core.run import Function
+from skidpad.core.settings.stack import StackSettings
 from skidpad.core.setup import DT
 from skidpad.core.specs import SensorSpec
 from skidpad.core.states import VehicleCommand
 from skidpad.roads.queries import RoadMap
-from skidpad.stack.control.steering import Smoothing, lookahead_distance, steer_towards
-from skidpad.stack.perception.lane_view import HighwayRoute, LaneTracker
+from skidpad.stack.memory import new_memory
+from skidpad.stack.road import Road, road_rules
 
 WHERE = f"{__name__}:ActionStack"  # as `--stack` takes it
 
@@ -29,8 +30,8 @@ class ActionStack:
         del specs
         self.recorded: Sequence[Sequence[float]] = settings.get("actions", ())
         self.action: Sequence[float] = (0.0,)
-        self.tracker = LaneTracker(map, HighwayRoute())
-        self.smoothing = Smoothing(DT)
+        rules = road_rules(frozenset({Function.LCA}), StackSettings(steer_smoothing=True), DT)
+        self.road = Road(map, new_memory(), rules)
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
         """Returns the command of the tick's recorded action, else of the last one set.
@@ -41,12 +42,8 @@ class ActionStack:
         if frame.tick < len(self.recorded):
             self.action = self.recorded[frame.tick]
         pedal = self.action[0]
-        steer = self.action[1] if len(self.action) > 1 else self._centre(frame)
+        ego = frame.ego
+        steer = (
+            self.action[1] if len(self.action) > 1 else self.road.read(ego.pose, ego.speed, True)[4]
+        )
         return VehicleCommand(throttle=max(pedal, 0.0), brake=max(-pedal, 0.0), steer=steer)
-
-    def _centre(self, frame: SensorFrame) -> float:
-        """Returns the steer of lane centring in -1..1."""
-        pose, v_kmh = frame.ego.pose, kmh_from_mps(frame.ego.speed)
-        view = self.tracker.update(pose)
-        place = self.tracker.ahead(view, lookahead_distance(v_kmh), pose.yaw)
-        return self.smoothing.update(steer_towards(pose, v_kmh, place))

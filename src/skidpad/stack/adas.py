@@ -16,7 +16,7 @@ from skidpad.core.frames import Segments, SensorFrame
 from skidpad.core.kernels.jit import Held, hold
 from skidpad.core.run import Function
 from skidpad.core.settings.parts import load_profile
-from skidpad.core.settings.stack import BranchChoice, StackSettings
+from skidpad.core.settings.stack import StackSettings
 from skidpad.core.setup import DT
 from skidpad.core.specs import SensorSpec
 from skidpad.core.states import StackReport, VehicleCommand
@@ -32,12 +32,11 @@ from skidpad.stack.configurations import (
 )
 from skidpad.stack.control.bends import BendSpeed
 from skidpad.stack.control.caps import cap_rules
-from skidpad.stack.control.steering import NoSmoothing, Smoothing, steering_of
 from skidpad.stack.control.text import mode_text
 from skidpad.stack.control.tiers import tier_rules
 from skidpad.stack.functions import AddedFunctions
 from skidpad.stack.memory import Memory, new_memory
-from skidpad.stack.perception.front import ROOM, VERIFIED_BY, WAYS, Cameras
+from skidpad.stack.perception.front import ROOM, VERIFIED_BY, Cameras
 from skidpad.stack.perception.fusion import (
     MEDIAN_SAMPLES,
     far_samples,
@@ -45,23 +44,17 @@ from skidpad.stack.perception.fusion import (
     rate_samples,
 )
 from skidpad.stack.perception.hsv import LampCamera
-from skidpad.stack.perception.lane_view import (
-    FirstBranchRoute,
-    HighwayRoute,
-    LaneTracker,
-    LaneView,
-    Place,
-)
-from skidpad.stack.perception.lights import NO_LIGHT, LightReading, LightScan, StopLock
+from skidpad.stack.perception.lights import NO_LIGHT, LightReading, StopLock
 from skidpad.stack.perception.persistence import detection_rules
 from skidpad.stack.perception.radar import radar_rules
+from skidpad.stack.road import Road, Way, road_rules
 from skidpad.stack.think import Answer, Rules, act, forget_sight, forget_tiers, perceive, think
 
 HELD = VehicleCommand(brake=1.0)  # while the supervisor drives; it overrides this anyway
 STATUSES, TIERS = tuple(DetectionStatus), tuple(Tier)  # by their numbers
 EMPTY = np.empty(0, np.float32)
 NO_SEGMENTS = Segments(EMPTY, EMPTY, EMPTY, EMPTY, EMPTY, np.empty(0, np.uint8))
-Rest = tuple[bool, float, float, float, float, float]
+Rest = tuple[float, bool, float, float, float]
 KEYS = ("configuration", "functions", "profile", "set", "cruise_kmh", "limiter_kmh", "dt")
 
 
@@ -105,7 +98,7 @@ class AdasConfig:
 class AdasStack:
     """One vehicle's driver. Deterministic: its commands depend on the frames alone."""
 
-    UNSAVED = ("_kept", "_ways", "_room")
+    UNSAVED = ("_kept", "_room")
     report: StackReport
 
     def __init__(
@@ -113,19 +106,13 @@ class AdasStack:
     ) -> None:
         self.config = AdasConfig.from_mapping(settings)
         options, dt = self.config.settings, self.config.dt
-        route = HighwayRoute() if options.route is BranchChoice.HIGHWAY else FirstBranchRoute()
-        self.map, self.tracker = map, LaneTracker(map, route)
         self.cameras = Cameras(specs, self.config.functions, options)
         self.memory = new_memory()
+        self.road = Road(map, self.memory, road_rules(self.config.functions, options, dt))
         self._samples, self._history = far_samples(MEDIAN_SAMPLES), rate_samples(dt)
-        self._kept, self._ways = np.empty(ROOM, dtype=np.int64), np.empty((WAYS, 2))
-        self._room = np.empty((ROOM, 2))
-        self.scan = LightScan(map)
+        self._kept, self._room = np.empty(ROOM, dtype=np.int64), np.empty((ROOM, 2))
         self.lamps = LampCamera(specs)
         self.lock = StopLock(dt, options.hsv_required)
-        self.smoothing: Smoothing | NoSmoothing = (
-            Smoothing(dt) if options.steer_smoothing else NoSmoothing()
-        )
         self.added = AddedFunctions(self.config.added, map, dt)
         self.supervision = Supervision.NONE
         self.verified_by = ""
@@ -151,7 +138,7 @@ class AdasStack:
         """
         c = self.config
         self.functions, self.assists = functions, Function.TLA in functions
-        self.steering = steering_of(functions, c.settings)
+        self.road.follow_rules(road_rules(functions, c.settings, c.dt))
         self.bends = BendSpeed(c.dt) if Function.BEND in functions else None
         self.cameras.switch(functions)
         s = c.settings
@@ -180,7 +167,6 @@ class AdasStack:
         forget_sight(self.memory, self._samples, self._history)
         forget_tiers(self.memory, self._held)
         self.lock.reset()
-        self.smoothing.reset()
         self.added.reset()
         if self.bends is not None:
             self.bends.reset()
@@ -191,56 +177,44 @@ class AdasStack:
         HELD, and no decision, while a supervisor drives. `report` is renewed either way.
         """
         self._follow_supervision(frame.supervision)
-        v = frame.ego.speed
-        view = self.tracker.update(frame.ego.pose)
-        light, hsv = self._light(frame, v, view)
-        stop = self.lock.update(light, v, frame.lights, hsv) if self.assists else None
         drives = frame.supervision is Supervision.NONE
-        rest = (
-            drives, v, view.ego.curvature if view.ego is not None else 0.0,
-            nan if stop is None else stop.distance, self._speed_for_bends(frame, v, view), self.v_told,
-        )  # fmt: skip
-        told = (self._think if frame.segments else self._think_of_images)(frame, view, rest)
+        v = frame.ego.speed
+        way = self.road.read(frame.ego.pose, v, drives)
+        light, hsv = self._light(frame, way)
+        stop = self.lock.update(light, v, frame.lights, hsv) if self.assists else None
+        stop_distance = nan if stop is None else stop.distance
+        rest = (v, drives, stop_distance, self._speed_for_bends(frame), self.v_told)
+        told = (self._think if frame.segments else self._think_of_images)(frame, rest)
         self.verified_by = VERIFIED_BY[told[4]]
-        self.report = self._report(told, view, light, stop is not None, hsv)
+        self.report = self._report(told, way, light, stop is not None, hsv)
         if not drives:
             return HELD
         _, throttle, brake, handbrake, *_ = told
-        command = VehicleCommand(throttle, brake, self._steer(frame, v, view), handbrake)
-        return self.added.update(frame, command)
+        return self.added.update(frame, VehicleCommand(throttle, brake, way[4], handbrake))
 
-    def _think(self, frame: SensorFrame, view: LaneView, rest: Rest) -> Answer:
+    def _think(self, frame: SensorFrame, rest: Rest) -> Answer:
         """Returns what the tick comes to, by the runs of pixels of the object level; rest: for `act`."""
-        pose, ego = frame.ego.pose, view.ego
+        pose = frame.ego.pose
         bumper = frame.segments.get(self.cameras.bumper.depth_id, NO_SEGMENTS)
         roof = frame.segments.get(self.cameras.roof.depth_id, NO_SEGMENTS)
-        told: Callable[..., Answer] = think  # mypy takes a named tuple for one of any length
         most = max(len(bumper.u), len(roof.u))
         if most > len(self._room):
             self._room = np.empty((most, 2))
+        told: Callable[..., Answer] = think  # mypy takes a named tuple for one of any length
         return told(
-            *self._memories(frame), self._room, *bumper, *roof, *frame.radar, self.map.held,
-            self.tracker.on_highway, pose.x, pose.y, pose.z, pose.yaw,
-            -1 if ego is None else ego.lane, 0.0 if ego is None else ego.s, view.yaw_error,
-            view.kappa, *rest,
+            *self._memories(frame), self._room, *bumper, *roof, *frame.radar, self.road.map.held,
+            self.road.on_highway, pose.x, pose.y, pose.z, pose.yaw, *rest,
         )  # fmt: skip
 
-    def _think_of_images(self, frame: SensorFrame, view: LaneView, rest: Rest) -> Answer:
+    def _think_of_images(self, frame: SensorFrame, rest: Rest) -> Answer:
         """Returns what the tick comes to, by images; rest: for `act`."""
-        pose, ego = frame.ego.pose, view.ego
-        place = Place(
-            pose.x, pose.y, pose.z, pose.yaw, rest[1], -1 if ego is None else ego.lane,
-            0.0 if ego is None else ego.s, view.yaw_error, view.kappa,
-        )  # fmt: skip
-        remembered = self._memories(frame)
+        pose, m = frame.ego.pose, self.memory[0]
+        yaw_error, kappa = float(m["yaw_error"]), float(m["kappa"])
         asks = perceive(
-            *remembered, *self.cameras.read(frame, view.yaw_error, view.kappa), frame.radar,
-            self.map.held, self.tracker.on_highway, place,
+            *self._memories(frame), *self.cameras.read(frame, yaw_error, kappa), frame.radar,
+            self.road.map.held, self.road.on_highway, pose.x, pose.y, pose.z, pose.yaw, rest[0],
         )  # fmt: skip
-        by = 0
-        if asks:
-            distance = float(self.memory["distance"][0])
-            by = self.cameras.verify(frame, distance, view.yaw_error, view.kappa)
+        by = self.cameras.verify(frame, float(m["distance"]), yaw_error, kappa) if asks else 0
         return act(self.memory, self._held, by, *rest)
 
     def _memories(
@@ -249,7 +223,7 @@ class AdasStack:
         """Returns memory and rules, with room for the frame's radar points."""
         if len(frame.radar.range) > len(self._kept):
             self._kept = np.empty(len(frame.radar.range), dtype=np.int64)
-        return self.memory, self._held, self._samples, self._history, self._kept, self._ways
+        return self.memory, self._held, self._samples, self._history, self._kept, self.road.ways
 
     def _follow_supervision(self, phase: Supervision) -> None:
         """Notes which supervisor drives; forgets the old place where a warm-up begins (A-185)."""
@@ -257,42 +231,31 @@ class AdasStack:
             self.relocated()
         self.supervision = phase
 
-    def _light(
-        self, frame: SensorFrame, v: float, view: LaneView
-    ) -> tuple[LightReading, LightState | None]:
+    def _light(self, frame: SensorFrame, way: Way) -> tuple[LightReading, LightState | None]:
         """Returns the light ahead by map, and the colour that the camera sees while there is one (M-4).
 
         NO_LIGHT and None without the assist; None, too, where no lamp is seen.
         """
         if not self.assists:
             return NO_LIGHT, None
-        light = self.scan.look(frame.ego.pose, v, view, frame.lights)
+        lane, _, _, _, _, trigger, line, distance = way
+        s = float(self.memory["s"][0]) if trigger >= 0 else 0.0
+        light = self.road.scan.name_light(lane, s, trigger, line, distance, frame.lights)
         if light.signal is None:
             return light, None
         return light, self.lamps.look(frame.images)
 
-    def _speed_for_bends(self, frame: SensorFrame, v: float, view: LaneView) -> float:
+    def _speed_for_bends(self, frame: SensorFrame) -> float:
         """Returns the m/s that bends ahead allow; inf without the function."""
         if self.bends is None:
             return inf
-
-        def curvature(distance: float) -> float:
-            place = self.tracker.ahead(view, distance, frame.ego.pose.yaw)
-            return 0.0 if place is None else place.curvature
-
-        return self.bends.update(v, curvature)
-
-    def _steer(self, frame: SensorFrame, v: float, view: LaneView) -> float:
-        """Returns the smoothed steering command in -1..1 that follows the lane at v in m/s."""
-        command = self.steering.steer(
-            frame.ego.pose, v, lambda d, heading: self.tracker.ahead(view, d, heading)
-        )
-        return self.smoothing.update(command)
+        yaw = frame.ego.pose.yaw
+        return self.bends.update(frame.ego.speed, lambda d: self.road.curvature(d, yaw))
 
     def _report(
         self,
         told: Answer,
-        view: LaneView,
+        way: Way,
         light: LightReading,
         stopping: bool,
         hsv: LightState | None,
@@ -302,7 +265,7 @@ class AdasStack:
             tier, _, _, _, _, cruise_kmh, status, distance, gap, bumper, roof, fused, radar_pre,
             radar_lane, radar_velocity, radar_points, resume_ticks,
         ) = told  # fmt: skip
-        ego = view.ego
+        _, offset, yaw_error, curvature, *_ = way
         return StackReport(
             status=STATUSES[status],
             tier=TIERS[tier],
@@ -322,9 +285,9 @@ class AdasStack:
             light_source=light.source if self.assists else None,
             light_stop=stopping,
             hsv=hsv,
-            lane_offset=None if ego is None else ego.offset,
-            yaw_error=None if ego is None else view.yaw_error,
-            curvature=None if ego is None else view.curvature,
+            lane_offset=_or_none(offset),
+            yaw_error=_or_none(yaw_error),
+            curvature=_or_none(curvature),
             resume_timer=None if resume_ticks < 0 else resume_ticks * self.config.dt,
         )
 

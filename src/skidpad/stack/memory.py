@@ -10,8 +10,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+KMH = 3.6  # per m/s
 MEMORY = np.dtype(
     [
+        # the ego on its lane, left positive; 0 off every lane
+        ("lane", np.int64),  # index; -1: off every lane
+        ("s", np.float64),  # m along it
+        ("bend", np.float64),  # 1/m, curvature of that lane there
+        ("reference", np.int64),  # index of the lane that is followed; -1: none
+        ("reference_s", np.float64),
+        ("yaw_error", np.float64),  # rad, heading minus lane heading
+        ("curvature", np.float64),  # 1/m, at the reference point ahead
+        ("kappa", np.float64),  # 1/m, of the parabola
+        ("steer", np.float64),  # smoothed
         # what the tick shows ahead
         ("status", np.int64),  # DetectionStatus
         ("distance", np.float64),  # measured, as the tiers use it
@@ -53,5 +64,5 @@ Record = Any  # that row, as kernels take it
 def new_memory() -> Memory:
     """Returns the memory of a stack that has seen nothing and stopped nowhere."""
     memory = np.zeros(1, MEMORY)
-    memory["resume_ticks"] = -1
+    memory["lane"] = memory["reference"] = memory["resume_ticks"] = -1
     return memory

@@ -24,7 +24,7 @@ from skidpad.stack.control.tiers import (
     needs_verification,
     time_gap,
 )
-from skidpad.stack.memory import Memory
+from skidpad.stack.memory import KMH, Memory
 from skidpad.stack.perception.corridor import Corridor, read_segments
 from skidpad.stack.perception.front import BY_NONE, look_ahead, verify_runs
 from skidpad.stack.perception.fusion import NOTHING, PERCENTILE, FusionRules
@@ -38,7 +38,6 @@ from skidpad.stack.perception.persistence import (
 from skidpad.stack.perception.radar import RadarRules, forget_radar
 
 RADAR_ACTIVE = int(DetectionStatus.RADAR_ACTIVE)
-KMH = 3.6  # per m/s
 
 
 class Rules(NamedTuple):
@@ -63,11 +62,11 @@ Answer = tuple[
 
 @kernel
 def forget_sight(memory: Memory, samples: Floats, history: Floats) -> None:
-    """Resets filters, radar and the memory of detections to no target."""
+    """Resets filters, radar and the memory of detections to no target, and the smoothed steer."""
     m = memory[0]
     forget_detections(m)
     forget_radar(m)
-    m.smoothed = NOTHING
+    m.smoothed, m.steer = NOTHING, 0.0
     samples.fill(NOTHING)
     history.fill(NOTHING)
 
@@ -82,31 +81,35 @@ def forget_tiers(memory: Memory, rules: Held[Rules]) -> None:
 def perceive(
     memory: Memory, rules: Held[Rules], samples: Floats, history: Floats, kept: NDArray[np.int64],
     ways: Floats, bumper: float, roof: float, points: RadarPoints, map: Held[LaneArrays],
-    on_highway: NDArray[np.bool_], place: Place,
+    on_highway: NDArray[np.bool_], x: float, y: float, z: float, yaw: float, v: float,
 ) -> bool:  # fmt: skip
-    """Notes what two distances in m and the radar show; returns whether the target must be verified."""
+    """Notes what two distances in m and the radar show; returns whether the target must be verified.
+
+    x, y, z, yaw, v: of the ego, in the world frame.
+    """
     m, r = memory[0], rules.value
+    place = Place(x, y, z, yaw, v, m.lane, m.s, m.yaw_error, m.kappa)
     look_ahead(
         m, r.fusion, r.detection, r.radar, samples, history, kept, bumper, roof, points, place, map,
         on_highway, ways,
     )  # fmt: skip
-    return bool(needs_verification(r.tiers, m.distance, place.v * KMH))
+    return bool(needs_verification(r.tiers, m.distance, v * KMH))
 
 
 @kernel
 def act(
-    memory: Memory, rules: Held[Rules], verified_by: int, drives: bool, v: float, curvature: float,
+    memory: Memory, rules: Held[Rules], verified_by: int, v: float, drives: bool,
     stop_distance: float, v_bends: float, v_told: float,
 ) -> Answer:  # fmt: skip
     """Returns the answer to what was noted ahead.
 
     A target that no camera bears out is dropped before the tiers, so that all go on without it (A-116,
-    D-043). drives: no supervisor does; curvature: of the ego's lane in 1/m; stop_distance: m, NaN: no
-    stop; v_bends, v_told: m/s that bends and others allow, inf: any.
+    D-043). drives: no supervisor does; stop_distance: m, NaN: no stop; v_bends, v_told: m/s that bends
+    and others allow, inf: any.
     """
     m, r = memory[0], rules.value
     v_kmh, stopping = v * KMH, not isnan(stop_distance)
-    count_resume(m, stopping, v_kmh, curvature)
+    count_resume(m, stopping, v_kmh, m.bend)
     cruise_kmh, follow_kmh = caps_kmh(m, r.caps)
     cruise_kmh = min(cruise_kmh, v_bends * KMH, v_told * KMH)
     if verified_by == BY_NONE:
@@ -138,24 +141,23 @@ def think(
     roof_depth: Floats32, roof_label: NDArray[np.uint8],
     radar_range: Floats32, azimuth: Floats32, altitude: Floats32, velocity: Floats32,
     map: Held[LaneArrays], on_highway: NDArray[np.bool_],
-    x: float, y: float, z: float, yaw: float, lane: int, s: float, yaw_error: float, kappa: float,
-    drives: bool, v: float, curvature: float, stop_distance: float, v_bends: float, v_told: float,
+    x: float, y: float, z: float, yaw: float, v: float, drives: bool, stop_distance: float,
+    v_bends: float, v_told: float,
 ) -> Answer:  # fmt: skip
     """Returns what `act` does, from what the sensors of the object level see.
 
     Arrays cross into a kernel one by one, as a named tuple of them takes twice as long.
     """
-    r = rules.value
+    m, r = memory[0], rules.value
     bumper = Segments(bumper_u, bumper_width, bumper_top, bumper_bottom, bumper_depth, bumper_label)
     roof = Segments(roof_u, roof_width, roof_top, roof_bottom, roof_depth, roof_label)
-    place = Place(x, y, z, yaw, v, lane, s, yaw_error, kappa)
     near, far = r.keep
-    turn = sin(yaw_error)
+    turn = sin(m.yaw_error)
     asks = perceive(
         memory, rules, samples, history, kept, ways,
-        read_segments(bumper, near, near.near, near.far, PERCENTILE, turn, kappa, room),
-        read_segments(roof, far, far.near, far.far, PERCENTILE, turn, kappa, room),
-        RadarPoints(radar_range, azimuth, altitude, velocity), map, on_highway, place,
+        read_segments(bumper, near, near.near, near.far, PERCENTILE, turn, m.kappa, room),
+        read_segments(roof, far, far.near, far.far, PERCENTILE, turn, m.kappa, room),
+        RadarPoints(radar_range, azimuth, altitude, velocity), map, on_highway, x, y, z, yaw, v,
     )  # fmt: skip
-    by = verify_runs(bumper, roof, r.keep, memory[0].distance, place, room) if asks else 0
-    return act(memory, rules, by, drives, v, curvature, stop_distance, v_bends, v_told)
+    by = verify_runs(bumper, roof, r.keep, m.distance, turn, m.kappa, room) if asks else 0
+    return act(memory, rules, by, v, drives, stop_distance, v_bends, v_told)

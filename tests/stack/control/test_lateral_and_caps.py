@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from math import asin, atan2, cos, inf, pi, sin
+from math import asin, atan2, cos, inf, isnan, pi, sin
 
 import numpy as np
 import pytest
@@ -16,36 +15,27 @@ from skidpad.core.settings.stack import CapScope, Lookahead, ResumeEnd, StackSet
 from skidpad.core.vocabulary import Tier
 from skidpad.stack.adas import AdasStack
 from skidpad.stack.configurations import functions_of
-from skidpad.stack.control.steering import (
-    LaneCentring,
-    LazyDriver,
-    NoSmoothing,
-    Smoothing,
-    angle_to,
-    steer_towards,
-    steering_of,
-)
-from skidpad.stack.perception.lane_view import FirstBranchRoute, HighwayRoute, LaneTracker
-from support.stack_parts import ResumeProtocol, speed_caps
+from skidpad.stack.control.steering import angle_to, steering_rules
+from support.stack_parts import Lanes, ResumeProtocol, Smoothing, speed_caps
 from support.stackfakes import LANE_WIDTH, RED, SPECS, ArcMap, Car, ego_at, frame
 
 approx = pytest.approx
 
 
-def steer(driver, map, pose, v, route=None):
-    tracker = LaneTracker(map, route or HighwayRoute())
-    view = tracker.update(pose)
-    return driver.steer(pose, v, lambda d, heading: tracker.ahead(view, d, heading))
+def steer(rules, map, pose, v, first_branch=False):
+    return Lanes(map, first_branch, rules).steer(pose, v)
+
+
+def centring(**settings):
+    return steering_rules(functions_of(2), StackSettings(**settings), 0.05)
 
 
 @pytest.mark.req("A-142")
 @given(st.floats(-40.0, 40.0), st.floats(-40.0, 40.0), st.floats(-3.1, 3.1))
 def test_angle_to_the_target_is_the_difference_of_directions(dx, dy, yaw):
-    target = ArcMap()._at(0, 0.0)
-    target = replace(target, x=5.0 + dx, y=-3.0 + dy)
-    angle = angle_to(Pose(5.0, -3.0, yaw=yaw), target)
-    if np.hypot(dx, dy) < 0.1:
-        assert angle is None
+    angle = angle_to(5.0, -3.0, yaw, 5.0 + dx, -3.0 + dy)
+    if np.hypot(5.0 + dx - 5.0, -3.0 + dy + 3.0) < 0.1:
+        assert isnan(angle)
     else:
         apart = angle - (atan2(dy, dx) - yaw)
         assert cos(apart) == approx(1.0, abs=1e-9)
@@ -60,52 +50,55 @@ def test_centring_steers_by_the_chord_of_the_bend(v_kmh, lookahead, curvature):
     gain = {20.0: 1.2, 60.0: 1.04, 150.0: 0.35}[v_kmh]
     angle = lookahead * curvature / 2
     expected = angle * gain * (1.0 - 0.3 * abs(angle) / pi)
-    driver = LaneCentring(Lookahead.DYNAMIC)
-    assert steer(driver, ArcMap(curvature), Pose(0, 0), v_kmh / 3.6) == approx(expected, rel=1e-6)
+    assert steer(centring(), ArcMap(curvature), Pose(0, 0), v_kmh / 3.6) == approx(
+        expected, rel=1e-6
+    )
 
 
 @pytest.mark.req("A-143")
 def test_fixed_lookahead_is_12_m():
     beside, v = Pose(0.0, 0.5), 30.0
-    fixed = steer(LaneCentring(Lookahead.FIXED), ArcMap(), beside, v)
+    fixed = steer(centring(lookahead=Lookahead.FIXED), ArcMap(), beside, v)
     angle = -atan2(0.5, 12.0)
     assert fixed == approx(angle * (1.2 - 0.008 * 68.0) * (1.0 - 0.3 * -angle / pi))
 
 
 @pytest.mark.req("A-146")
 def test_steer_is_zero_without_a_place_and_clipped():
-    driver = LaneCentring(Lookahead.DYNAMIC)
-    assert steer(driver, ArcMap(), Pose(0.0, 300.0), 10.0) == 0.0
-    here = ArcMap()._at(0, 0.05)
-    assert steer_towards(Pose(0, 0), 10.0, here) == 0.0
+    assert steer(centring(), ArcMap(), Pose(0.0, 300.0), 10.0) == 0.0
+    end = ArcMap(piece=100.0, pieces=1)
+    assert steer(centring(), end, Pose(80.0, 0.5), 12.0) != 0.0
+    assert steer(centring(), end, Pose(80.0, 0.5), 20.0) == 0.0, "the road ends before"
     for beside, steers in ((0.095, False), (0.105, True)):
-        assert (steer_towards(Pose(0.05, -beside), 10.0, here) != 0.0) is steers
-    assert steer(driver, ArcMap(), Pose(0.0, 0.0, yaw=2.0), 5.0) == -1.0
-    assert steer(driver, ArcMap(), Pose(0.0, 0.0, yaw=-2.0), 5.0) == 1.0
+        assert isnan(angle_to(0.05, -beside, 0.0, 0.05, 0.0)) is not steers
+    assert steer(centring(), ArcMap(), Pose(0.0, 0.0, yaw=2.0), 5.0) == -1.0
+    assert steer(centring(), ArcMap(), Pose(0.0, 0.0, yaw=-2.0), 5.0) == 1.0
 
 
 @pytest.mark.req("A-147", "A-148", "A-149")
 def test_highway_route_leaves_the_slip_road_and_goes_straight():
-    slip = ArcMap(first_goes_left=True)
+    slip = ArcMap()
     slip.lanes = slip.lanes._replace(
         road=np.where(np.arange(24) % 3 == 0, slip.lanes.road + 50, slip.lanes.road)
     )
     slip.off_highway = frozenset(range(51, 59))
-    ego, driver = Pose(0.0, 0.0), LaneCentring(Lookahead.DYNAMIC)
-    towards = -steer(driver, slip, Pose(0.0, 2 * LANE_WIDTH), 20.0, HighwayRoute())
+    ego, rules = Pose(0.0, 0.0), centring()
+    towards = -steer(rules, slip, Pose(0.0, 2 * LANE_WIDTH), 20.0)
     assert towards == 0.0, "on the highway it stays in its lane"
-    assert steer(driver, slip, ego, 20.0, HighwayRoute()) > 0.05, "beside it, it goes there"
-    # As printed: stay in the lane, take the first branch, which here leads left.
-    plain = ArcMap(first_goes_left=True)
-    assert steer(driver, plain, ego, 20.0, HighwayRoute()) == 0.0
-    assert steer(driver, plain, ego, 20.0, FirstBranchRoute()) > 0.05
+    assert steer(rules, slip, ego, 20.0) > 0.05, "beside it, it goes there"
+    assert steer(rules, slip, ego, 20.0, first_branch=True) == 0.0
+    # As printed: stay in the lane, take the first branch, which here leads right.
+    fork, ego = ArcMap(piece=20.0, forks=True), Pose(0.0, 2 * LANE_WIDTH)
+    assert steer(rules, fork, ego, 20.0) == 0.0
+    assert steer(rules, fork, ego, 20.0, first_branch=True) < -0.05
+    assert steer(rules, ArcMap(piece=20.0), ego, 20.0, first_branch=True) == 0.0
     none = ArcMap(off_highway=frozenset(range(1, 9)))
-    assert steer(driver, none, ego, 20.0, HighwayRoute()) == 0.0, "no highway anywhere: stay"
+    assert steer(rules, none, Pose(0.0, 0.0), 20.0) == 0.0, "no highway anywhere: stay"
 
 
 @pytest.mark.req("A-150")
 def test_lazy_driver_looks_8_m_ahead_ignores_little_and_halves_the_rest():
-    lazy, map = steering_of(functions_of(1), StackSettings()), ArcMap()
+    lazy, map = steering_rules(functions_of(1), StackSettings(), 0.05), ArcMap()
     for v_kmh, gain in ((20.0, 1.2), (140.0, 0.4)):
         for offset in (0.05, 0.5, 1.5):
             angle = -atan2(offset, 8.0)
@@ -120,8 +113,7 @@ def test_lazy_driver_looks_8_m_ahead_ignores_little_and_halves_the_rest():
 @pytest.mark.req("A-151")
 def test_lazy_driver_has_settings():
     values = {"lazy_lookahead": 20.0, "lazy_dead_band": 0.0, "lazy_gain": 1.0}
-    lazy = steering_of(functions_of(0), Settings().with_values(values).stack)
-    assert isinstance(lazy, LazyDriver)
+    lazy = steering_rules(functions_of(0), Settings().with_values(values).stack, 0.05)
     angle = -atan2(0.5, 20.0)
     expected = angle * 1.2 * (1.0 - 0.3 * abs(angle) / pi)
     assert steer(lazy, ArcMap(), Pose(0.0, 0.5), 5.0) == approx(expected)
@@ -134,11 +126,11 @@ def test_smoothing_is_a_low_pass_with_a_rate_limit():
     # one third per step of 0.05 s at a time constant of 0.10 s
     assert small[:3] == approx([0.1 / 3, 0.1 / 3 * (1 + 2 / 3), 0.1 / 3 * (1 + 2 / 3 + 4 / 9)])
     assert small[-1] == approx(0.1, rel=1e-4)
-    s.reset()
+    s = Smoothing(0.05)
     large = np.diff([0.0] + [s.update(1.0) for _ in range(5)])
     assert large[:3] == approx([0.15] * 3)
     assert s.update(-1.0) - sum(large) == approx(-0.15)
-    assert NoSmoothing().update(0.7) == 0.7
+    assert Smoothing(0.05, smooths=False).update(0.7) == 0.7
 
 
 @pytest.mark.req("A-152")
@@ -172,7 +164,7 @@ def test_steering_is_the_same_in_every_tier():
 
 @pytest.mark.req("A-148")
 def test_lane_view_of_a_bend():
-    view = LaneTracker(ArcMap(1 / 200), HighwayRoute()).update(Pose(0.0, 0.0, yaw=0.1))
+    view = Lanes(ArcMap(1 / 200)).view(Pose(0.0, 0.0, yaw=0.1))
     assert view.yaw_error == approx(0.1)
     assert sin(view.yaw_error) == approx(sin(0.1))
     assert asin(30.0 * view.kappa / 30.0) == approx(1 / 400, rel=1e-4)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import cos, radians, sin, tan
 
 import numpy as np
@@ -25,7 +24,7 @@ from skidpad.stack.perception.corridor import (
     weighted_percentile,
 )
 from skidpad.stack.perception.fusion import bumper_corridor, roof_corridor
-from skidpad.stack.perception.lane_view import FirstBranchRoute, HighwayRoute, LaneTracker
+from support.stack_parts import Lanes
 from support.stackfakes import BUMPER_SEMANTIC, ROOF_SEMANTIC, ArcMap, Car, draw
 
 approx = pytest.approx
@@ -73,7 +72,7 @@ def test_offset_is_the_pinhole_projection_inverted():
 def test_corrected_offset_is_the_offset_from_the_lane(curvature, yaw_error, offset):
     """A point beside a lane in closed form, seen by an ego turned against the lane."""
     map, c = ArcMap(curvature), roof()
-    view = LaneTracker(map, HighwayRoute()).update(Pose(0.0, 0.0, yaw=yaw_error))
+    view = Lanes(map).view(Pose(0.0, 0.0, yaw=yaw_error))
     for s in (15.0, 30.0):
         x, y, heading = map._point(s, offset)
         z, left = (
@@ -87,19 +86,21 @@ def test_corrected_offset_is_the_offset_from_the_lane(curvature, yaw_error, offs
 
 
 @pytest.mark.req("A-043")
-@pytest.mark.parametrize("route", [HighwayRoute(), FirstBranchRoute()])
-def test_curvature_is_read_at_one_point_30_m_ahead(route):
+@pytest.mark.parametrize("first_branch", [False, True])
+def test_curvature_is_read_at_one_point_30_m_ahead(first_branch):
     class Bend(ArcMap):
-        """The curvature of a place is its s, so it tells where it was read."""
+        """The curvature of a place is its s in km, so it tells where it was read."""
 
-        def _at(self, lane, s, offset=0.0):
-            return replace(super()._at(lane, s, offset), curvature=s)
+        def _baked(self):
+            baked = super()._baked()
+            baked.samples = baked.samples._replace(curvature=1e-3 * baked.samples.s)
+            return baked
 
-    tracker = LaneTracker(Bend(), route)
+    lanes = Lanes(Bend(), first_branch)
     for x in (100.0, 170.0):
-        view = tracker.update(Pose(x, 0.3, yaw=0.02))
-        assert view.curvature == approx(x + 30.0)
-        assert view.kappa == approx((x + 30.0) / 2)
+        view = lanes.view(Pose(x, 0.3, yaw=0.02))
+        assert view.curvature == approx(1e-3 * (x + 30.0))
+        assert view.kappa == approx(1e-3 * (x + 30.0) / 2)
         assert view.yaw_error == approx(0.02)
 
 

@@ -11,7 +11,6 @@ from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import LightSource, LightState
 from skidpad.stack.adas import AdasStack
 from skidpad.stack.control.tiers import stopping_speed
-from skidpad.stack.perception.lane_view import HighwayRoute, LaneTracker, LaneView
 from skidpad.stack.perception.lights import (
     NO_LIGHT,
     NO_WAYPOINT,
@@ -29,8 +28,10 @@ ONE = ((7, 0, 300.0),)  # light 7 governs the rightmost lane at s 300 m
 
 def look(map, x, y=0.0, yaw=0.0, v=0.0, states=None, scan=None):
     pose = Pose(x, y, yaw=yaw)
-    view = LaneTracker(map, HighwayRoute()).update(pose)
-    return (scan or LightScan(map)).look(pose, v, view, {7: RED} if states is None else states)
+    here = map.project(x, y, 0.0)
+    lane, s = (-1, 0.0) if here is None else (here.lane, here.s)
+    states = {7: RED} if states is None else states
+    return (scan or LightScan(map)).look(map, pose, float(v), lane, s, states)
 
 
 @pytest.mark.req("A-156")
@@ -104,13 +105,14 @@ def test_no_waypoint_and_unseen_state():
     assert look(map, 0.0, y=300.0) == NO_WAYPOINT == (LightSource.NO_WAYPOINT, None, None, None)
     assert look(map, 260.0, states={}).state is LightState.UNKNOWN
     assert look(ArcMap(), 260.0) == NO_LIGHT
-    assert LightScan(map).look(Pose(0, 0), 0.0, LaneView(None, None, 0, 0), {}) == NO_WAYPOINT
+    assert LightScan(map).look(map, Pose(0, 0), 0.0, -1, 0.0, {}) == NO_WAYPOINT
 
 
 @pytest.mark.req("A-162")
 def test_geometry_is_read_once():
     map = ArcMap(lights=ONE)
     scan = LightScan(map)
+    assert map.held
     map.signals = None
     assert look(map, 260.0, scan=scan).distance == approx(40.0)
 

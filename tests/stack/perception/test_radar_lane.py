@@ -11,7 +11,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import DetectionStatus
 from skidpad.roads.bundled import load_map
 from skidpad.stack.adas import AdasStack
-from skidpad.stack.perception.lane_view import HighwayRoute, LaneTracker, LaneView
+from skidpad.stack.perception.lane_view import NOWHERE as STRAIGHT
 from skidpad.stack.perception.radar import (
     HALF_WIDTH,
     MOUNT,
@@ -19,11 +19,10 @@ from skidpad.stack.perception.radar import (
     RadarRules,
     velocity_limit,
 )
-from support.stack_parts import NO_RADAR, find_in_lane, place_of, read_radar
+from support.stack_parts import NO_RADAR, Lanes, find_in_lane, place_of, read_radar
 from support.stackfakes import LANE_WIDTH, SPECS, ArcMap, Car, ego_at, frame, radar_points
 
 approx = pytest.approx
-STRAIGHT = LaneView(None, None, 0.0, 0.0)
 MAP = ArcMap()
 NOWHERE = np.zeros(len(MAP.lanes.road), np.bool_)
 
@@ -54,7 +53,7 @@ def test_path_follows_yaw_error_and_curvature():
     for curvature, yaw in ((1 / 200, 0.05), (-1 / 200, 0.05), (1 / 300, -0.1)):
         map = ArcMap(curvature)
         ego = Pose(0.0, 0.0, yaw=yaw)
-        view = LaneTracker(map, HighwayRoute()).update(ego)
+        view = Lanes(map).view(ego)
         x, y, _ = map._point(50.0, 0.0)
         r, azimuth = float(np.hypot(x, y)), float(np.arctan2(y, x)) - yaw
         assert passes(r, azimuth, 0.0, -5.0, view=view)
@@ -138,8 +137,8 @@ def test_each_measurement_stands_alone():
 
 
 def lane_match(map, pose, r, azimuth=0.0):
-    tracker = LaneTracker(map, HighwayRoute())
-    points, here = radar_points((r, azimuth, 0.0, 0.0)), place_of(pose, 0.0, tracker.update(pose))
+    tracker = Lanes(map)
+    points, here = radar_points((r, azimuth, 0.0, 0.0)), place_of(pose, 0.0, tracker.view(pose))
     return find_in_lane(map, tracker.on_highway, points, 1, here) == 0
 
 
@@ -213,8 +212,8 @@ LEFT = float(np.arcsin(LANE_WIDTH / 30.0))
 @pytest.mark.req("A-082")
 def test_all_points_are_matched_and_the_nearest_in_the_lane_counts():
     map, points = ArcMap(), radar_points((30.0, LEFT, 0.0, -3.0), (50.0, 0.0, 0.0, -5.0))
-    tracker = LaneTracker(map, HighwayRoute())
-    here = place_of(Pose(0.0, 0.0), 20.0, tracker.update(Pose(0.0, 0.0)))
+    tracker = Lanes(map)
+    here = place_of(Pose(0.0, 0.0), 20.0, tracker.view(Pose(0.0, 0.0)))
     both = RadarRules(True, HALF_WIDTH, by_map=True, nearest_only=False)
     reading = read_radar(both, points, here, map, tracker.on_highway)
     assert (reading.pre, reading.lane, reading.velocity) == approx((30.0, 50.0, -5.0))
@@ -296,13 +295,13 @@ def test_the_stack_keeps_4_m_about_the_path():
         assert (report.radar_pre is not None) is kept
 
 
-def is_in_lane(map, pose, view, r, azimuth):
+def is_in_lane(map, pose, view, on_highway, r, azimuth):
     """A-076 to A-078 point by point, by the questions that the map answers."""
 
     def onto_highway(point):
         for _ in range(8):
             left = map.left(point)
-            if point.road in view.highway or left is None:
+            if on_highway[point.lane] or left is None:
                 break
             point = left
         return point
@@ -313,9 +312,9 @@ def is_in_lane(map, pose, view, r, azimuth):
         pose.y + MOUNT * sin(pose.yaw) + r * sin(bearing),
         pose.z,
     )
-    if target is None or view.ego is None:
+    if target is None or view.lane < 0:
         return False
-    target, ego = onto_highway(target), onto_highway(view.ego)
+    target, ego = onto_highway(target), onto_highway(map.at(view.lane, view.s))
     place = (target.road, target.lane_id)
     reached = [ego, *map.all_ahead(ego, r + 10.0)]
     return place in {(p.road, p.lane_id) for p in reached}
@@ -326,19 +325,18 @@ def is_in_lane(map, pose, view, r, azimuth):
 def test_kernel_finds_the_point_that_the_map_s_own_answers_name(name):
     """Places all over the map, beside the highway, before forks and at ends of roads."""
     map, rng, found = load_map(name), np.random.default_rng(7), []
-    tracker = LaneTracker(map, HighwayRoute())
+    tracker = Lanes(map)
     for _ in range(250):
         lane = int(rng.integers(len(map.lanes.road)))
         at = map.at(lane, float(rng.uniform(0.0, map.lanes.length[lane])))
         pose = Pose(at.x, at.y, at.z, yaw=at.heading + rng.normal(scale=0.05))
-        view = tracker.update(pose)
+        view = tracker.view(pose)
         points = radar_points(
             *((r, rng.normal(scale=0.1), 0.0, 0.0) for r in rng.uniform(5.0, 80.0, 4))
         )
+        seen = zip(points.range.tolist(), points.azimuth.tolist(), strict=True)
         inside = [
-            k
-            for k in range(4)
-            if is_in_lane(map, pose, view, float(points.range[k]), float(points.azimuth[k]))
+            k for k, at in enumerate(seen) if is_in_lane(map, pose, view, tracker.on_highway, *at)
         ]
         here = place_of(pose, 0.0, view)
         found.append(find_in_lane(map, tracker.on_highway, points, 4, here))

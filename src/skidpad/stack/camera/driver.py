@@ -31,7 +31,12 @@ from skidpad.stack.camera.codes import AHEAD, Label, mosaic
 from skidpad.stack.camera.eyes import CAMERAS, images_of
 from skidpad.stack.camera.network import read_mosaic
 from skidpad.stack.control.bends import bend_speed, slow_for_bend
-from skidpad.stack.control.steering import Smoothing, lookahead_distance, steer_command
+from skidpad.stack.control.steering import (
+    lookahead_distance,
+    smooth,
+    steer_command,
+    steering_rules,
+)
 from skidpad.stack.control.tiers import Situation, begin_tiers, decide, tier_rules, time_gap
 from skidpad.stack.memory import new_memory
 
@@ -60,7 +65,8 @@ class CameraDriver:
         require_range("cruise_kmh", self.cruise_kmh, 1.0, 400.0)
         self.tiers, self.memory = tier_rules(FUNCTIONS, StackSettings(), DT), new_memory()
         begin_tiers(self.memory[0], self.tiers)
-        self.smoothing = Smoothing(DT)
+        smoothed = StackSettings(steer_smoothing=True)
+        self.steering = steering_rules(FUNCTIONS, smoothed, DT)
         self.gaps: deque[float | None] = deque(maxlen=SAMPLES)
         self.offsets: Floats | None = None
         self.report = StackReport()
@@ -98,7 +104,7 @@ class CameraDriver:
             v_target=cruise / 3.6,
             curvature=bend,
         )
-        steer = self.smoothing.update(steer_of(offsets, v))
+        steer = smooth(self.memory[0], self.steering, steer_of(offsets, v))
         return VehicleCommand(request.throttle, request.brake, steer, request.handbrake)
 
     def picture(self, frame: SensorFrame) -> Picture:

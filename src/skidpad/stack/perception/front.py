@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +39,6 @@ BUMPER = ("depth_bumper", "semantic_bumper")
 VERIFIED_BY = ("", "bumper", "roof", "none")  # not asked, or which pair bears the target out
 BY_BUMPER, BY_ROOF, BY_NONE = 1, 2, 3
 ROOM = 512  # radar points and runs of pixels; more need a larger room
-WAYS = 256  # branches of the lane ahead
 
 
 class Cameras:
@@ -87,15 +85,18 @@ def verify_runs(
     roof: Segments,
     keep: tuple[Corridor, Corridor],
     distance: float,
-    place: Place,
+    turn: float,
+    kappa: float,
     room: Floats,
 ) -> int:
-    """Returns what `Cameras.verify` does, by runs of pixels; keep: corridors of bumper and roof."""
+    """Returns what `Cameras.verify` does, by runs of pixels; keep: corridors of bumper and roof.
+
+    turn: sine of the yaw error.
+    """
     near, far = verified_depths(distance)
-    turn = sin(place.yaw_error)
-    if read_segments(bumper, keep[0], near, far, PERCENTILE, turn, place.kappa, room) > 0.0:
+    if read_segments(bumper, keep[0], near, far, PERCENTILE, turn, kappa, room) > 0.0:
         return BY_BUMPER
-    if read_segments(roof, keep[1], near, far, PERCENTILE, turn, place.kappa, room) > 0.0:
+    if read_segments(roof, keep[1], near, far, PERCENTILE, turn, kappa, room) > 0.0:
         return BY_ROOF
     return BY_NONE
 

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import cos, hypot, sin
+from math import cos, hypot, nan, sin
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.arrays import Floats
 from skidpad.core.geometry import Pose
+from skidpad.core.kernels.jit import Held, hold, kernel
 from skidpad.core.vocabulary import LightSource, LightState
+from skidpad.roads.kernels import LaneArrays, advance_kernel
 from skidpad.roads.lanes import SignalKind
-from skidpad.roads.queries import LanePoint, RoadMap
-from skidpad.stack.perception.lane_view import LaneView
+from skidpad.roads.queries import RoadMap
 
 SCAN_MIN = 80.0  # m (A-156)
 SCAN_TIME = 6.0  # s (A-156)
@@ -21,15 +26,17 @@ TRIGGER_BEHIND = 1.0
 YELLOW_DECELERATION = 1.5  # m/s^2, a yellow light that needs more is passed (D-070)
 LANE_STEP = 0.01  # m beyond a lane's end, to arrive on the next one
 MAX_LANES = 64
+States = Mapping[int, LightState]  # by signal id
 
 
-class StopLine(NamedTuple):
-    """One light as it governs one lane."""
+class StopLines(NamedTuple):
+    """Stop lines of lights as they govern lanes, by lane and in driving order (A-162)."""
 
-    s: float  # m along the lane
-    signal: int
-    x: float  # of the signal head, world frame
-    y: float
+    start: NDArray[np.int64]  # (lanes + 1,) lines of lane i: rows start[i] to start[i + 1]
+    s: Floats  # m along the lane
+    signal: NDArray[np.int64]
+    x: Floats  # of the signal head, world frame
+    y: Floats
 
 
 class LightReading(NamedTuple):
@@ -45,85 +52,107 @@ NO_LIGHT = LightReading(LightSource.NO_LIGHT)
 NO_WAYPOINT = LightReading(LightSource.NO_WAYPOINT)
 
 
+@kernel
 def scan_distance(v: float) -> float:
     """Returns how far ahead lights are looked for in m, at v in m/s (eq. 16)."""
     return max(SCAN_MIN, SCAN_TIME * v)
 
 
-def stop_lines(map: RoadMap) -> dict[int, tuple[StopLine, ...]]:
-    """Returns the stop lines of lights by lane index, in driving order (A-162).
-
-    Lanes without are left out.
-    """
+def stop_lines(map: RoadMap) -> StopLines:
+    """Returns the stop lines of a map's lights."""
     signals = map.signals
-    lines: dict[int, list[StopLine]] = {}
-    for i in range(len(signals.id)):
-        if signals.kind[i] == SignalKind.LIGHT:
-            line = StopLine(
-                float(signals.s[i]), int(signals.id[i]), float(signals.x[i]), float(signals.y[i])
-            )
-            lines.setdefault(int(signals.lane[i]), []).append(line)
-    return {lane: tuple(sorted(found)) for lane, found in lines.items()}
+    chosen = np.flatnonzero(signals.kind == SignalKind.LIGHT)
+    rows = chosen[np.lexsort((signals.id[chosen], signals.s[chosen], signals.lane[chosen]))]
+    start = np.searchsorted(signals.lane[rows], np.arange(len(map.lanes.road) + 1))
+    signal = signals.id[rows].astype(np.int64)
+    return StopLines(start, signals.s[rows], signal, signals.x[rows], signals.y[rows])
+
+
+@kernel
+def find_trigger(lines: StopLines, lane: int, s: float) -> int:
+    """Returns the first line of a lane whose trigger volume holds the place at s (A-157); -1: none."""
+    for k in range(lines.start[lane], lines.start[lane + 1]):
+        if -TRIGGER_BEHIND <= lines.s[k] - s <= TRIGGER_BEFORE:
+            return k
+    return -1
+
+
+@kernel
+def find_light(
+    a: LaneArrays, lines: StopLines, lane: int, s: float, x: float, y: float, yaw: float, v: float
+) -> tuple[int, float]:
+    """Returns the first line ahead along the lanes within the scan distance, and the m to it; -1: none.
+
+    lane, s: where the ego is; x, y, yaw: its pose; v: m/s (A-156, A-158).
+    """
+    reach, start = scan_distance(v), -s  # start: of the lane, m from the ego
+    for _ in range(MAX_LANES):
+        for k in range(lines.start[lane], lines.start[lane + 1]):
+            distance = start + lines.s[k]
+            if 0.0 <= distance <= reach and is_ahead(lines, k, x, y, yaw):
+                return k, distance
+        length = a.length[lane]
+        start += length
+        lane, s = advance_kernel(a, lane, s, length - s + LANE_STEP, nan)
+        if start > reach or lane < 0:
+            break
+    return -1, nan
+
+
+@kernel
+def is_ahead(lines: StopLines, k: int, x: float, y: float, yaw: float) -> bool:
+    """Returns whether a line's light lies ahead of the pose within the angle of COS_AHEAD (A-159)."""
+    dx, dy = lines.x[k] - x, lines.y[k] - y
+    return bool(dx * cos(yaw) + dy * sin(yaw) > COS_AHEAD * hypot(dx, dy))
+
+
+@kernel
+def scan_lights(
+    map: Held[LaneArrays], lines: Held[StopLines], lane: int, s: float, x: float, y: float, yaw: float,
+    v: float,
+) -> tuple[int, int, float]:  # fmt: skip
+    """Returns what `find_trigger` and `find_light` find; -1, -1 and NaN off every lane."""
+    if lane < 0:
+        return -1, -1, nan
+    line, distance = find_light(map.value, lines.value, lane, s, x, y, yaw, v)
+    return find_trigger(lines.value, lane, s), line, distance
 
 
 class LightScan:
     """Finds the next light on the walked lane; any stop line counts (M-5)."""
 
     def __init__(self, map: RoadMap) -> None:
-        self.map = map
         self.lines = stop_lines(map)
+        self.held = hold(self.lines)
 
     def look(
-        self, pose: Pose, v: float, view: LaneView, states: Mapping[int, LightState]
+        self, map: RoadMap, pose: Pose, v: float, lane: int, s: float, states: States
     ) -> LightReading:
-        """Returns the light that governs the ego at `pose` with speed v (m/s).
+        """Returns the light that governs the ego at `pose`, which is at s of a lane (-1: none), at v m/s."""
+        found = scan_lights(map.held, self.held, lane, s, pose.x, pose.y, pose.yaw, v)
+        return self.name_light(lane, s, *found, states)
+
+    def name_light(
+        self, lane: int, s: float, trigger: int, line: int, distance: float, states: States
+    ) -> LightReading:
+        """Returns the light that governs the ego at s of a lane, by `find_trigger` and `find_light`.
 
         NO_LIGHT for none, NO_WAYPOINT off every lane. states: by signal id, a missing one is UNKNOWN.
         """
-        if view.ego is None:
+        if lane < 0:
             return NO_WAYPOINT
-        if not self.lines:
+        if trigger >= 0:
+            for k in range(trigger, self.lines.start[lane + 1]):
+                here, signal = float(self.lines.s[k]) - s, int(self.lines.signal[k])
+                state = states.get(signal, LightState.UNKNOWN)
+                if -TRIGGER_BEHIND <= here <= TRIGGER_BEFORE and state is not LightState.GREEN:
+                    source = LightSource.IMMEDIATE_TRIGGER
+                    return LightReading(source, signal, max(here, 0.0), state)
+        if line < 0:
             return NO_LIGHT
-        return self._triggering_light(view.ego, states) or self._walk(pose, v, view.ego, states)
-
-    def _triggering_light(
-        self, ego: LanePoint, states: Mapping[int, LightState]
-    ) -> LightReading | None:
-        """Returns the reading of a light, not green, at the ego on its own lane; None where there is none."""
-        for line in self.lines.get(ego.lane, ()):
-            distance = line.s - ego.s
-            state = states.get(line.signal, LightState.UNKNOWN)
-            if -TRIGGER_BEHIND <= distance <= TRIGGER_BEFORE and state is not LightState.GREEN:
-                return LightReading(
-                    LightSource.IMMEDIATE_TRIGGER, line.signal, max(distance, 0.0), state
-                )
-        return None
-
-    def _walk(
-        self, pose: Pose, v: float, ego: LanePoint, states: Mapping[int, LightState]
-    ) -> LightReading:
-        """Returns the first light ahead along the lanes within the scan distance; NO_LIGHT where none is."""
-        reach = scan_distance(v)
-        here, start = ego, -ego.s  # start: of lane `here`, m from the ego
-        for _ in range(MAX_LANES):
-            for line in self.lines.get(here.lane, ()):
-                distance = start + line.s
-                if 0.0 <= distance <= reach and _is_ahead(pose, line):
-                    state = states.get(line.signal, LightState.UNKNOWN)
-                    return LightReading(LightSource.MAP_SCAN, line.signal, distance, state)
-            length = float(self.map.lanes.length[here.lane])
-            start += length
-            onward = self.map.ahead(here, length - here.s + LANE_STEP)
-            if start > reach or onward is None:
-                break
-            here = onward
-        return NO_LIGHT
-
-
-def _is_ahead(pose: Pose, line: StopLine) -> bool:
-    """Returns whether a stop line lies ahead of the pose within the angle of COS_AHEAD."""
-    dx, dy = line.x - pose.x, line.y - pose.y
-    return dx * cos(pose.yaw) + dy * sin(pose.yaw) > COS_AHEAD * hypot(dx, dy)
+        signal = int(self.lines.signal[line])
+        state = states.get(signal, LightState.UNKNOWN)
+        return LightReading(LightSource.MAP_SCAN, signal, distance, state)
 
 
 class StopRequest(NamedTuple):
@@ -148,7 +177,7 @@ class StopLock:
         self,
         light: LightReading,
         v: float,
-        states: Mapping[int, LightState],
+        states: States,
         hsv: LightState | None,
     ) -> StopRequest | None:
         """Returns the stop asked for in this tick, None for none; call it once per tick.

@@ -100,7 +100,7 @@ def first_in_lane(
     """Returns the first row of `points` in the ego's lane or where it leads (A-076 to A-078).
 
     Of the rows that the first `chosen` of `kept` name; -1: none is, or the ego is on no lane (A-083).
-    on_highway: by lane; ways (n, 2): room for branches, beyond which none is followed. The look
+    on_highway: by lane; ways (n, 4): room for branches, beyond which none is followed. The look
     ahead reads one place per branch, the point's range + 10 m on, as A-078 is written: a target whose
     road ends before that place is missed.
     """

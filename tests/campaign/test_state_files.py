@@ -172,7 +172,7 @@ def test_no_file_makes_what_is_no_data(tmp_path, forged):
 def test_a_run_that_begins_otherwise_is_refused(tmp_path):
     path = tmp_path / "state"
     path.write_bytes(written_bytes())
-    _, files = begin(spec_of("figure8", 0, duration=6.0))
+    _, files = begin(scenario_run(SCRIPTS[0]))
     with pytest.raises(CheckpointError, match="begins otherwise"):
         files.restore(unpack_state(path))
 

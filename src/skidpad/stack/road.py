@@ -138,6 +138,6 @@ class Road:
         )  # fmt: skip
 
     def curvature(self, distance: float, heading: float) -> float:
-        """Returns what `read_curvature` does."""
+        """Returns the 1/m of the lane that is followed, so many m on; 0 without one."""
         held = self.map.held
         return read_curvature(self.memory, self._rules, held, self.ways, distance, heading)

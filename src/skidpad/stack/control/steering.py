@@ -26,7 +26,7 @@ SMOOTHING_RATE = 3.0  # per s (A-152)
 
 
 class SteeringRules(NamedTuple):
-    """How a stack steers."""
+    """How a stack steers along its lane."""
 
     centres: bool  # lane centring; else small errors are ignored, others corrected in part (A-150)
     lookahead: float  # m; 0: by speed (A-143)

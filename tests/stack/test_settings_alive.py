@@ -125,7 +125,9 @@ STACK: dict[str, Scenario] = {
         "cruise", driven(*[{"cars": [Car(59.0)], "v": 22.5}] * 5, configuration=4)
     ),
     "lookahead": Scenario("fixed", driven({"y": 0.5})),
-    "route": Scenario("first_branch", driven({}, map=ArcMap(first_goes_left=True))),
+    "route": Scenario(
+        "first_branch", driven({"y": LANE_WIDTH}, map=ArcMap(piece=20.0, forks=True))
+    ),
     "radar": Scenario(False, driven({"radar": radar((30.0, 0.0))})),
     "radar_corridor": Scenario("parabola", driven({"radar": radar((30.0, 1.7))})),
     "consistency_guard": Scenario(10.0, driven(*[{"near": [Car(20.0)], "far": [Car(50.0)]}] * 5)),

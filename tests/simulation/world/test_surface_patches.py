@@ -201,6 +201,21 @@ def test_the_kernel_finds_the_patch_that_plain_words_find():
         ("patches: [{friction: 0.5, polygon: [[0, 0], [1, 1]]}]", "at least 3 corners, got 2"),
         ("patches: [{mud: 1}]", "mud"),
         ("patches: [{friction: 0.5, road: 1, side: middle}]", "middle"),
+        ("patches: [{water_mn: 1, road: 1}]", "did you mean 'water_mm'"),
+        (
+            "patches: [{slush_mm: lots, road: 1}]",
+            "slush_mm must be a number from 0 to 15, got 'lots'",
+        ),
+        (
+            "patches: [{friction: [1], road: 1}]",
+            "friction must be a number from 0.01 to 1.5, got [1]",
+        ),
+        ("patches: [{ice_mm: 1, road: A}]", "road: Expected `int | null`, got `str`, got 'A'"),
+        (
+            "patches: [{ice_mm: 1, circle: [0, 0]}]",
+            "circle: Expected `array` of length 3, got 2, got [0, 0]",
+        ),
+        ("patches: [3]", "patches[0]: Expected `object`, got `int`"),
     ],
 )
 def test_a_wrong_file_is_refused_in_one_sentence(text, complaint, tmp_path):
@@ -211,6 +226,13 @@ def test_a_wrong_file_is_refused_in_one_sentence(text, complaint, tmp_path):
     assert complaint in str(caught.value)
     assert "surface.yaml" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_missing_file_is_named_once(tmp_path):
+    with pytest.raises(FileError) as caught:
+        read_surface(tmp_path / "gone.yaml")
+    assert str(caught.value).startswith(f"surface {tmp_path}/gone.yaml: cannot be read")
+    assert str(caught.value).count("gone.yaml") == 1
 
 
 @pytest.mark.parametrize(

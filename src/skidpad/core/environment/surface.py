@@ -22,6 +22,15 @@ PATH_OFFSET, PATH_WIDTH = 0.75, 0.6
 RADIUS = (0.1, 1000.0)  # m
 DRIED_MIN = (0.0, 1440.0)  # min
 AIR_C = RANGES["air_temperature_c"]  # of weather
+NUMBERS = {  # ranges of the fields that are one number
+    "friction": FRICTION,
+    "water_mm": WATER_MM,
+    "ice_mm": ICE_MM,
+    "snow_mm": SNOW_MM,
+    "slush_mm": SLUSH_MM,
+    "dried_min": DRIED_MIN,
+    "air_below_c": AIR_C,
+}
 
 
 class SurfacePatch(
@@ -69,14 +78,9 @@ class SurfacePatch(
 
     def _require_what(self) -> None:
         """Raises ConfigError unless the patch has either a friction or a depth in mm, within its range."""
-        deep = {
-            "water_mm": WATER_MM,
-            "ice_mm": ICE_MM,
-            "snow_mm": SNOW_MM,
-            "slush_mm": SLUSH_MM,
-        }
-        for name, (low, high) in deep.items():
-            require_range(name, getattr(self, name), low, high)
+        deep = [name for name in NUMBERS if name.endswith("_mm")]
+        for name in deep:
+            require_range(name, getattr(self, name), *NUMBERS[name])
         lies = any(getattr(self, name) > 0.0 for name in deep)
         if lies is (self.friction is not None):
             raise ConfigError(

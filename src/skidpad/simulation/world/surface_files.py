@@ -7,13 +7,13 @@ from typing import Any, Literal, TypeVar
 
 import msgspec
 
-from skidpad.core.environment.surface import SurfacePatch
-from skidpad.core.errors import ConfigError
+from skidpad.core.environment.surface import NUMBERS, SurfacePatch
+from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.files.reading import decode_yaml, read_bytes
 from skidpad.core.text.told import describe_value, on_a_line
 from skidpad.simulation.world.crg import read_crg
 
-S = TypeVar("S")
+S = TypeVar("S", bound=msgspec.Struct)
 
 
 class CrgFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -39,7 +39,7 @@ def read_surface(path: Path) -> tuple[SurfacePatch, ...]:
     """
     if path.suffix.lower() == ".crg":
         return read_crg(path)
-    plain = decode_yaml(read_bytes(path, str(path)), str(path))
+    plain = decode_yaml(read_bytes(path, "surface"), str(path))
     if not isinstance(plain, dict) or not plain or set(plain) - {"patches", "crg"}:
         raise ConfigError(
             f"{path} must be a mapping with `patches` or `crg`, got {describe_value(plain, 100)}"
@@ -62,6 +62,23 @@ def _entries(plain: Any, key: str, what: str, path: Path) -> list[tuple[Any, str
 def _struct(plain: Any, kind: type[S], where: str) -> S:
     """Returns plain data as a struct; raises ConfigError with `where`."""
     try:
+        for name in plain if isinstance(plain, dict) else ():
+            require_choice("field", str(name), kind.__struct_fields__)
         return msgspec.convert(plain, kind)
-    except (msgspec.ValidationError, ConfigError) as error:
+    except msgspec.ValidationError as error:
+        raise ConfigError(f"{where}: {_say_what_is_wrong(plain, on_a_line(error))}") from None
+    except ConfigError as error:
         raise ConfigError(f"{where}: {on_a_line(error)}") from None
+
+
+def _say_what_is_wrong(plain: Any, text: str) -> str:
+    """Returns msgspec's sentence with the field first and its value last; the range of a number instead."""
+    said, _, path = text.partition(" - at `$.")
+    name = path.strip("`").split("[")[0]
+    if not name:
+        return said
+    value = describe_value(plain[name], 100)
+    if name in NUMBERS:
+        low, high = NUMBERS[name]
+        return f"{name} must be a number from {low:g} to {high:g}, got {value}"
+    return f"{name}: {said}, got {value}"

@@ -26,6 +26,7 @@ from skidpad.core.vocabulary import (
     Supervision,
     Tier,
 )
+from skidpad.roads.kernels import LaneArrays, project_point
 from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import LanePoint, RoadMap
 
@@ -128,15 +129,16 @@ class Supervisor:
         self.off = 0  # ticks with all wheels off every lane
         self.over = False  # the ego lies on its side
         self.first: LanePoint | None = None  # where the run began
-        self._lane: LanePoint | None = None  # of this moment, where it was asked for
-        self.last: LanePoint | None = None  # nearest lane, as long as there was one
+        self._last: tuple[int, float, float] | None = (
+            None  # lane, s, offset, as long as there was one
+        )
 
     def observe(self, truth: WorldTruth) -> Supervision:
         """Returns the phase of the tick that `truth` begins, a new one where it is due.
 
         Call it once per tick.
         """
-        self.truth, self._lane = truth, None
+        self.truth = truth
         self.contacts_seen += len(truth.contacts)
         self.over |= 0 in truth.rolled
         if self.phase is not Supervision.NONE:
@@ -218,7 +220,7 @@ class Supervisor:
         if self.reason is RelocationReason.ROAD_END:
             nearest = self.first
         elif self.reason in LEAVING and nearest is None:
-            nearest = self.last
+            nearest = None if self._last is None else self.map.at(*self._last)
         if nearest is None:
             return Action(FULL_STOP, notice="no driving lane near the ego, relocation is retried")
         place, shift, clear = self._clear_place(nearest)
@@ -286,31 +288,34 @@ class Supervisor:
     def _astray(self, truth: WorldTruth) -> RelocationReason | None:
         """Returns why the ego is put back although it touched nothing, None where it is not.
 
-        Wrong way, off the road, or over the end of the map. Notes the lane of the moment.
+        Wrong way, off the road, or over the end of the map. Notes the place on a lane.
         """
         states = truth.states
-        place = self._lane = self._find_lane(states)
-        if place is not None:
-            self.first, self.last = self.first or place, place
-            crossing = self.map.lanes.junction[place.lane] >= 0  # its lanes lead all ways
-            if not crossing and cos(place.heading - float(states.yaw[0])) < WRONG_WAY_DOT:
+        lane, s, offset, turned, inside = find_ego(self.map.held, self._hold(states))
+        if lane >= 0:
+            self._last = lane, s, offset
+            self.first = self.first or self.map.at(lane, s, offset)
+            crossing = self.map.lanes.junction[lane] >= 0  # its lanes lead all ways
+            if turned < WRONG_WAY_DOT and not crossing:
                 return RelocationReason.WRONG_WAY  # more than 120 deg off (A-196, A-197)
-        if self.last is None or not self._has_left(truth, place):
+        if inside or self._last is None:
+            self.off = 0
+            return None
+        if not self._has_left(truth):
             return None
         x, y = float(states.x[0]), float(states.y[0])
-        ended = is_past_the_end(self.map, x, y, self.last)
+        ended = is_past_the_end(self.map, x, y, self.map.at(*self._last))
         return RelocationReason.ROAD_END if ended else RelocationReason.OFF_ROAD
 
-    def _has_left(self, truth: WorldTruth, place: LanePoint | None) -> bool:
+    def _has_left(self, truth: WorldTruth) -> bool:
         """Returns whether all wheels are off every lane for a second, or the car far beyond the edge (R-6).
 
         Counts the ticks.
         """
         states, table = truth.states, truth.table
         x, y, z, yaw = states.x[:1], states.y[:1], states.z[:1], states.yaw[:1]
-        inside = place is not None and hypot(x[0] - place.x, y[0] - place.y) < 0.5 * place.width
         size = float(table.length[0]), float(table.width[0])
-        if inside or not self.map.edge.off(x, y, z, yaw, *size)[0]:
+        if not self.map.edge.off(x, y, z, yaw, *size)[0]:
             self.off = 0
             return False
         self.off += 1
@@ -334,7 +339,7 @@ class Supervisor:
         """Returns whether the stack says that it holds, or an actor or a red light stands ahead."""
         if report is not None and report.tier in HOLDING:
             return True
-        ego = self._lane or self._find_lane(truth.states)
+        ego = self._find_lane(truth.states)
         if ego is None:
             return False
         here = replace(
@@ -345,10 +350,14 @@ class Supervisor:
     def _is_clear_of_others(self, here: LanePoint) -> bool:
         """Returns whether no actor stands at or ahead of the lane point."""
         assert self.truth is not None
-        states = self.truth.states
+        held = self._hold(self.truth.states)
+        return not has_actor_ahead(held, here.x, here.y, here.z, here.heading)
+
+    def _hold(self, states: ActorStates) -> Held[ActorStates]:
+        """Returns the states for kernels; they are held anew when they are another object."""
         if states is not self._states:
             self._states, self._held = states, hold(states)
-        return not has_actor_ahead(self._held, here.x, here.y, here.z, here.heading)
+        return self._held
 
     def _light_ahead(self, ego: LanePoint, truth: WorldTruth) -> bool:
         """Returns whether a red or yellow light is within LIGHT_REACH ahead on the ego's lane."""
@@ -373,6 +382,24 @@ def is_past_the_end(map: RoadMap, x: float, y: float, last: LanePoint) -> bool:
     dx, dy = x - last.x, y - last.y
     ahead = dx * cos(last.heading) + dy * sin(last.heading)
     return ahead > abs(dy * cos(last.heading) - dx * sin(last.heading))
+
+
+@kernel
+def find_ego(
+    map: Held[LaneArrays], held: Held[ActorStates]
+) -> tuple[int, float, float, float, bool]:
+    """Returns the ego's lane (-1: none), s and offset, the cosine of its yaw error, and if it is inside.
+
+    Inside is less than half the lane's width from its centre.
+    """
+    states = held.value
+    x, y = states.x[0], states.y[0]
+    lane, s, offset, px, py, _, heading, _, width = project_point(
+        map.value, x, y, states.z[0], True
+    )
+    if lane < 0:
+        return -1, s, offset, 1.0, False
+    return lane, s, offset, cos(heading - states.yaw[0]), hypot(x - px, y - py) < 0.5 * width
 
 
 @kernel

@@ -27,9 +27,7 @@ def drive() -> None:
     [
         step.advance,
         feel.feel_motion,
-        objects.look,
-        objects.listen,
-        objects.feel_slope,
+        objects.sense,
         road.read_road,
         think.think,
         ticks.copy_actors,

@@ -116,9 +116,7 @@ class Objects:
     ) -> CameraRadarReadings:
         """Segments of the depth cameras; lights and lamps play no part at this level."""
         del lights, braking
-        return CameraRadarReadings(
-            NO_IMAGES, self.suite.segments(states), self.suite.radar(tick, states)
-        )
+        return CameraRadarReadings(NO_IMAGES, *self.suite.read(tick, states))
 
     def change(self, outside: Outside) -> None:
         """Weather and headlights are others from the next reading on."""

@@ -93,6 +93,7 @@ class ObjectSuite:
             for s in specs
             if isinstance(s, CameraSpec) and s.modality is Modality.DEPTH
         ]
+        self.camera_ids = tuple(spec.id for spec, _ in self.cameras)
         self._specs, self._seed, self._dt = specs, seed, dt
         self.see_through(weather, None)
         self.labels = np.array([LABEL_OF_KIND[ActorKind(k)] for k in table.kind], dtype=np.uint8)
@@ -132,15 +133,20 @@ class ObjectSuite:
     def segments(self, states: ActorStates) -> dict[str, Segments]:
         """Returns what each depth camera sees of vehicles, by camera id; `NOTHING` where it sees none."""
         around = self._around(states)
-        seen = {}
-        for (spec, _), eye, held in zip(self.cameras, self._eyes, self._held_eyes, strict=True):
-            m = look(around, held, self.limit)
-            if m == 0:
-                seen[spec.id] = NOTHING
-                continue
-            u, width, top, bottom, depth = eye.runs[:, :m].copy()
-            seen[spec.id] = Segments(u, width, top, bottom, depth, eye.classes[:m].copy())
-        return seen
+        runs = (look(around, held, self.limit) for held in self._held_eyes)
+        return dict(zip(self.camera_ids, map(copy_runs, self._eyes, runs), strict=True))
+
+    def read(self, tick: int, states: ActorStates) -> tuple[dict[str, Segments], RadarPoints]:
+        """Returns what `segments` and `radar` do, in one call of a kernel for the common sensors."""
+        if len(self._eyes) != 2 or len(self.antennas) != 1 or self.lanes is None:
+            return self.segments(states), self.radar(tick, states)
+        one, other = self._held_eyes
+        near, far, m = sense(
+            self._around(states), self.lanes, one, other, self._held_antennas[0], tick, self.limit
+        )
+        runs = map(copy_runs, self._eyes, (near, far))
+        seen = dict(zip(self.camera_ids, runs, strict=True))
+        return seen, RadarPoints(*self._radar.echoes[:, :m].copy())
 
     def radar(self, tick: int, states: ActorStates) -> RadarPoints:
         """Returns the points of the first radar; none when the suite has no radar."""
@@ -168,6 +174,29 @@ class ObjectSuite:
                 )
             )
         return self._held
+
+
+def copy_runs(eye: Eye, m: int) -> Segments:
+    """Returns the m runs that a camera has seen."""
+    if m == 0:
+        return NOTHING
+    u, width, top, bottom, depth = eye.runs[:, :m].copy()
+    return Segments(u, width, top, bottom, depth, eye.classes[:m].copy())
+
+
+@kernel
+def sense(
+    around: Held[Surroundings],
+    map: Held[LaneArrays],
+    one: Held[Eye],
+    other: Held[Eye],
+    radar: Held[Antenna],
+    tick: int,
+    limit: float,
+) -> tuple[int, int, int]:
+    """Returns what `look` does for two cameras, and `listen` on the road's slope."""
+    feel_slope(map, around)
+    return look(around, one, limit), look(around, other, limit), listen(around, radar, tick)
 
 
 @kernel

@@ -1,5 +1,7 @@
 """`skidpad effects`: arms differ in their effect alone, pairs are compared, and what is not read says so."""
 
+from pathlib import Path
+
 import numpy as np
 import polars as pl
 import pytest
@@ -15,6 +17,7 @@ from skidpad.campaign.studies.effects import (
     plan_arm,
     settings_of_arm,
 )
+from skidpad.cli.campaigns.effects import difference_text
 from skidpad.cli.main import app
 from skidpad.core.settings.parts import load_profile
 from skidpad.core.vocabulary import SensorLevel
@@ -90,3 +93,33 @@ def test_the_command_prints_a_table_and_writes_its_rows(tmp_path):
     table = pl.read_csv(out)
     assert table["arm"].to_list() == ["none", "lidar", "wind", "all"]
     assert table["log_hash"][0] == table["log_hash"][1] != table["log_hash"][2]
+
+
+RESULTS = Path(__file__).parents[2] / "docs" / "results"
+
+
+def plain(text):
+    """A cell without the sign of what is positive or rounds to nothing."""
+    return (
+        text.removeprefix("+").replace("-0.00", "0.00")
+        if text[1:5] == "0.00"
+        else text.removeprefix("+")
+    )
+
+
+@pytest.mark.parametrize("name", ["ours", "lidar", "camera"])
+def test_the_page_shows_what_its_rows_say(name):
+    page = (RESULTS / "effects.md").read_text(encoding="utf-8")
+    table = pl.read_csv(RESULTS / f"effects-{name}.csv", schema_overrides={"stack": pl.String})
+    seeds = table["seed"].n_unique()
+    for found in compare_effects(table):
+        cells = [
+            found.note or plain(difference_text(d)) for d in (found.interventions, found.speed)
+        ]
+        line = f"| {found.title} | {cells[0]} | {cells[1]} | {found.changed} of {seeds} |"
+        assert line in page.split(f"(effects-{name}.csv)")[1].split("\n## ")[0]
+
+
+def test_our_stack_has_a_row_for_every_effect():
+    arms = pl.read_csv(RESULTS / "effects-ours.csv")["arm"].unique().to_list()
+    assert set(arms) == {NONE, *EFFECTS, "all"}

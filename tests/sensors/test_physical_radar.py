@@ -25,9 +25,13 @@ from skidpad.roads.roadside import Barrier, BarrierKind, Box, Roadside
 from skidpad.sensors.physical_radar import setup as radar_setup
 from skidpad.sensors.physical_radar.cells import (
     AVERAGED,
+    UNKNOWN,
+    Noise,
+    bound_powers,
     cfar_threshold,
     make_cells,
     noise_mean,
+    power_of,
     snr_for,
 )
 from skidpad.sensors.physical_radar.echoes import lobe_section
@@ -85,11 +89,12 @@ def test_threshold_keeps_the_rate_of_false_alarms_and_finds_what_theory_says():
     cells = make_cells()
 
     @numba.njit
-    def shares(numbers, powers, threshold, snr, echoes):
+    def shares(cells, aims, clutter, threshold, snr, echoes):
         passed = found = 0
         n = len(echoes)
         for k, echo in enumerate(echoes):
-            mean = noise_mean(numbers, powers, 250, 10_000_100 + 3 * k, 0.0, np.uint64(7), k)
+            noise = Noise(np.uint64(6), k, 0.1, aims, clutter, clutter)
+            mean = noise_mean(cells, noise, 250, 10_000_100 + 3 * k, 0.0, np.uint64(7))
             passed += echo > threshold * mean
             found += echo * (1.0 + snr) > threshold * mean
         return passed / n, found / n
@@ -97,8 +102,9 @@ def test_threshold_keeps_the_rate_of_false_alarms_and_finds_what_theory_says():
     # P_FA 1e-3 can be counted; Swerling 1 by IEEE AES-14 (1978), 44: M 16, P_D 0.9
     false, detected = 1e-3, 0.9
     one, other = shares(
-        cells.number,
-        cells.power,
+        cells,
+        np.zeros((1, 3)),
+        np.zeros(250),
         cfar_threshold(false),
         snr_for(detected, false),
         np.random.default_rng(1).exponential(size=200_000),
@@ -255,6 +261,35 @@ def test_a_tick_costs_at_most_four_times_one_with_the_geometric_radar():
                 _ = frame.segments, frame.radar
             best[model] = min(best[model], process_time() - begin)
     assert best[RadarModel.PHYSICAL] < 4.0 * best[RadarModel.GEOMETRIC]
+
+
+def test_bounds_hold_the_power_that_is_drawn():
+    """Over a million cells: a bound on the wrong side would drop a detection without a trace."""
+    cells, aims = make_cells(), np.zeros((1, 3))
+    aims[:, 2] = 1.0
+    clutter = np.linspace(0.0, 5.0, 2048)
+
+    @numba.njit
+    def count_wrong(cells, aims, clutter, ticks):
+        wrong, tight = 0, 0.0
+        n = len(cells.number)
+        cells.reached[0] = n
+        for k in range(n):
+            cells.number[k] = k
+            cells.re[k] = 0.01 * (k % 500)
+        for tick in range(ticks):
+            noise = Noise(np.uint64(3), tick, 0.1, aims, clutter, clutter)
+            cells.power[:] = UNKNOWN
+            bound_powers(cells, noise)
+            for k in range(n):
+                amplitude = np.sqrt(power_of(cells, noise, k))
+                wrong += not cells.fewest[k] <= amplitude <= cells.most[k]
+                tight = max(tight, amplitude / cells.most[k])
+        return wrong, tight
+
+    wrong, tight = count_wrong(cells, aims, clutter, 128)
+    assert wrong == 0
+    assert tight > 0.99
 
 
 def test_the_page_shows_this_model():

@@ -115,6 +115,11 @@ def test_what_is_gone_is_dropped_after_five_misses():
     assert counts[12:] == [0] * 8
 
 
+@numba.njit
+def _correct(state, spread, looks, values):
+    tracking._correct(state, spread, looks, values)
+
+
 def test_one_correction_by_three_values_is_that_of_all_at_once():
     rng = np.random.default_rng(3)
     half = rng.normal(size=(4, 4))
@@ -123,7 +128,7 @@ def test_one_correction_by_three_values_is_that_of_all_at_once():
     gain = spread @ looks.T @ np.linalg.inv(looks @ spread @ looks.T + np.diag(values[:, 1]))
     expected = state + gain @ (values[:, 0] - looks @ state)
     wide = spread - gain @ looks @ spread
-    tracking._correct.py_func(state, spread, looks, values)
+    _correct(state, spread, looks, values)
     assert state == pytest.approx(expected)
     assert spread == pytest.approx(wide)
 

@@ -144,9 +144,7 @@ def walls_in_view(
     c, s = np.cos(yaw), np.sin(yaw)
     n = 0
     for g in range(groups.x_min.size):
-        aside = max(groups.x_min[g] - origin[0], origin[0] - groups.x_max[g], 0.0)
-        aside += max(groups.y_min[g] - origin[1], origin[1] - groups.y_max[g], 0.0)
-        if aside > 1.5 * reach + groups.longest[g] + ROUNDING:
+        if is_group_far(groups, g, origin, reach):
             continue
         if _is_out_of_view(origin, c, s, slope, groups, g):
             continue
@@ -164,6 +162,14 @@ def walls_in_view(
                 keep[n] = w
                 n += 1
     return n
+
+
+@inner_kernel
+def is_group_far(groups: WallGroups, g: int, origin: Floats, reach: float) -> bool:
+    """Returns whether all of a group lies beyond 1.5 times `reach` m, along the axes in sum."""
+    aside = max(groups.x_min[g] - origin[0], origin[0] - groups.x_max[g], 0.0)
+    aside += max(groups.y_min[g] - origin[1], origin[1] - groups.y_max[g], 0.0)
+    return bool(aside > 1.5 * reach + groups.longest[g] + ROUNDING)
 
 
 @inner_kernel

@@ -6,20 +6,20 @@ from math import exp, log, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from skidpad.core.arrays import Floats
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.kernels.jit import inner_kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics.mirrors import two_ray_gain
 from skidpad.sensors.noise import uniform
-from skidpad.sensors.object_level.boxes import WallGroups, Walls, walls_in_view
-from skidpad.sensors.physical_radar.cells import Cells, add_echo, normal_pair
+from skidpad.sensors.object_level.boxes import GROUP, WallGroups, Walls, is_group_far
+from skidpad.sensors.physical_radar.cells import FAINT, Cells, Scratch, add_echo, normal_pair
 from skidpad.sensors.physical_radar.mirrors import Mirrors
 from skidpad.sensors.physical_radar.setup import BEAM_STEP, DB, WAVE_NUMBER, RadarSetup
 from skidpad.sensors.physical_radar.targets import LOBES, Sites, Targets
 
 NEAR = 1.0  # m, nearest echo
+WIDER, LESS = 1.0 + 1e-9, 1.0 - 1e-9  # of a bound, so that rounding leaves nothing out
 
 
 class RadarWorld(NamedTuple):
@@ -32,17 +32,24 @@ class RadarWorld(NamedTuple):
     sites: Sites
     walls: Walls
     groups: WallGroups
+    regions: WallGroups  # of the sites
     mirrors: Mirrors
+
+
+Way = tuple[float, float, float]  # m, along the axes of the world
 
 
 class Screens(NamedTuple):
     """Boxes that may hide others, seen from the antenna; arrays (n,)."""
 
-    row: NDArray[np.int64]
+    row: Ints
     cos: Floats
     sin: Floats
     x: Floats  # m, antenna from the box's middle, in the box's axes
     y: Floats
+    ahead: Floats  # m, the box's middle from the antenna, along the axes of the world
+    aside: Floats
+    around: Floats  # m^2, a little more than the squared radius of a circle about its ground plan
 
 
 class Sensor(NamedTuple):
@@ -67,25 +74,30 @@ class Echo(NamedTuple):
 
 @inner_kernel
 def find_screens(
-    radar: RadarSetup, world: RadarWorld, states: ActorStates, origin: Floats
+    radar: RadarSetup, world: RadarWorld, states: ActorStates, origin: Floats, scratch: Scratch
 ) -> Screens:
-    """The boxes of actors within reach of the antenna."""
+    """The boxes of actors within reach of the antenna; arrays of `scratch`."""
     n = 0
-    row = np.empty(states.x.size, np.int64)
+    row, table = scratch.actor, scratch.screen
     for i in range(1, states.x.size):
         if states.present[i]:
             d = np.hypot(states.x[i] - origin[0], states.y[i] - origin[1])
             if d - world.length[i] < radar.reach:
                 row[n] = i
                 n += 1
-    table = np.empty((4, n))
     for k in range(n):
         i = row[k]
         c, s = np.cos(states.yaw[i]), np.sin(states.yaw[i])
         dx, dy = origin[0] - states.x[i], origin[1] - states.y[i]
         table[0, k], table[1, k] = c, s
         table[2, k], table[3, k] = c * dx + s * dy, -s * dx + c * dy
-    return Screens(row[:n], table[0], table[1], table[2], table[3])
+        table[4, k], table[5, k] = -dx, -dy
+        long, wide = world.length[i], world.width[i]
+        table[6, k] = WIDER * 0.25 * (long * long + wide * wide)
+    return Screens(
+        row[:n], table[0, :n], table[1, :n], table[2, :n], table[3, :n], table[4, :n],
+        table[5, :n], table[6, :n],
+    )  # fmt: skip
 
 
 @inner_kernel
@@ -135,7 +147,7 @@ def is_hidden(
     """Whether a box lies between antenna and a point that is `way` m off; own: a row not counted."""
     for k in range(screens.row.size):
         i = screens.row[k]
-        if i == own:
+        if i == own or _passes_by(screens, k, way[0], way[1]):
             continue
         place = (screens.x[k], screens.y[k], origin[2] - states.z[i])
         if crosses_actor(world, i, screens.cos[k], screens.sin[k], place, way):
@@ -144,8 +156,19 @@ def is_hidden(
 
 
 @inner_kernel
+def _passes_by(screens: Screens, k: int, x: float, y: float) -> bool:
+    """Whether the way (x, y) from the antenna surely misses a box, as it misses a circle about it."""
+    dx, dy = screens.ahead[k], screens.aside[k]
+    square, cross = x * x + y * y, dx * y - dy * x
+    if cross * cross > screens.around[k] * square:
+        return True
+    # behind the antenna, which stands outside the circle
+    return bool(dx * x + dy * y < 0.0 and dx * dx + dy * dy > screens.around[k])
+
+
+@inner_kernel
 def is_behind_wall(
-    walls: Walls, chosen: NDArray[np.int64], origin: Floats, way: tuple[float, float, float]
+    walls: Walls, chosen: Ints, origin: Floats | Way, way: tuple[float, float, float]
 ) -> bool:
     """Whether a wall crosses the way from the antenna to a point that is `way` m off."""
     for w in chosen:
@@ -154,7 +177,10 @@ def is_behind_wall(
         if det == 0.0:
             continue
         px, py = walls.x0[w] - origin[0], walls.y0[w] - origin[1]
-        t, f = (ex * py - ey * px) / det, (way[0] * py - way[1] * px) / det
+        met, along = ex * py - ey * px, way[0] * py - way[1] * px
+        if abs(met) > abs(det) or abs(along) > abs(det) or met * det < 0.0 or along * det < 0.0:
+            continue  # as most do, without a division
+        t, f = met / det, along / det
         if 0.0 < t < 1.0 and 0.0 <= f <= 1.0:
             foot = walls.z0[w] + f * (walls.z1[w] - walls.z0[w])
             if 0.0 <= origin[2] + t * way[2] - foot <= walls.height[w]:
@@ -191,6 +217,8 @@ def deposit_echo(
 
     tick, index: they choose the random phase; `index` counts the points that return an echo.
     """
+    if echo.snr * section < FAINT:
+        return
     grid = radar.grid
     at = (
         echo.distance / grid.range_step,
@@ -226,14 +254,14 @@ def add_actors(
     states: ActorStates,
     sensor: Sensor,
     screens: Screens,
+    rails: Ints,
     tick: int,
 ) -> None:
-    """Echoes of the sides of actors that face the antenna and are not hidden."""
+    """Echoes of the sides of actors that face the antenna and are not hidden.
+
+    rails: the walls in view.
+    """
     origin, targets = sensor.origin, world.targets
-    edge = np.tan(0.5 * radar.wide)
-    yaw = np.arctan2(sensor.rotation[1, 0], sensor.rotation[0, 0])
-    room = np.empty(world.walls.x0.size, np.int64)
-    rails = room[: walls_in_view(origin, yaw, edge, world.walls, world.groups, radar.reach, room)]
     for k in range(screens.row.size):
         i = screens.row[k]
         c, s = screens.cos[k], screens.sin[k]
@@ -285,13 +313,30 @@ def add_sites(
 ) -> None:
     """Echoes of what stands beside the road."""
     sites, origin = world.sites, sensor.origin
-    for j in range(sites.x.size):
-        x, y = sites.x[j] - origin[0], sites.y[j] - origin[1]
-        if abs(x) + abs(y) > 1.5 * radar.reach or x * sites.nx[j] + y * sites.ny[j] > 0.0:
+    for g in range(world.regions.x_min.size):
+        if is_group_far(world.regions, g, origin, radar.reach):
             continue
-        way = (x, y, sites.z[j] - origin[2])
-        echo = echo_of(radar, sensor, way, 0.0, 0.0)
-        if echo.snr * sites.section[j] < 1.0:
-            continue
-        if not is_hidden(world, states, origin, screens, 0, way):
-            deposit_echo(radar, cells, echo, sites.section[j], tick, 4 * states.x.size + j)
+        for j in range(GROUP * g, min(GROUP * (g + 1), sites.x.size)):
+            x, y = sites.x[j] - origin[0], sites.y[j] - origin[1]
+            if abs(x) + abs(y) > 1.5 * radar.reach or x * sites.nx[j] + y * sites.ny[j] > 0.0:
+                continue
+            square = x * x + y * y
+            if radar.factor * sites.section[j] < LESS * square * square:
+                continue  # without any loss it would be below the noise
+            way = (x, y, sites.z[j] - origin[2])
+            if _is_beside(radar, sensor, way):
+                continue
+            echo = echo_of(radar, sensor, way, 0.0, 0.0)
+            if echo.snr * sites.section[j] < 1.0:
+                continue
+            if not is_hidden(world, states, origin, screens, 0, way):
+                deposit_echo(radar, cells, echo, sites.section[j], tick, 4 * states.x.size + j)
+
+
+@inner_kernel
+def _is_beside(radar: RadarSetup, sensor: Sensor, way: Way) -> bool:
+    """Whether a point surely lies beside the antenna's view; `echo_of` says so exactly."""
+    r = sensor.rotation
+    ahead = r[0, 0] * way[0] + r[1, 0] * way[1] + r[2, 0] * way[2]
+    left = r[0, 1] * way[0] + r[1, 1] * way[1] + r[2, 1] * way[2]
+    return bool(ahead <= 0.0 or abs(left) > radar.edge * ahead)

@@ -15,8 +15,8 @@ from __future__ import annotations
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skidpad.core.arrays import Ints
 from skidpad.core.kernels.jit import inner_kernel
 from skidpad.core.states import ActorStates
 from skidpad.sensors.object_level.boxes import walls_in_view
@@ -51,18 +51,17 @@ def add_ghosts(
     states: ActorStates,
     sensor: Sensor,
     screens: Screens,
+    rails: Ints,
+    room: Ints,
     tick: int,
 ) -> None:
-    """Echoes of actors by way of every mirror in view."""
+    """Echoes of actors by way of every mirror in view.
+
+    rails: the walls in view; room: for as many mirrors as there are.
+    """
     walls = world.mirrors.walls
     yaw, edge = np.arctan2(sensor.rotation[1, 0], sensor.rotation[0, 0]), np.tan(0.5 * radar.wide)
-    room = np.empty(walls.x0.size, np.int64)
     seen = walls_in_view(sensor.origin, yaw, edge, walls, world.mirrors.groups, radar.reach, room)
-    if seen == 0:
-        return
-    room2 = np.empty(world.walls.x0.size, np.int64)
-    n = walls_in_view(sensor.origin, yaw, edge, world.walls, world.groups, radar.reach, room2)
-    rails = room2[:n]
     strongest = radar.factor * MOST_SECTION
     for m in range(seen):
         w = room[m]
@@ -84,7 +83,8 @@ def add_ghosts(
             found = reflect(world.mirrors, w, sensor.origin, middle, radar.concrete, WAVE_NUMBER)
             way = found.way
             square = way[0] * way[0] + way[1] * way[1]
-            most = strongest * max(1.0, world.targets.area[i].max())
+            area = world.targets.area
+            most = strongest * max(1.0, area[i, 0], area[i, 1], area[i, 2], area[i, 3])
             if most * found.power < square * square:
                 continue
             if _is_blocked(world, states, sensor, screens, rails, i, found, middle):
@@ -106,7 +106,7 @@ def _is_blocked(
     states: ActorStates,
     sensor: Sensor,
     screens: Screens,
-    rails: NDArray[np.int64],
+    rails: Ints,
     own: int,
     found: Reflection,
     point: Way,
@@ -118,21 +118,20 @@ def _is_blocked(
         return True
     if is_behind_wall(world.walls, rails, origin, first):
         return True
-    start = np.array([point[0], point[1], point[2]])
     second = (
         SHORT * (origin[0] + f[0] - point[0]),
         SHORT * (origin[1] + f[1] - point[1]),
         SHORT * (origin[2] + f[2] - point[2]),
     )
-    if is_behind_wall(world.walls, rails, start, second):
+    if is_behind_wall(world.walls, rails, point, second):
         return True
     for k in range(screens.row.size):
         i = screens.row[k]
         if i == own:
             continue
         c, s = screens.cos[k], screens.sin[k]
-        dx, dy = start[0] - states.x[i], start[1] - states.y[i]
-        place = (c * dx + s * dy, -s * dx + c * dy, start[2] - states.z[i])
+        dx, dy = point[0] - states.x[i], point[1] - states.y[i]
+        place = (c * dx + s * dy, -s * dx + c * dy, point[2] - states.z[i])
         if crosses_actor(world, i, c, s, place, second):
             return True
     return False
@@ -146,7 +145,7 @@ def _add_images(
     states: ActorStates,
     sensor: Sensor,
     screens: Screens,
-    rails: NDArray[np.int64],
+    rails: Ints,
     tick: int,
     i: int,
     found: Reflection,

@@ -11,10 +11,10 @@ from math import exp, log
 
 import numpy as np
 
+from skidpad.core.arrays import Ints
 from skidpad.core.kernels.jit import inner_kernel
 from skidpad.core.states import ActorStates
 from skidpad.sensors.noise import uniform
-from skidpad.sensors.object_level.boxes import walls_in_view
 from skidpad.sensors.physical_radar.echoes import (
     RadarWorld,
     Screens,
@@ -29,13 +29,11 @@ NEAREST = 1.0  # m between two antennas
 
 @inner_kernel
 def add_interference(
-    radar: RadarSetup, world: RadarWorld, states: ActorStates, sensor: Sensor, screens: Screens
-) -> Sensor:
-    """The sensor whose losses hold what other radars add to its noise, in nepers."""
+    radar: RadarSetup, world: RadarWorld, states: ActorStates, sensor: Sensor, screens: Screens,
+    rails: Ints,
+) -> Sensor:  # fmt: skip
+    """The sensor whose losses hold what other radars add to its noise, in nepers; rails: walls in view."""
     origin, r = sensor.origin, sensor.rotation
-    room = np.empty(world.walls.x0.size, np.int64)
-    yaw, edge = np.arctan2(r[1, 0], r[0, 0]), np.tan(0.5 * radar.wide)
-    rails = room[: walls_in_view(origin, yaw, edge, world.walls, world.groups, radar.reach, room)]
     key, added = radar.key + np.uint64(5), 0.0
     for k in range(screens.row.size):
         i = screens.row[k]

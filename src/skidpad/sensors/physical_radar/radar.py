@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.frames import RadarObjects, RadarPoints, RadarTracks
 from skidpad.core.kernels.jit import Held, hold, inner_kernel, kernel
 from skidpad.core.maths.randomness import stream_key
@@ -18,18 +19,34 @@ from skidpad.core.vocabulary import RadarOutput
 from skidpad.core.weather import Weather
 from skidpad.roads.roadside import Roadside
 from skidpad.sensors.noise import uniform
-from skidpad.sensors.object_level.boxes import group_walls, placed, walls_of
+from skidpad.sensors.object_level.boxes import (
+    Mount,
+    WallGroups,
+    Walls,
+    group_walls,
+    place,
+    walls_in_view,
+    walls_of,
+)
 from skidpad.sensors.physical_radar.cells import (
     RANGES,
     SLACK,
     SPEEDS,
     Cells,
+    Noise,
+    Scratch,
+    bins_of,
+    bound_powers,
     centre,
     clear,
+    clutter_at,
+    is_minor,
     is_peak,
     make_cells,
+    make_scratch,
     noise_mean,
     normal_pair,
+    power_of,
 )
 from skidpad.sensors.physical_radar.echoes import (
     RadarWorld,
@@ -45,13 +62,12 @@ from skidpad.sensors.physical_radar.mirrors import mirrors_of
 from skidpad.sensors.physical_radar.setup import (
     FASTEST,
     MAX_SPEED,
-    RAIN_SPREAD,
     RISE_WIDTH,
     SLOPE,
     RadarSetup,
     setup_of,
 )
-from skidpad.sensors.physical_radar.targets import sites_of, targets_of
+from skidpad.sensors.physical_radar.targets import Sites, sites_of, targets_of
 from skidpad.sensors.physical_radar.tracks import (
     MOST_TRACKS,
     Tracks,
@@ -103,14 +119,18 @@ class PhysicalRadar:
         self.spec, self._key = spec, np.uint64(stream_key(seed, "physical radar", spec.id))
         self._multipath, self._output, self._dt = multipath, output, dt
         self._interference = interference
-        walls = walls_of(roadside)
+        walls, sites = walls_of(roadside), sites_of(roadside)
+        mirrors = mirrors_of(roadside if multipath else Roadside())
         self._world = hold(
             RadarWorld(
-                table.length, table.width, table.height, targets_of(table), sites_of(roadside),
-                walls, group_walls(walls), mirrors_of(roadside if multipath else Roadside()),
+                table.length, table.width, table.height, targets_of(table), sites, walls,
+                group_walls(walls), group_sites(sites), mirrors,
             )
         )  # fmt: skip
         self._cells = hold(make_cells())
+        beams = setup_of(spec, self._key, None).grid.beams
+        room = make_scratch(len(table), len(walls.x0), len(mirrors.walls.x0), beams)
+        self._scratch = hold(room)
         self._tracks = hold(make_tracks())
         self._out = np.empty((MOST_FOUND, 6), np.float32)
         self._more = np.empty((MOST_TRACKS, 6))
@@ -127,7 +147,9 @@ class PhysicalRadar:
 
     def read(self, tick: int, states: ActorStates) -> Reading:
         """Detections of this state as the output asks for, valid until the next call."""
-        count = find_detections(self._held, self._world, self._cells, states, tick, self._out)
+        count = find_detections(
+            self._held, self._world, self._cells, self._scratch, states, tick, self._out
+        )
         if self._output is RadarOutput.POINTS:
             return Reading(RadarPoints(*self._out[:count, :4].T))
         follows = self._output is RadarOutput.TRACKS
@@ -149,10 +171,16 @@ class PhysicalRadar:
         return RadarTracks(more[:, 0].astype(np.int64), x, y, vx, vy, more[:, 5].astype(np.int64))
 
 
+def group_sites(sites: Sites) -> WallGroups:
+    """Returns where the points of each group are, as of walls that have no length."""
+    x, y, z = sites.x, sites.y, sites.z
+    return group_walls(Walls(x, y, z, x, y, z, z))
+
+
 @inner_kernel
-def _sensor_of(radar: RadarSetup, states: ActorStates) -> Sensor:
-    """Where the antenna is, and how it moves."""
-    seat = placed(radar.mount, states)
+def _sensor_of(radar: RadarSetup, states: ActorStates, seat: Mount) -> Sensor:
+    """Where the antenna is, written into `seat`, and how it moves."""
+    place(radar.mount, states, seat)
     vx = states.vx[0] - states.yaw_rate[0] * (seat.origin[1] - states.y[0])
     vy = states.vy[0] + states.yaw_rate[0] * (seat.origin[0] - states.x[0])
     speed = np.hypot(vx, vy)
@@ -165,26 +193,34 @@ def find_detections(
     held: Held[RadarSetup],
     surroundings: Held[RadarWorld],
     state: Held[Cells],
+    room: Held[Scratch],
     states: ActorStates,
     tick: int,
     out: NDArray[np.float32],
 ) -> int:
     """Write range, azimuth, altitude, range rate and power of the cells found; returns how many."""
-    radar, world, cells = held.value, surroundings.value, state.value
-    sensor = _sensor_of(radar, states)
+    radar, world, cells, scratch = held.value, surroundings.value, state.value, room.value
+    sensor = _sensor_of(radar, states, Mount(scratch.origin, scratch.rotation))
+    origin, r = sensor.origin, sensor.rotation
     clear(cells)
     _note_motion(cells.own, sensor, states.yaw_rate[0])
-    screens = find_screens(radar, world, states, sensor.origin)
+    screens = find_screens(radar, world, states, origin, scratch)
+    yaw, edge = np.arctan2(r[1, 0], r[0, 0]), np.tan(0.5 * radar.wide)
+    n = walls_in_view(origin, yaw, edge, world.walls, world.groups, radar.reach, scratch.walls)
+    rails = scratch.walls[:n]
     if radar.rivals > 0.0:
-        sensor = add_interference(radar, world, states, sensor, screens)
-    add_actors(radar, world, cells, states, sensor, screens, tick)
+        sensor = add_interference(radar, world, states, sensor, screens, rails)
+    add_actors(radar, world, cells, states, sensor, screens, rails, tick)
     add_sites(radar, world, cells, states, sensor, screens, tick)
     if radar.multipath:
-        add_ghosts(radar, world, cells, states, sensor, screens, tick)
-    aims = _aim_beams(radar, sensor)
-    _add_noise(radar, cells, aims, tick)
-    n = _select(radar, cells, aims, tick, out)
-    return _add_false_alarm(radar, tick, n, out)
+        add_ghosts(radar, world, cells, states, sensor, screens, rails, scratch.mirrors, tick)
+    _aim_beams(radar, sensor, scratch.aims)
+    noise = Noise(
+        radar.key + np.uint64(1), tick, radar.grid.speed_step, scratch.aims, radar.air.ground,
+        radar.air.rain,
+    )  # fmt: skip
+    found = _select(radar, cells, noise, out)
+    return _add_false_alarm(radar, tick, found, out)
 
 
 @kernel
@@ -222,9 +258,8 @@ def _note_motion(own: NDArray[np.float64], sensor: Sensor, yaw_rate: float) -> N
 
 
 @inner_kernel
-def _aim_beams(radar: RadarSetup, sensor: Sensor) -> NDArray[np.float64]:
-    """For each beam: the antenna's speed along it in two parts, and what its lobe leaves of clutter."""
-    aims = np.empty((radar.grid.beams, 3))
+def _aim_beams(radar: RadarSetup, sensor: Sensor, aims: Floats) -> None:
+    """Write for each beam the antenna's speed along it in two parts, and what its lobe leaves of clutter."""
     r = sensor.rotation
     for beam in range(radar.grid.beams):
         azimuth = (beam - 0.5 * (radar.grid.beams - 1)) * radar.grid.beam_step
@@ -232,74 +267,32 @@ def _aim_beams(radar: RadarSetup, sensor: Sensor) -> NDArray[np.float64]:
         aims[beam, 0] = sensor.vx * (r[0, 0] * c + r[0, 1] * s)
         aims[beam, 1] = sensor.vy * (r[1, 0] * c + r[1, 1] * s)
         aims[beam, 2] = exp(-8.0 * log(2.0) * (azimuth / radar.wide) ** 2 - sensor.wet)
-    return aims
 
 
 @inner_kernel
-def _clutter(
-    radar: RadarSetup, aims: NDArray[np.float64], distance: int, speed: int, beam: int
-) -> float:
-    """Clutter over noise in a cell: ground where what stands has this Doppler, rain around it."""
-    off = abs(speed * radar.grid.speed_step + aims[beam, 0] + aims[beam, 1])
-    power = 0.0
-    if off <= radar.grid.speed_step:
-        power += radar.air.ground[distance]
-    if off <= RAIN_SPREAD:
-        power += radar.air.rain[distance]
-    return float(power * aims[beam, 2])
-
-
-@inner_kernel
-def _bins(number: int) -> tuple[int, int, int]:
-    """Range, Doppler and beam of a cell."""
-    rest = number // RANGES
-    return number % RANGES, rest % SPEEDS - SPEEDS // 2, rest // SPEEDS
-
-
-@inner_kernel
-def _add_noise(radar: RadarSetup, cells: Cells, aims: NDArray[np.float64], tick: int) -> None:
-    """Noise and clutter of the cells that an echo reached."""
-    key = radar.key + np.uint64(1)
-    for k in range(cells.reached[0]):
-        slot = cells.taken[k]
-        distance, speed, beam = _bins(cells.number[slot])
-        z, w = normal_pair(key, tick, cells.number[slot])
-        rms = sqrt(0.5 * (1.0 + _clutter(radar, aims, distance, speed, beam)))
-        re, im = cells.re[slot] + rms * z, cells.im[slot] + rms * w
-        cells.power[slot] = re * re + im * im
-
-
-@inner_kernel
-def _select(
-    radar: RadarSetup,
-    cells: Cells,
-    aims: NDArray[np.float64],
-    tick: int,
-    out: NDArray[np.float32],
-) -> int:
-    """Write the peaks that pass the threshold."""
+def _select(radar: RadarSetup, cells: Cells, noise: Noise, out: NDArray[np.float32]) -> int:
+    """Write the peaks that pass the threshold; returns how many."""
     grid, n = radar.grid, 0
-    numbers, powers = cells.number, cells.power
-    key = radar.key + np.uint64(2)
+    bound_powers(cells, noise)
+    key, least = radar.key + np.uint64(2), SLACK * radar.grid.threshold
     for k in range(cells.reached[0]):
-        slot = cells.taken[k]
-        power, number = cells.power[slot], cells.number[slot]
-        if n == MOST_FOUND or power < SLACK * grid.threshold or not is_peak(numbers, powers, slot):
+        if n == MOST_FOUND or is_minor(cells, k, least):
             continue
-        distance, speed, beam = _bins(number)
-        clutter = _clutter(radar, aims, distance, speed, beam)
-        if power < grid.threshold * noise_mean(
-            numbers, powers, grid.ranges, number, clutter, key, tick
-        ):
+        power, number = power_of(cells, noise, k), cells.number[k]
+        if power < least or not is_peak(cells, noise, k):
             continue
-        z, _ = normal_pair(key + np.uint64(1), tick, number)
-        rise = cells.rise[slot] / cells.weight[slot]
+        distance, speed, beam = bins_of(number)
+        clutter = clutter_at(noise, number)
+        if power < grid.threshold * noise_mean(cells, noise, grid.ranges, number, clutter, key):
+            continue
+        z, _ = normal_pair(key + np.uint64(1), noise.tick, number)
+        rise = cells.rise[k] / cells.weight[k]
         rise += RISE_WIDTH / (SLOPE * sqrt(2.0 * power / (1.0 + clutter))) * z
-        away = beam + centre(numbers, powers, number, SPEEDS * RANGES) - 0.5 * (grid.beams - 1)
-        out[n, 0] = (distance + centre(numbers, powers, number, 1)) * grid.range_step
+        away = beam + centre(cells, noise, number, SPEEDS * RANGES) - 0.5 * (grid.beams - 1)
+        out[n, 0] = (distance + centre(cells, noise, number, 1)) * grid.range_step
         out[n, 1] = away * grid.beam_step
         out[n, 2] = rise
-        out[n, 3] = (speed + centre(numbers, powers, number, RANGES)) * grid.speed_step
+        out[n, 3] = (speed + centre(cells, noise, number, RANGES)) * grid.speed_step
         out[n, 4] = power
         n += 1
     return n

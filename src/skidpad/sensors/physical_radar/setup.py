@@ -10,7 +10,7 @@ Gaussian lobe with the fields of view as its widths at half power. Each echo has
 
 from __future__ import annotations
 
-from math import ceil, log, pi, radians, sqrt
+from math import ceil, inf, log, pi, radians, sqrt, tan
 from typing import NamedTuple
 
 import numpy as np
@@ -24,14 +24,19 @@ from skidpad.physics.mirrors import LIGHT, concrete_permittivity
 from skidpad.physics.optics import RADAR_GHZ, rain_attenuation_db_km
 from skidpad.physics.radio import rain_scatter, wet_radome_db
 from skidpad.sensors.object_level.boxes import Mount, mount_of
-from skidpad.sensors.physical_radar.cells import RANGES, Grid, cfar_threshold, snr_for
+from skidpad.sensors.physical_radar.cells import (
+    RAIN_SPREAD,
+    RANGES,
+    Grid,
+    cfar_threshold,
+    snr_for,
+)
 
 RANGE_STEP, SPEED_STEP, BEAM_STEP = 0.6, 0.53 / 3.6, radians(1.4)  # TIDUEN5A
 MAX_SPEED = 133.0 / 3.6  # m/s, TIDUEN5A; faster targets keep their Doppler here
 RISE_WIDTH, SLOPE = radians(18.0), 1.6  # TIDUEN5A; an assumption: of the angle's error
 REFERENCE, DETECTED, FALSE_ALARMS = 10.0, 0.9, 1e-8  # m^2 (TIDUEN5A); the others are assumptions
 GAMMA = 10.0**-2.5  # of the road, sigma_0 = gamma sin(grazing angle): an assumption
-RAIN_SPREAD = 1.0  # m/s, of the drops' Doppler to each side: an assumption
 DB = log(10.0) / 10.0  # nepers of power in a decibel
 WAVE_NUMBER = 2.0 * pi * RADAR_GHZ * 1e9 / LIGHT  # 1/m
 FASTEST = 71  # entries of the table of radome losses by speed in m/s
@@ -56,6 +61,7 @@ class RadarSetup(NamedTuple):
     factor: float  # SNR of 1 m^2 at 1 m on the axis
     wide: float  # rad, widths of the antenna's lobe at half power
     high: float
+    edge: float  # more than the tangent of the azimuth up to which an echo is met
     false: float  # mean number of false alarms per tick
     air: RadarAir
     multipath: bool  # mirrors in walls, rails and the road
@@ -79,9 +85,11 @@ def setup_of(
     factor = snr_for(DETECTED, FALSE_ALARMS) * spec.range**4 / REFERENCE
     cells = ranges * beams * 2.0 * MAX_SPEED / SPEED_STEP
     air = _air(spec, factor, ranges, high, 0.0 if weather is None else rain_rate(weather))
+    last = 0.5 * wide + BEAM_STEP
+    edge = (1.0 + 1e-9) * tan(last) if last < 0.5 * pi else inf
     return RadarSetup(
-        mount_of(spec.mount), key, grid, spec.range, factor, wide, high, cells * FALSE_ALARMS, air,
-        multipath, concrete_permittivity(RADAR_GHZ), rivals,
+        mount_of(spec.mount), key, grid, spec.range, factor, wide, high, edge,
+        cells * FALSE_ALARMS, air, multipath, concrete_permittivity(RADAR_GHZ), rivals,
         interference_over_noise(1.0, AFFECTED, RADAR_GHZ),
     )  # fmt: skip
 

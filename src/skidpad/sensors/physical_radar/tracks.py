@@ -59,13 +59,14 @@ def make_tracks() -> Tracks:
 
 
 @inner_kernel
-def _multiply(a: Floats, b: Floats, out: Floats) -> None:
-    """Write the product of two 4 x 4 matrices; a library's would take seconds to compile."""
-    for i in range(4):
-        for j in range(4):
-            out[i, j] = 0.0
-            for k in range(4):
-                out[i, j] += a[i, k] * b[k, j]
+def _turn_and_move(a: Floats, c: float, s: float, dt: float, out: Floats) -> None:
+    """Write the product with a of the matrix that moves a state on by dt and turns it by (c, s)."""
+    for j in range(4):
+        x, y, vx, vy = a[0, j], a[1, j], a[2, j], a[3, j]
+        out[0, j] = c * x + -s * y + dt * c * vx + dt * -s * vy
+        out[1, j] = s * x + c * y + dt * s * vx + dt * c * vy
+        out[2, j] = c * vx + -s * vy
+        out[3, j] = s * vx + c * vy
 
 
 @inner_kernel
@@ -73,11 +74,6 @@ def predict_tracks(tracks: Tracks, own: tuple[float, float, float], dt: float) -
     """Move all tracks on by dt; own: velocity of the antenna in its axes in m/s, yaw rate in rad/s."""
     turn = -own[2] * dt
     c, s = np.cos(turn), np.sin(turn)
-    f = np.zeros((4, 4))
-    for a in (0, 2):
-        f[a, a] = f[a + 1, a + 1] = c
-        f[a, a + 1], f[a + 1, a] = -s, s
-    f[:2, 2:] = dt * f[:2, :2]
     half = np.empty((4, 4))
     noise = (ACCELERATION * dt) ** 2
     for t in range(MOST_TRACKS):
@@ -88,8 +84,8 @@ def predict_tracks(tracks: Tracks, own: tuple[float, float, float], dt: float) -
         x, y = x + (vx - own[0]) * dt, y + (vy - own[1]) * dt
         state[0], state[1] = c * x - s * y, s * x + c * y
         state[2], state[3] = c * vx - s * vy, s * vx + c * vy
-        _multiply(f, tracks.spread[t], half)
-        _multiply(f, half.T, tracks.spread[t])
+        _turn_and_move(tracks.spread[t], c, s, dt, half)
+        _turn_and_move(half.T, c, s, dt, tracks.spread[t])
         for axis in range(2):
             tracks.spread[t, axis, axis] += 0.25 * noise * dt * dt
             tracks.spread[t, axis, 2 + axis] += 0.5 * noise * dt
@@ -127,14 +123,20 @@ def _error(state: Floats, spread: Floats, looks: Floats, values: Floats) -> floa
 
 
 @inner_kernel
+def _along(row: Floats, h: Floats) -> float:
+    """Returns the sum of products of two rows of four."""
+    return float(row[0] * h[0] + row[1] * h[1] + row[2] * h[2] + row[3] * h[3])
+
+
+@inner_kernel
 def _correct(state: Floats, spread: Floats, looks: Floats, values: Floats) -> None:
     """Correct a track by the three values of a detection, one after the other."""
     for k in range(3):
         h = looks[k]
-        p = np.zeros(4)
-        for a in range(4):
-            for b in range(4):
-                p[a] += spread[a, b] * h[b]
+        p = (
+            _along(spread[0], h), _along(spread[1], h), _along(spread[2], h),
+            _along(spread[3], h),
+        )  # fmt: skip
         wide = values[k, 1] + h[0] * p[0] + h[1] * p[1] + h[2] * p[2] + h[3] * p[3]
         off = values[k, 0] - (h[0] * state[0] + h[1] * state[1] + h[2] * state[2] + h[3] * state[3])
         for a in range(4):
@@ -149,25 +151,28 @@ def update_tracks(
 ) -> None:
     """Carry the tracks on to this tick's detections; own: motion of the antenna."""
     predict_tracks(tracks, own, dt)
+    alive, n = np.empty(MOST_TRACKS, np.int64), 0
     for t in range(MOST_TRACKS):
         if tracks.number[t] > 0:
             tracks.age[t] += 1
             tracks.history[t] = (tracks.history[t] << 1) & ((1 << OF_TICKS) - 1)
-    cost = np.full((MOST_TRACKS, count), np.inf)
+            alive[n] = t
+            n += 1
+    cost = np.empty((n, count))
     looks, values = np.zeros((3, 4)), np.zeros((3, 2))
     for k in range(count):
         _look(rows[k], own, looks, values)
-        for t in range(MOST_TRACKS):
-            if tracks.number[t] > 0:
-                cost[t, k] = _error(tracks.state[t], tracks.spread[t], looks, values)
+        for m in range(n):
+            cost[m, k] = _error(tracks.state[alive[m]], tracks.spread[alive[m]], looks, values)
     free = np.ones(count, np.bool_)
-    while count > 0:
+    while n > 0 and count > 0:
         best = np.argmin(cost)
-        t, k = best // count, best % count
-        if not cost[t, k] <= GATE:
+        m, k = best // count, best % count
+        if not cost[m, k] <= GATE:
             break
-        cost[t, :], cost[:, k] = np.inf, np.inf
+        cost[m, :], cost[:, k] = np.inf, np.inf
         free[k] = False
+        t = alive[m]
         _look(rows[k], own, looks, values)
         _correct(tracks.state[t], tracks.spread[t], looks, values)
         _note_hit(tracks, t, rows[k])

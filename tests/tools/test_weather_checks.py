@@ -90,3 +90,15 @@ def test_links_of_the_page_lead_to_tables_and_tests() -> None:
         path = ROOT / name if name.startswith("tests/") else PAGE.parent / name
         assert path.exists(), target
         assert not anchor or anchor in anchors(path), target
+
+
+def test_every_limit_of_a_model_has_a_range_and_an_error() -> None:
+    """On the page of limits; what is no model of something measured stands in the list of exceptions."""
+    text = (PAGE.parent / "limits.md").read_text(encoding="utf-8")
+    models = text.split("## The world")[1].split("## The numbers")[0]
+    lacking = {
+        bullet.split("**")[1].split(".")[0]
+        for bullet in re.split(r"^\* ", models, flags=re.M)[1:]
+        if not ("*valid*" in bullet.lower() and "*error*" in bullet.lower())
+    }
+    assert lacking == {"One car, few maps", "The object level sees boxes"}

@@ -116,3 +116,14 @@ laneId="-1"/></Position></Route></Position>"""
     there = EVENT.format("there", place, NEAR.format(41), "none")
     row = played_file(tmp_path, there).of("other")[-1]
     assert row.y == pytest.approx(-1.75, abs=0.01)
+
+
+def test_two_cars_of_0_9_1_meet_at_their_places(tmp_path):
+    """The ego is at s = 150 after 5 s, and the other one at s = 200 then."""
+    meeting = """<Meeting mode="route"><Position><Lane roadId="1" laneId="-2" s="200"/></Position>
+<Relative mode="route" object="ego" offsetTime="0" continuous="true"><Position><Lane roadId="1"
+laneId="-2" s="150"/></Position></Relative></Meeting>"""
+    told = played_file(tmp_path, EVENT.format("meet", meeting, NEAR.format(99), "none"))
+    there = {name: next(r for r in told.of(name) if r.time > 4.999) for name in ("ego", "other")}
+    assert there["ego"].x == pytest.approx(150.0, abs=0.6)
+    assert there["other"].x == pytest.approx(200.0, abs=0.6)

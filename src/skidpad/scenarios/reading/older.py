@@ -85,6 +85,8 @@ TAGS: Mapping[str, Mapping[str, str]] = {  # by the new name of what they stand 
     "GlobalAction": {"SetEnvironment": "EnvironmentAction", "Entity": "EntityAction"},
     "EntityAction": {"Add": "AddEntityAction", "Delete": "DeleteEntityAction"},
     "Position": POSITION,
+    "TargetPosition": POSITION,
+    "TargetPositionMaster": POSITION,
     "RoutePosition": {"Position": "InRoutePosition"},
     "InRoutePosition": {
         "Current": "FromCurrentEntity", "RoadCoord": "FromRoadCoordinates",
@@ -225,6 +227,23 @@ def _time(element: Element) -> None:
         element.set("dateTime", f"{day}T{hour}:{minute}:00")
 
 
+def _meeting(element: Element) -> None:
+    """Names master and places of a meeting of 0.9.1 as a synchronisation does, in place.
+
+    One with an offset in time is left: later versions do not have it.
+    """
+    relative, place = element.find("Relative"), element.find("Position")
+    there = None if relative is None else relative.find("Position")
+    if relative is None or place is None or there is None:
+        return
+    if str(relative.get("offsetTime", "0")).strip("0."):
+        return
+    element.set("masterEntityRef", str(relative.get("object", "")))
+    element.attrib.pop("mode", None)
+    place.tag, there.tag = "TargetPosition", "TargetPositionMaster"
+    element.replace(relative, there)
+
+
 def _trajectory(element: Element) -> None:
     """Puts the shape around the vertices, in place; only lines from point to point are taken over."""
     vertices = element.findall("Vertex")
@@ -245,6 +264,7 @@ SPECIAL: Mapping[str, Callable[[Element], None]] = {
     "Performance": _performance,
     "PrivateAction": _private,
     "Actors": _actors,
+    "SynchronizeAction": _meeting,
     "TimeOfDay": _time,
     "Trajectory": _trajectory,
 }

@@ -239,7 +239,7 @@ def _meeting(element: Element) -> None:
     if str(relative.get("offsetTime", "0")).strip("0."):
         return
     element.set("masterEntityRef", str(relative.get("object", "")))
-    element.attrib.pop("mode", None)
+    element.attrib.pop("mode", "")
     place.tag, there.tag = "TargetPosition", "TargetPositionMaster"
     element.replace(relative, there)
 

@@ -252,14 +252,21 @@ def _enter(folder: str) -> None:
 
 def _check(name: str, command: VehicleCommand, tick: int) -> None:
     """Raises StackError for a command out of range: throttle and brake 0..1, steer -1..1, two switches."""
+    throttle, brake, steer = command.throttle, command.brake, command.steer
+    if (
+        (type(throttle) is type(brake) is type(steer) is float)
+        and 0.0 <= throttle <= 1.0
+        and 0.0 <= brake <= 1.0
+        and -1.0 <= steer <= 1.0
+        and type(command.handbrake) is type(command.reverse) is bool
+    ):
+        return  # as in nearly all ticks
     ranges: tuple[tuple[str, Any, float], ...] = (
-        ("throttle", command.throttle, 0.0),
-        ("brake", command.brake, 0.0),
-        ("steer", command.steer, -1.0),
+        ("throttle", throttle, 0.0),
+        ("brake", brake, 0.0),
+        ("steer", steer, -1.0),
     )
     for what, value, low in ranges:
-        if type(value) is float and low <= value <= 1.0:
-            continue  # as in nearly all ticks
         if not _is_number(value) or not isfinite(value) or not low <= value <= 1.0:
             raise StackError(
                 f"{name}: {what} must be between {low:g} and 1, "

@@ -67,6 +67,9 @@ ADD = world(
     '<EntityAction entityRef="other"><AddEntityAction><Position><WorldPosition x="300" y="-1.75" '
     'h="0"/></Position></AddEntityAction></EntityAction>'
 )
+CHANGE = """<LateralAction><LaneChangeAction><LaneChangeActionDynamics dynamicsShape="linear" value="2"
+dynamicsDimension="time"/><LaneChangeTarget><AbsoluteTargetLane value="-2"/></LaneChangeTarget>
+</LaneChangeAction></LateralAction>"""
 DELETE = world('<EntityAction entityRef="other"><DeleteEntityAction/></EntityAction>')
 
 
@@ -80,6 +83,12 @@ def test_entities_vanish_and_appear_somewhere(tmp_path):
     assert not any(2.06 < t < 4.0 for t in times)
     back = next(r for r in rows if r.time > 4.0)
     assert (back.x, back.y) == pytest.approx((300.0, -1.75), abs=0.6)
+
+
+def test_a_lane_change_does_not_bring_back_who_vanishes_in_its_step(tmp_path):
+    gone, aside = event("gone", DELETE, time(2.0)), event("aside", private(CHANGE), time(2.0))
+    rows = told(tmp_path, stories=story(gone, aside), end=4.0).of("other")
+    assert rows[-1].time == pytest.approx(2.0, abs=0.06)
 
 
 @pytest.mark.osc("SetAction", "ModifyAction")

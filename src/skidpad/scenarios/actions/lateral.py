@@ -128,7 +128,8 @@ class LaneChange:
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """Begins the change from where the entity is now; put there in this step, it moves on at once."""
-        actor.goes_on = actor.goes_on or actor.word is not None
+        if actor.word is not None and actor.word.place is not None:
+            actor.goes_on = True
         actor.leave_track(scene.network)
         actor.catch_up(scene.network)
         guide = actor.guide

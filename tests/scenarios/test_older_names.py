@@ -127,3 +127,17 @@ laneId="-2" s="150"/></Position></Relative></Meeting>"""
     there = {name: next(r for r in told.of(name) if r.time > 4.999) for name in ("ego", "other")}
     assert there["ego"].x == pytest.approx(150.0, abs=0.6)
     assert there["other"].x == pytest.approx(200.0, abs=0.6)
+
+
+@pytest.mark.parametrize(
+    "change",
+    ['<Set value="20"/>', '<Modify><Rule><Multiply value="2"/></Rule></Modify>'],
+)
+def test_parameters_of_0_9_1_are_changed_and_seen(tmp_path, change):
+    double = f'</Private><Global><Parameter name="$v">{change}</Parameter></Global><Private>'
+    doubled = EVENT.format("double", double, NEAR.format(41), "none").replace(
+        "<Private></Private>", ""
+    )
+    seen = '<ByValue><Parameter name="$v" value="20" rule="equal_to"/></ByValue>'
+    rows = played_file(tmp_path, doubled, EVENT.format("slow", SLOW, seen, "none")).of("other")
+    assert rows[-1].speed == pytest.approx(4.0)

@@ -82,7 +82,11 @@ TAGS: Mapping[str, Mapping[str, str]] = {  # by the new name of what they stand 
     "FollowTrajectoryAction": {
         "Longitudinal": "TimeReference", "Lateral": "TrajectoryFollowingMode",
     },
-    "GlobalAction": {"SetEnvironment": "EnvironmentAction", "Entity": "EntityAction"},
+    "GlobalAction": {
+        "SetEnvironment": "EnvironmentAction", "Entity": "EntityAction", "Parameter": "ParameterAction",
+    },
+    "ParameterAction": {"Set": "SetAction", "Modify": "ModifyAction"},
+    "Rule": {"Add": "AddValue", "Multiply": "MultiplyByValue"},
     "EntityAction": {"Add": "AddEntityAction", "Delete": "DeleteEntityAction"},
     "Position": POSITION,
     "TargetPosition": POSITION,
@@ -105,6 +109,8 @@ ATTRIBUTES: Mapping[str, Mapping[str, str]] = {  # by the new name of the elemen
     "Condition": {"edge": "conditionEdge"},
     "TriggeringEntities": {"rule": "triggeringEntitiesRule"},
     "ParameterCondition": {"name": "parameterRef"},
+    "ParameterAction": {"name": "parameterRef"},
+    "Waypoint": {"strategy": "routeStrategy"},
     "RelativeDistanceCondition": {"type": "relativeDistanceType"},
     "RoadPosition": {"id": "roadId"},
     "EntityAction": {"name": "entityRef"},

@@ -266,27 +266,16 @@ class AdasStack:
             radar_lane, radar_velocity, radar_points, resume_ticks,
         ) = told  # fmt: skip
         _, offset, yaw_error, curvature, *_ = way
-        return StackReport(  # what is not equal to itself is NaN
-            status=STATUSES[status],
-            tier=TIERS[tier],
-            detected=distance == distance,
-            distance=distance if distance == distance else None,
-            time_gap=gap if gap == gap else None,
-            bumper=bumper if bumper == bumper else None,
-            roof=roof if roof == roof else None,
-            fused=fused if fused == fused else None,
-            radar_pre=radar_pre if radar_pre == radar_pre else None,
-            radar_lane=radar_lane if radar_lane == radar_lane else None,
-            radar_velocity=radar_velocity if radar_velocity == radar_velocity else None,
-            radar_points=radar_points,
-            v_target=cruise_kmh / 3.6,
-            light_distance=light.distance,
-            light_state=light.state,
-            light_source=light.source if self.assists else None,
-            light_stop=stopping,
-            hsv=hsv,
-            lane_offset=offset if offset == offset else None,
-            yaw_error=yaw_error if yaw_error == yaw_error else None,
-            curvature=curvature if curvature == curvature else None,
-            resume_timer=None if resume_ticks < 0 else resume_ticks * self.config.dt,
-        )
+        return StackReport(  # by position, as names take as long as all the rest
+            STATUSES[status], TIERS[tier], distance == distance, _or_none(distance), _or_none(gap),
+            _or_none(bumper), _or_none(roof), _or_none(fused), _or_none(radar_pre),
+            _or_none(radar_lane), _or_none(radar_velocity), radar_points, cruise_kmh / 3.6,
+            light.distance, light.state, light.source if self.assists else None, stopping, hsv,
+            _or_none(offset), _or_none(yaw_error), _or_none(curvature),
+            None if resume_ticks < 0 else resume_ticks * self.config.dt,
+        )  # fmt: skip
+
+
+def _or_none(value: float) -> float | None:
+    """Returns a number of a kernel, None for NaN."""
+    return value if value == value else None

@@ -16,6 +16,7 @@ from skidpad.core.inputs import Outside
 from skidpad.core.maths.randomness import stream, stream_key
 from skidpad.core.setup import ActorCommand, Setup
 from skidpad.core.states import EgoEstimate, VehicleCommand, WorldTruth
+from skidpad.core.vocabulary import Supervision
 from skidpad.physics.fleet import shown_gear
 from skidpad.physics.grip import road_of
 from skidpad.roads.queries import RoadMap
@@ -71,21 +72,10 @@ class EmbeddedBackend:
     def truth(self) -> WorldTruth:
         """Returns the ground truth of the present tick."""
         w = self.world
-        return WorldTruth(
-            tick=w.tick,
-            table=w.table,
-            states=w.states,
-            mu=w.mu,
-            commands=w.commands,
-            lights=w.lights.by_id,
-            contacts=w.contacts,
-            invasions=w.invasions,
-            background=w.background,
-            put_back=w.put_back,
-            moved_on=w.moved_on,
-            rolled=w.rolled,
-            notices=w.notices,
-        )
+        return WorldTruth(  # by position, as names take as long as all the rest
+            w.tick, w.table, w.states, w.mu, w.commands, w.lights.by_id, w.contacts, w.invasions,
+            w.background, w.put_back, w.moved_on, w.rolled, w.notices,
+        )  # fmt: skip
 
     def relocate(self, pose: Pose, v: float) -> None:
         """Put the ego at `pose` with speed v along it; its height follows from the road."""
@@ -155,33 +145,22 @@ class EmbeddedBackend:
         seen = self.sensing.read(w.tick, states, lights, braking)
         extra = {} if asked is None else asked.read(w.tick, states, seen.images, lights, braking)
         return SensorFrame(
-            tick=w.tick,
-            ego=self._estimate(),
-            images=seen.images,
-            segments=seen.segments,
-            radar=seen.radar,
-            lights=MappingProxyType(lights),
-            contacts=w.contacts,
-            invasions=w.invasions,
-            extra=extra,
-            radar_objects=seen.radar_objects,
-            radar_tracks=seen.radar_tracks,
-        )
+            w.tick, self._estimate(), seen.images, seen.segments, seen.radar,
+            MappingProxyType(lights), w.contacts, w.invasions, Supervision.NONE, extra,
+            seen.radar_objects, seen.radar_tracks,
+        )  # fmt: skip
 
     def _estimate(self) -> EgoEstimate:
         """Returns the ego's estimated state: true but for Gaussian noise on x and y."""
         w, sigma = self.world, self._noise
-        x, y, z, roll, pitch, yaw, speed, yaw_rate, ax, ay, *wheels = feel_motion(w.arena, EGO)
+        (
+            x, y, z, roll, pitch, yaw, speed, yaw_rate, ax, ay, front_left, front_right, rear_left,
+            rear_right,
+        ) = feel_motion(w.arena, EGO)  # fmt: skip
         pose = Pose(x, y, z, roll, pitch, yaw)
         if sigma > 0.0:
             dx, dy = self._localisation.normal(0.0, sigma, 2).tolist()
             pose = replace(pose, x=pose.x + dx, y=pose.y + dy)
-        return EgoEstimate(
-            pose=pose,
-            speed=speed,
-            yaw_rate=yaw_rate,
-            ax=ax,
-            ay=ay,
-            wheel_speeds=(wheels[0], wheels[1], wheels[2], wheels[3]),
-            gear=shown_gear(speed, bool(w.commands[EGO, REVERSE])),
-        )
+        wheel_speeds = (front_left, front_right, rear_left, rear_right)
+        gear = shown_gear(speed, bool(w.commands[EGO, REVERSE]))
+        return EgoEstimate(pose, speed, yaw_rate, ax, ay, wheel_speeds, gear)

@@ -1,6 +1,8 @@
 """Spray behind vehicles: water in the air by hand, what beams lose and bring back, and where."""
 
+from dataclasses import replace
 from math import exp, pi
+from time import process_time
 
 import numpy as np
 import pytest
@@ -12,9 +14,9 @@ from skidpad.core.weather import Weather
 from skidpad.physics.grip import RAIN_FULL, road_surface
 from skidpad.physics.optics import LidarAir
 from skidpad.physics.spray import DROP, WATER, spray_density, spray_extinction
-from skidpad.sensors.ranging.clouds import THIN, SprayClouds, no_spray, spray_of
+from skidpad.sensors.ranging.clouds import THIN, SprayClouds, Sprayed, no_spray, spray_of
 from skidpad.sensors.ranging.lidar import Lidar
-from skidpad.sensors.ranging.lidar_returns import ReturnModel
+from skidpad.sensors.ranging.lidar_returns import ReturnModel, find_returns, lost_depths
 from skidpad.sensors.suite import PixelSuite
 from support.sensors.worlds import states_at, straight, table_of
 
@@ -60,11 +62,12 @@ def cloud(first=0.1, length=30.0, yaw=0.0):
 
 
 def along(clouds, eye, way, distance, n=20_000):
-    ways = np.tile(np.asarray(way, float) / np.linalg.norm(way), (n, 1))
     azimuth = np.full(n, np.arctan2(way[1], way[0]))
-    met = np.ones(n, np.bool_)
-    eye = np.asarray(eye, float)
-    return spray_of(clouds, eye, azimuth, ways, np.full(n, distance), met, 0.0, KEY, 0)
+    elevation = np.full(1, np.arctan2(way[2], np.hypot(way[0], way[1])))
+    eye, never = np.asarray(eye, float), np.full(n, np.inf)
+    return spray_of(
+        clouds, eye, np.eye(3), azimuth, elevation, np.full(n, distance), never, 0.0, KEY, 0
+    )
 
 
 def test_depth_along_the_whole_cloud_is_the_integral_of_its_extinction():
@@ -110,6 +113,64 @@ def scan(weather, speed, *, spray=True, gap=8.0, kind=ActorKind.TRUCK):
 
 
 RAIN = Weather(precipitation=50.0, wetness=100.0, precipitation_deposits=50.0)
+
+
+def test_a_turned_lidar_sees_the_cloud_where_it_is():
+    """Beams of a lidar that is yawed, pitched and rolled meet what those of a level one meet."""
+    ways = np.array([[np.cos(a), np.sin(a), 0.0] for a in np.linspace(-0.2, 0.2, 200)])
+    found = []
+    for r in (
+        np.eye(3),
+        Pose(0.0, 0.0, yaw=0.7).rotation(),
+        Pose(0.0, 0.0, yaw=-2.0, pitch=0.1, roll=0.05).rotation(),
+    ):
+        own = ways @ r  # in the axes of the lidar
+        azimuth, elevation = np.arctan2(own[:, 1], own[:, 0]), np.arcsin(own[:, 2])
+        eye, one = np.array([-40.0, 0.0, 1.0]), np.ones(1)
+        found.append([
+            spray_of(cloud(), eye, r, azimuth[k] * one, elevation[k] * one, 40.0 * one, 99.0 * one,
+                     0.0, KEY, 0).depth[0]
+            for k in range(200)
+        ])  # fmt: skip
+    assert 0.0 in found[0]
+    assert max(found[0]) > 0.0
+    assert found[1] == pytest.approx(found[0])
+    assert found[2] == pytest.approx(found[0])
+
+
+def test_what_is_called_lost_is_not_noticed():
+    """A surface behind as much spray as `lost_depths` says is not found; behind a little less it is."""
+    model = ReturnModel(LidarAir(fog=0.004, falling=0.002), 100.0)
+    n = 500
+    distance = np.linspace(5.0, 95.0, n)
+    label = np.full(n, int(SemanticClass.CAR))
+    lost = lost_depths(model.air, np.arange(n), distance, label, model.least, n)
+    for extra, noticed in ((1e-9, False), (-1e-4, True)):
+        spray = Sprayed(lost + extra, np.zeros(n), np.zeros(n))
+        found = find_returns(model.air, distance, label, np.ones(n), 1.0, KEY, 0, spray)
+        met = np.isfinite(found.distance) & ~found.false
+        assert (met == noticed)[lost > 0.0].all()
+    assert (lost > 0.0).sum() > 100
+
+
+def test_spray_of_twenty_cars_costs_less_than_three_scans_without():
+    times = []
+    table = table_of([ActorKind.CAR] * 20)
+    places = [(200 + 12.0 * (k // 2) - 54.0, (-1.75, -8.75)[k % 2], 0, 0.0) for k in range(20)]
+    states = states_at([(200, -5.25, 0, 0.0), *places])
+    states.vx[:] = 25.0
+    suite = PixelSuite(straight(400), table, [], Weather())
+    suite.observe(0, states, {})
+    model = ReturnModel(LidarAir(), 100.0)
+    wide = replace(SPEC, channels=64, points_per_second=600_000)
+    for clouds in (None, SprayClouds(table, 0.0008)):
+        lidar, best = Lidar(wide, 0.05, 0.0, model, 5, clouds), 1.0
+        for k in range(12):
+            begin = process_time()
+            lidar.measure(k, states.pose(0), suite.scene, 0, states)
+            best = min(best, process_time() - begin)
+        times.append(best)
+    assert times[1] < 3.0 * times[0]
 
 
 def test_false_returns_lie_behind_fast_vehicles_on_wet_road_alone():

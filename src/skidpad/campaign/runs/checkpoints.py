@@ -12,6 +12,7 @@ from skidpad.roads.queries import RoadMap
 from skidpad.sensors.object_level.boxes import Walls
 from skidpad.sensors.object_level.object_camera import CameraScratch, Eye
 from skidpad.sensors.object_level.object_radar import RadarScratch
+from skidpad.sensors.physical_radar.cells import Scratch
 from skidpad.sensors.pictures.degradation import CameraNoise
 from skidpad.sensors.pictures.shading import Shading
 from skidpad.sensors.raster.passes import Pass
@@ -21,7 +22,7 @@ from skidpad.simulation.world.traffic.network import Network
 # the map and what is made of it; elements of a file; arrays that each tick fills before it reads them
 FIXED = (
     RoadMap, type(etree.Element("element")), LaneArrays, Network, Segments, Walls, StaticScene,
-    Eye, CameraScratch, RadarScratch, Pass, Shading, CameraNoise,
+    Eye, CameraScratch, RadarScratch, Scratch, Pass, Shading, CameraNoise,
 )  # fmt: skip
 
 

@@ -8,13 +8,12 @@ pulse as fog does (`lidar_returns`), with fog's share of backscatter, over half 
 
 from __future__ import annotations
 
-from math import atan2, cos, exp, log, pi, sin
+from math import atan2, cos, exp, hypot, log, pi, sin
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from skidpad.core.arrays import Floats
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.geometry import Pose
 from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.kernels.splitmix import GOLDEN, scrambled, unit
@@ -29,11 +28,14 @@ ROOM = 0.05  # rad, of a column that is not upright as its lidar rolls and pitch
 NEAREST, ANSWER_REACH = 1.5, 30.0  # m, of spray that is noticed, as of drops in `lidar_returns`
 BACKSCATTER = -FOG_BACKSCATTER / log(0.05)  # 1/sr, of the extinction
 ANSWERS = 3.0  # m, half a pulse of 20 ns
+PULSE_SHARE = pi * BACKSCATTER
 MEETS = (0.9, 10.0)  # m, from and to which receiver and beam come to overlap; `lidar_returns`
+OVERLAP = 1.0 / (MEETS[1] - MEETS[0])
+CLEAREST = 1.001 * OVERLAP / (4.0 * MEETS[0])  # 1/m^2, most of overlap / t^2: at twice MEETS[0]
 LEAST = 1e-4  # 1/m, clouds thinner than this are left out
 DENSER = -np.log1p(-(np.arange(1024) + 0.5) / 1024)  # quantiles of an exponential distribution
 FIRST_BITS = np.uint64(64 - 10)  # of random bits, as many as choose one of them
-CERTAIN = 1.0 - 1e-12  # of a bound, so that rounding leaves no answer out
+STEP_BITS = np.uint64(10)
 SALT = np.uint64(0x5BF0_3635_D1F9_B3A7)
 
 
@@ -82,49 +84,70 @@ def _cut(o: float, w: float, a: float, b: float, low: float, far: float) -> tupl
     """
     if abs(w) < 1e-9:
         return low, (-1.0 if o < a or o > b else far)
-    t0, t1 = (a - o) / w, (b - o) / w
+    stretch = 1.0 / w
+    t0, t1 = (a - o) * stretch, (b - o) * stretch
     return max(low, min(t0, t1)), min(far, max(t0, t1))
+
+
+@inner_kernel
+def _nearest_first(clouds: Floats, eye: Floats) -> Ints:
+    """Returns the rows of the clouds by the distance of their middle lines from the eye."""
+    away = np.empty(len(clouds))
+    for c in range(len(clouds)):
+        x, y, yaw, length = clouds[c, 0], clouds[c, 1], clouds[c, 3], clouds[c, 4]
+        ox, oy = eye[0] - x, eye[1] - y
+        back, left = -(ox * cos(yaw) + oy * sin(yaw)), oy * cos(yaw) - ox * sin(yaw)
+        away[c] = hypot(back - min(max(back, 0.0), length), left)
+    return np.argsort(away)
 
 
 @kernel
 def spray_of(
-    clouds: Floats, eye: Floats, azimuth: Floats, ways: Floats, distance: Floats,
-    met: NDArray[np.bool_], least: float, key: np.uint64, tick: int,
+    clouds: Floats, eye: Floats, r: Floats, azimuth: Floats, elevation: Floats, distance: Floats,
+    lost: Floats, least: float, key: np.uint64, tick: int,
 ) -> Sprayed:  # fmt: skip
-    """Returns what clouds (k, 8) do to beams from `eye` (3,) with unit vectors ways (n, 3), of the world.
+    """Returns what clouds (k, 8) do to beams from `eye` (3,), whose axes are turned by r (3, 3).
 
     A cloud: x, y, z of the middle of the rear at the road, yaw, length, half width, height in m,
-    extinction in 1/m at its begin. azimuth (m,): of the columns of n / m beams each, roughly.
-    distance (n,): m to the surface that ends each beam, where it has `met` one, else to the lidar's range.
-    Left out is what changes no return: answers below `least`, and the depth of beams that meet nothing, or
-    whose surface is lost already, where a cloud is too far to answer.
+    extinction in 1/m at its begin. azimuth (m,), elevation (c,): beam i of the n = m c beams goes to
+    azimuth i // c and elevation i % c. distance (n,): m to the surface that ends each beam, or to the
+    lidar's range. lost (n,): depth from which that surface is not noticed; -inf where there is none.
+    Left out is what changes no return: answers below `least`, and the depth of beams whose surface is lost
+    already, where a cloud is too far to answer.
     """
-    n = distance.size
-    channels = n // azimuth.size
+    n, channels = distance.size, elevation.size
     depth, power, where = np.zeros(n), np.zeros(n), np.zeros(n)
-    lost = np.empty(n)  # depth at which not even a white surface is noticed
-    for i in range(n):
-        lost[i] = -0.5 * log(least * distance[i] * distance[i]) + 1e-6
     start = scrambled((key ^ SALT) + np.uint64(tick) * GOLDEN)
-    for c in range(len(clouds)):
+    flat, rise = np.cos(elevation), np.sin(elevation)
+    here = np.empty(STEPS)
+    for c in _nearest_first(clouds, eye):
         x, y, z, yaw, length, half, high, first = clouds[c]
         cy, sy = cos(yaw), sin(yaw)
         ox, oy = eye[0] - x, eye[1] - y
         back, left, up = -(ox * cy + oy * sy), oy * cy - ox * sy, eye[2] - z
-        toward = yaw + atan2(-left, back - 0.5 * length)
-        span = _span(clouds[c], back, left)
+        off = eye_yaw(r) - yaw - atan2(-left, back - 0.5 * length)
+        span, fall = _span(clouds[c], back, left), -THIN / length
+        back_up, left_up = -(r[0, 2] * cy + r[1, 2] * sy), r[1, 2] * cy - r[0, 2] * sy
         for column in range(azimuth.size):
-            if abs((azimuth[column] - toward + pi) % (2.0 * pi) - pi) > span:
+            if abs((azimuth[column] + off + pi) % (2.0 * pi) - pi) > span:
                 continue
-            for i in range(column * channels, (column + 1) * channels):
-                wx, wy, wz = ways[i, 0], ways[i, 1], ways[i, 2]
-                gone, aside = -(wx * cy + wy * sy), wy * cy - wx * sy
+            ca, sa = cos(azimuth[column]), sin(azimuth[column])
+            dx, dy = r[0, 0] * ca + r[0, 1] * sa, r[1, 0] * ca + r[1, 1] * sa
+            dz = r[2, 0] * ca + r[2, 1] * sa
+            back_flat, left_flat = -(dx * cy + dy * sy), dy * cy - dx * sy
+            for channel in range(channels):
+                i = column * channels + channel
+                wz = dz * flat[channel] + r[2, 2] * rise[channel]
+                gone = back_flat * flat[channel] + back_up * rise[channel]
                 if _leaves(up, wz, 0.0, high) or _leaves(back, gone, 0.0, length):
                     continue
+                aside = left_flat * flat[channel] + left_up * rise[channel]
                 if _leaves(left, aside, -half, half):
                     continue
-                low, far = _cut(back, gone, 0.0, length, 0.0, distance[i])
-                if far <= low or not (met[i] or low < ANSWER_REACH):
+                is_lost = depth[i] > lost[i]
+                reach = min(distance[i], ANSWER_REACH) if is_lost else distance[i]
+                low, far = _cut(back, gone, 0.0, length, 0.0, reach)
+                if far <= low:
                     continue
                 low, far = _cut(up, wz, 0.0, high, low, far)
                 if far <= low:
@@ -132,37 +155,47 @@ def spray_of(
                 low, far = _cut(left, aside, -half, half, low, far)
                 if far <= low:
                     continue
-                is_lost = not met[i] or depth[i] > lost[i]
-                if is_lost and low >= ANSWER_REACH:
-                    continue
-                bits = scrambled(start + np.uint64(i * 64 + c) * np.uint64(16) * GOLDEN)
-                step, jitter = (far - low) / STEPS, unit(bits)
-                tau, over, strongest = 0.0, min(ANSWERS, far - low), power[i]
-                mean = first * exp(-THIN * (back + gone * (low + jitter * step)) / length)
-                thins = exp(-THIN * gone * step / length)
+                bits = scrambled(start + np.uint64(i * 64 + c) * np.uint64(2) * GOLDEN)
+                step = (far - low) * (1.0 / STEPS)
+                over = PULSE_SHARE * min(ANSWERS, far - low)
+                t = low + unit(bits) * step
+                mean = first * exp(fall * (back + gone * t))
+                thins = exp(fall * gone * step)
+                bits = scrambled(bits + GOLDEN)  # ten of them for each step
+                tau, densest = 0.0, 0.0
                 for s in range(STEPS):
-                    t = low + (s + jitter) * step
-                    if is_lost and t >= ANSWER_REACH:
-                        break
-                    bits += GOLDEN
-                    here = DENSER[scrambled(bits) >> FIRST_BITS] * mean
-                    tau += 0.5 * here * step
-                    if NEAREST < t < ANSWER_REACH:
-                        overlap = min(max((t - MEETS[0]) / (MEETS[1] - MEETS[0]), 0.0), 1.0)
-                        clear = (
-                            pi * BACKSCATTER * here * over
-                        )  # without its own cloud, full overlap
-                        noticed = CERTAIN * max(strongest, least) * t * t
-                        # exp(2 x) is at least 1 + 2 x + 2 x^2
-                        if clear * overlap > noticed * (1.0 + 2.0 * tau * (1.0 + tau)):
-                            answer = clear * overlap * exp(-2.0 * tau) / (t * t)
-                            if answer > strongest:
-                                strongest, where[i] = answer, t
-                    tau += 0.5 * here * step
+                    here[s] = DENSER[bits >> FIRST_BITS] * mean
+                    bits <<= STEP_BITS
+                    tau += here[s]
+                    densest = max(densest, here[s])
                     mean *= thins
-                depth[i] += tau
-                power[i] = strongest
+                depth[i] += tau * step
+                # of answers, the clearest that one could be; later clouds are mostly farther
+                strongest, near = max(power[i], least), max(low, NEAREST)
+                bound = densest * over * min(CLEAREST, 1.0 / (near * near))
+                if low >= ANSWER_REACH or far <= NEAREST or bound <= strongest:
+                    continue
+                tau = 0.0
+                for s in range(STEPS):
+                    taken = 0.5 * here[s] * step
+                    tau += taken
+                    if NEAREST < t < ANSWER_REACH:
+                        overlap = min(max((t - MEETS[0]) * OVERLAP, 0.0), 1.0)
+                        clear = here[s] * over * overlap  # without its own cloud
+                        # exp(2 x) is at least 1 + 2 x + 2 x^2
+                        if clear > strongest * t * t * (1.0 + 2.0 * tau * (1.0 + tau)):
+                            answer = clear * exp(-2.0 * tau) / (t * t)
+                            if answer > strongest:
+                                strongest, where[i], power[i] = answer, t, answer
+                    tau += taken
+                    t += step
     return Sprayed(depth, power, where)
+
+
+@inner_kernel
+def eye_yaw(r: Floats) -> float:
+    """Returns where the forward axis of a rotation (3, 3) points, rad."""
+    return atan2(r[1, 0], r[0, 0])
 
 
 class SprayClouds:
@@ -177,9 +210,9 @@ class SprayClouds:
         states: ActorStates,
         eye: Pose,
         azimuth: Floats,
-        ways: Floats,
+        elevation: Floats,
         distance: Floats,
-        met: NDArray[np.bool_],
+        lost: Floats,
         least: float,
         key: np.uint64,
         tick: int,
@@ -188,9 +221,8 @@ class SprayClouds:
         clouds = self.at(states)
         if not len(clouds):
             return no_spray()
-        place = np.array([eye.x, eye.y, eye.z])
-        turned = ways @ eye.rotation().T
-        return spray_of(clouds, place, azimuth + eye.yaw, turned, distance, met, least, key, tick)
+        place, turned = np.array([eye.x, eye.y, eye.z]), np.ascontiguousarray(eye.rotation())
+        return spray_of(clouds, place, turned, azimuth, elevation, distance, lost, least, key, tick)
 
     def at(self, states: ActorStates) -> Floats:
         """Returns the clouds (k, 8) of this moment, as in `spray_of`, but those thinner than LEAST."""

@@ -25,12 +25,11 @@ from skidpad.sensors.ranging.around import (
     STEEPEST_DEG,
     Fan,
     RayHits,
-    directions,
     look_around,
     sectors_of,
 )
 from skidpad.sensors.ranging.clouds import SprayClouds, Sprayed, no_spray
-from skidpad.sensors.ranging.lidar_returns import BeamAir, ReturnModel, find_returns
+from skidpad.sensors.ranging.lidar_returns import BeamAir, ReturnModel, find_returns, lost_depths
 from skidpad.sensors.raster.live_scene import LiveScene
 
 
@@ -97,7 +96,9 @@ class Lidar:
             window, spray = self._window(speed), no_spray()
             if self._spray is not None and states is not None:
                 least = self._returns.least / window
-                spray = self._meet_spray(self._spray, states, pose, fan, seen, tick, least)
+                spray = self._meet_spray(
+                    self._spray, self._returns, states, pose, fan, seen, tick, least
+                )
             return self._through_weather(self._returns, fan, seen, tick, spray, window)
         return LidarPoints(
             (seen.direction * seen.distance[:, None]).astype(np.float32),
@@ -110,6 +111,7 @@ class Lidar:
     def _meet_spray(
         self,
         clouds: SprayClouds,
+        model: ReturnModel,
         states: ActorStates,
         eye: Pose,
         fan: Fan,
@@ -118,11 +120,20 @@ class Lidar:
         least: float,
     ) -> Sprayed:
         """Returns what spray does to every beam of a tick; least: power that is just noticed."""
-        n = len(fan.column)
-        distance, met = np.full(n, self.spec.range), np.zeros(n, np.bool_)
-        distance[seen.ray], met[seen.ray] = seen.distance, True
-        ways, key = directions(fan, np.arange(n)), np.uint64(self._key)
-        return clouds.of_beams(states, eye, fan.azimuth, ways, distance, met, least, key, tick)
+        distance = np.full(len(fan.column), self.spec.range)
+        distance[seen.ray] = seen.distance
+        lost = lost_depths(model.air, seen.ray, seen.distance, seen.label, least, len(distance))
+        return clouds.of_beams(
+            states,
+            eye,
+            fan.azimuth,
+            fan.elevation,
+            distance,
+            lost,
+            least,
+            np.uint64(self._key),
+            tick,
+        )
 
     def _through_weather(
         self,

@@ -16,14 +16,14 @@ Valid where drops in a beam are met one by one: 0.5 to 100 mm/h, fog down to 20 
 
 from __future__ import annotations
 
-from math import exp, inf, log1p, sqrt
+from math import exp, inf, log, log1p, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta, norm
 
-from skidpad.core.arrays import Floats
+from skidpad.core.arrays import Floats, Ints
 from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.kernels.splitmix import GOLDEN, scrambled, unit
 from skidpad.core.vocabulary import SemanticClass
@@ -155,6 +155,22 @@ def find_returns(
             found += ACCURACY * sqrt(0.5 * least / power) * m.normal[at]
         out[i], strengths[i] = found, intensity * window
     return Returns(out, strengths, false)
+
+
+@kernel
+def lost_depths(
+    air: BeamAir, ray: Ints, distance: Floats, label: Ints, least: float, n: int
+) -> Floats:
+    """Returns the depth of spray at which each of n beams' surfaces is not noticed; -inf: it has none.
+
+    ray, distance, label: of the beams that meet one, m. A little more than what `find_returns` says.
+    """
+    lost = np.full(n, -np.inf)
+    for k in range(ray.size):
+        d = distance[k]
+        depth = air.fog * max(d - air.fog_start, 0.0) + air.falling * d
+        lost[ray[k]] = 0.5 * log(air.reflects[label[k]] / (least * d * d)) - depth + 1e-6
+    return lost
 
 
 def wet_shares(cover: float) -> Floats:

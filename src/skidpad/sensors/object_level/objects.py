@@ -70,6 +70,16 @@ class Surroundings(NamedTuple):
     radar: RadarScratch
 
 
+class Common(NamedTuple):
+    """Surroundings, and the sensors that nearly every vehicle has."""
+
+    around: Surroundings
+    one: Eye
+    other: Eye
+    radar: Antenna
+    limit: float  # m, of the cameras
+
+
 class ObjectSuite:
     """Segments of every depth camera and points of every radar, tick by tick.
 
@@ -127,6 +137,7 @@ class ObjectSuite:
             if isinstance(s, RadarSpec)
         ]
         self._held_antennas = [hold(antenna) for antenna in self.antennas]
+        self._common: Held[Common] | None = None
         lit = Beam.LOW if beam is None else beam
         self.limit = SIGHT if weather is None else min(label_range(weather, lit), SIGHT)
 
@@ -140,12 +151,13 @@ class ObjectSuite:
         """Returns what `segments` and `radar` do, in one call of a kernel for the common sensors."""
         if len(self._eyes) != 2 or len(self.antennas) != 1 or self.lanes is None:
             return self.segments(states), self.radar(tick, states)
-        one, other = self._held_eyes
-        near, far, m = sense(
-            self._around(states), self.lanes, one, other, self._held_antennas[0], tick, self.limit
-        )
-        runs = map(copy_runs, self._eyes, (near, far))
-        seen = dict(zip(self.camera_ids, runs, strict=True))
+        self._around(states)
+        if self._common is None:
+            one, other = self._eyes
+            parts = Common(self._surroundings, one, other, self.antennas[0], self.limit)
+            self._common = hold(parts)
+        *runs, m = sense(self._common, self.lanes, tick)
+        seen = dict(zip(self.camera_ids, map(copy_runs, self._eyes, runs), strict=True))
         return seen, RadarPoints(*self._radar.echoes[:, :m].copy())
 
     def radar(self, tick: int, states: ActorStates) -> RadarPoints:
@@ -167,12 +179,11 @@ class ObjectSuite:
         if states is not self._states:
             t = self.table
             boxes = Boxes(states.x, states.y, states.z, states.yaw, t.length, t.width, t.height)
-            self._states = states
-            self._held = hold(
-                Surroundings(
-                    states, boxes, self.labels, self.walls, self.posts, self._camera, self._radar
-                )
+            self._states, self._common = states, None
+            self._surroundings = Surroundings(
+                states, boxes, self.labels, self.walls, self.posts, self._camera, self._radar
             )
+            self._held = hold(self._surroundings)
         return self._held
 
 
@@ -185,18 +196,16 @@ def copy_runs(eye: Eye, m: int) -> Segments:
 
 
 @kernel
-def sense(
-    around: Held[Surroundings],
-    map: Held[LaneArrays],
-    one: Held[Eye],
-    other: Held[Eye],
-    radar: Held[Antenna],
-    tick: int,
-    limit: float,
-) -> tuple[int, int, int]:
+def sense(common: Held[Common], map: Held[LaneArrays], tick: int) -> tuple[int, int, int]:
     """Returns what `look` does for two cameras, and `listen` on the road's slope."""
-    feel_slope(map, around)
-    return look(around, one, limit), look(around, other, limit), listen(around, radar, tick)
+    c = common.value
+    a, s = c.around, c.around.states
+    find_slope(map.value, s.x[0], s.y[0], s.z[0], a.radar.slope)
+    return (
+        see_boxes(c.one, a.states, a.boxes, a.labels, c.limit, a.camera),
+        see_boxes(c.other, a.states, a.boxes, a.labels, c.limit, a.camera),
+        cast_radar(c.radar, tick, a.boxes, a.states, a.walls, a.posts, a.radar),
+    )
 
 
 @kernel

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numba.core.dispatcher import Dispatcher
 
-from skidpad.core.kernels.jit import hold
+from skidpad.core.kernels.jit import Held, hold
 from skidpad.stack import memory
 from support import stack_parts, stackfakes
 
@@ -26,7 +26,7 @@ def interpret(patch: pytest.MonkeyPatch, others: Iterable[ModuleType] = ()) -> N
     loaded = [m for name, m in list(sys.modules.items()) if name.startswith(HOUSES)]
     for module in (*loaded, *others):
         for name, value in list(vars(module).items()):
-            if value is hold:
+            if value is hold or value is Held:
                 patch.setattr(module, name, _keep)
             elif isinstance(value, Dispatcher) and value.py_func.__module__ not in COMPILED:
                 patch.setattr(module, name, value.py_func)

@@ -310,10 +310,10 @@ class Smoothing:
 def read_radar(rules, points, at, map, on_highway, tracking=False):
     """One measurement of the radar."""
     m, kept = memory.new_memory()[0], np.empty(max(len(points.range), 1), np.int64)
-    found = radar.read_radar(m, rules, points, kept, tracking, at, map.held, on_highway, WAYS)
+    found = radar.read_radar(m, rules, points, kept, tracking, at, map.arrays, on_highway, WAYS)
     return RadarReading(*(known(n) for n in found[:3]), found.points)
 
 
 def find_in_lane(map, on_highway, points, n, at):
     """The first of n points that is in the ego's lane, or -1."""
-    return radar.first_in_lane(map.held, on_highway, points, np.arange(n), n, at, WAYS)
+    return radar.first_in_lane(map.arrays, on_highway, points, np.arange(n), n, at, WAYS)

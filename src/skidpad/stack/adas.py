@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from skidpad.core.arrays import Floats
 from skidpad.core.errors import require_choice, require_range
 from skidpad.core.frames import Segments, SensorFrame
-from skidpad.core.kernels.jit import Held, hold
+from skidpad.core.kernels.jit import Held
 from skidpad.core.run import Function
 from skidpad.core.settings.parts import load_profile
 from skidpad.core.settings.stack import StackSettings
@@ -48,7 +48,17 @@ from skidpad.stack.perception.lights import NO_LIGHT, LightReading, StopLock
 from skidpad.stack.perception.persistence import detection_rules
 from skidpad.stack.perception.radar import radar_rules
 from skidpad.stack.road import Road, Way, road_rules
-from skidpad.stack.think import Answer, Rules, act, forget_sight, forget_tiers, perceive, think
+from skidpad.stack.think import (
+    Answer,
+    Parts,
+    Rules,
+    act,
+    forget_sight,
+    forget_tiers,
+    hold_rules,
+    perceive,
+    think,
+)
 
 HELD = VehicleCommand(brake=1.0)  # while the supervisor drives; it overrides this anyway
 STATUSES, TIERS = tuple(DetectionStatus), tuple(Tier)  # by their numbers
@@ -155,7 +165,7 @@ class AdasStack:
 
     def follow_rules(self, rules: Rules) -> None:
         """Drives by these rules from now on; tiers start afresh."""
-        self.rules, self._held = rules, hold(rules)
+        self.rules, self._held = rules, hold_rules(rules, self.road.map.held)
         forget_tiers(self.memory, self._held)
 
     def limit_speed(self, v: float) -> None:
@@ -202,7 +212,7 @@ class AdasStack:
             self._room = np.empty((most, 2))
         told: Callable[..., Answer] = think  # mypy takes a named tuple for one of any length
         return told(
-            *self._memories(frame), self._room, *bumper, *roof, *frame.radar, self.road.map.held,
+            *self._memories(frame), self._room, *bumper, *roof, *frame.radar,
             self.road.on_highway, pose.x, pose.y, pose.z, pose.yaw, *rest,
         )  # fmt: skip
 
@@ -212,14 +222,14 @@ class AdasStack:
         yaw_error, kappa = float(m["yaw_error"]), float(m["kappa"])
         asks = perceive(
             *self._memories(frame), *self.cameras.read(frame, yaw_error, kappa), frame.radar,
-            self.road.map.held, self.road.on_highway, pose.x, pose.y, pose.z, pose.yaw, rest[0],
+            self.road.on_highway, pose.x, pose.y, pose.z, pose.yaw, rest[0],
         )  # fmt: skip
         by = self.cameras.verify(frame, float(m["distance"]), yaw_error, kappa) if asks else 0
         return act(self.memory, self._held, by, *rest)
 
     def _memories(
         self, frame: SensorFrame
-    ) -> tuple[Memory, Held[Rules], Floats, Floats, NDArray[np.int64], Floats]:
+    ) -> tuple[Memory, Held[Parts], Floats, Floats, NDArray[np.int64], Floats]:
         """Returns memory and rules, with room for the frame's radar points."""
         if len(frame.radar.range) > len(self._kept):
             self._kept = np.empty(len(frame.radar.range), dtype=np.int64)

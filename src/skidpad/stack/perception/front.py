@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
 from skidpad.core.frames import RadarPoints, Segments, SensorFrame
-from skidpad.core.kernels.jit import Held, kernel
+from skidpad.core.kernels.jit import kernel
 from skidpad.core.run import Function
 from skidpad.core.settings.stack import RoofCorridor, StackSettings, Targets
 from skidpad.core.specs import SensorSpec
@@ -114,7 +114,7 @@ def look_ahead(
     roof: float,
     points: RadarPoints,
     place: Place,
-    map: Held[LaneArrays],
+    a: LaneArrays,
     on_highway: NDArray[np.bool_],
     ways: Floats,
 ) -> None:
@@ -124,7 +124,7 @@ def look_ahead(
     """
     fused = fuse(fusion, bumper, roof)
     tracking = is_confirmed(m, detection)
-    reading = read_radar(m, radar, points, kept, tracking, place, map, on_highway, ways)
+    reading = read_radar(m, radar, points, kept, tracking, place, a, on_highway, ways)
     push(samples, limit_rate(m, fusion, history, fused) if fusion.limits_rate else fused)
     found = detect(m, detection, median(samples), bumper, reading)
     m.status, m.distance = found.status, found.distance

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
 from skidpad.core.frames import RadarPoints
-from skidpad.core.kernels.jit import Held, inner_kernel, kernel
+from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.settings.stack import RadarCandidates, RadarCorridor, StackSettings
 from skidpad.roads.kernels import LaneArrays, neighbour_s, project_kernel
 from skidpad.stack.memory import Record
@@ -89,7 +89,7 @@ NO_RADAR = RadarReading(nan, nan, nan, 0)
 
 @kernel
 def first_in_lane(
-    map: Held[LaneArrays],
+    a: LaneArrays,
     on_highway: NDArray[np.bool_],
     points: RadarPoints,
     kept: NDArray[np.int64],
@@ -106,7 +106,6 @@ def first_in_lane(
     """
     if place.lane < 0:
         return -1
-    a = map.value
     lane, s = _onto_highway(a, on_highway, place.lane, place.s)
     x, y = place.x + MOUNT * cos(place.yaw), place.y + MOUNT * sin(place.yaw)
     for k in range(chosen):
@@ -189,7 +188,7 @@ def radar_rules(settings: StackSettings) -> RadarRules:
 @kernel
 def read_radar(
     m: Record, rules: RadarRules, points: RadarPoints, kept: NDArray[np.int64], tracking: bool, place: Place,
-    map: Held[LaneArrays], on_highway: NDArray[np.bool_], ways: Floats,
+    a: LaneArrays, on_highway: NDArray[np.bool_], ways: Floats,
 ) -> RadarReading:  # fmt: skip
     """Returns the readings of one measurement, NO_RADAR without a point that passes the pre-filter (A-066).
 
@@ -208,7 +207,7 @@ def read_radar(
     found = nearest
     if rules.by_map:
         chosen = 1 if rules.nearest_only else n
-        found = first_in_lane(map, on_highway, points, kept, chosen, place, ways)
+        found = first_in_lane(a, on_highway, points, kept, chosen, place, ways)
     lane = nan if found < 0 else np.float64(points.range[found])
     told = nearest if found < 0 else found
     pre, velocity = np.float64(points.range[nearest]), np.float64(points.velocity[told])

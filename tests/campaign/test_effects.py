@@ -55,6 +55,13 @@ def test_puddles_lie_on_every_road_in_their_arm_and_in_all_together():
     assert {p.road for p in wet.surface} == set(load_map("figure8").lanes.road.tolist())
 
 
+def test_arms_drive_on_the_map_that_is_asked_for():
+    on_motorway = plan_arm("2", "rain-noon", "puddles", 1, 5.0, "motorway")
+    assert on_motorway.course.map == "motorway"
+    assert {p.road for p in on_motorway.surface} == set(load_map("motorway").lanes.road.tolist())
+    assert plan_arm("2", "rain-noon", NONE, 1, 5.0).course.map == "figure8"
+
+
 def test_differences_are_of_equal_seeds_with_intervals_from_eight():
     none = [(0, 60.0 + k, f"n{k}") for k in range(8)]
     wind = [(k % 2, 59.0 + k - 0.1 * k, f"w{k}") for k in range(8)]

@@ -16,7 +16,7 @@ from skidpad.campaign.workers.pool import local
 from skidpad.campaign.workers.worker import Job
 from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import SkidpadError
-from skidpad.core.run import CameraDriver, RunSpec
+from skidpad.core.run import CameraDriver, Roads, RunSpec
 from skidpad.core.settings.parts import load_profile
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.evidence.drive.metrics import run_metrics
@@ -58,9 +58,12 @@ EFFECTS: dict[str, Effect] = {
         puddles=True,
     ),
     "seen_puddles": Effect(
-        "the same, and background drivers that slow for it",
+        "the same puddles, and background drivers that slow for them",
         GRIP | {"water_drag": True, "drivers": True, "drivers_patches": True},
         puddles=True,
+    ),
+    "sheet_flow": Effect(
+        "grip and rain that gathers on low superelevation", GRIP | {"sheet_flow": True}
     ),
     "drivers": Effect("background drivers that mind grip and sight", {"drivers": True}),
     "wakes": Effect("air that lorries push aside", {"wakes": True}),
@@ -79,10 +82,17 @@ EFFECTS: dict[str, Effect] = {
     ),
     "lidar": Effect("lidar: lost and false returns", RANGE | {"lidar": "physical"}, "lidar"),
     "spray": Effect(
-        "lidar: the same and spray", RANGE | {"lidar": "physical", "spray": True}, "lidar"
+        "lidar: lost and false returns, and spray",
+        RANGE | {"lidar": "physical", "spray": True},
+        "lidar",
+    ),
+    "fog_drops": Effect(
+        "lidar: lost and false returns with the drops of advection fog",
+        RANGE | {"lidar": "physical", "lidar_fog": "advection"},
+        "lidar",
     ),
     "window": Effect(
-        "lidar: the same, wet ground, drops and dirt on the window",
+        "lidar: lost and false returns, wet ground, drops and dirt on the window",
         RANGE
         | {"lidar": "physical", "lidar_wet_ground": True, "lidar_drops_s": 5.0, "lidar_dirt": 0.3},
         "lidar",
@@ -128,7 +138,9 @@ def settings_of_arm(arm: str) -> dict[str, Any]:
     return values
 
 
-def plan_arm(stack: str, weather: str, arm: str, seed: int, duration: float) -> RunSpec:
+def plan_arm(
+    stack: str, weather: str, arm: str, seed: int, duration: float, map: str = "figure8"
+) -> RunSpec:
     """Returns the run of an arm; the driver that sees pictures gets them."""
     driver = find_driver(stack)
     pixels = isinstance(driver, CameraDriver)
@@ -136,6 +148,7 @@ def plan_arm(stack: str, weather: str, arm: str, seed: int, duration: float) -> 
         driver=driver,
         weather=find_weather(weather),
         settings=load_profile("recommended", settings_of_arm(arm)),
+        course=Roads(map=map),
         sensors=SensorLevel.PIXELS if pixels else SensorLevel.OBJECTS,
         seed=seed,
         duration=duration,
@@ -174,6 +187,7 @@ def drive_effects(
     workers: int,
     effects: Sequence[str] = tuple(EFFECTS),
     on_run: Callable[[int, int], None] = lambda *_: None,
+    map: str = "figure8",
 ) -> pl.DataFrame:
     """Drives none, each effect alone and all together with the same seeds; returns a row per run.
 
@@ -184,7 +198,7 @@ def drive_effects(
         Job(f"{arm}-{seed}", drive_arm, spec, spec.deadline_s)
         for arm in arms
         for seed in seeds
-        for spec in (plan_arm(stack, weather, arm, seed, duration),)
+        for spec in (plan_arm(stack, weather, arm, seed, duration, map),)
     ]
     rows: dict[str, dict[str, Any]] = {}
     for finished in local(workers, warm_up)(jobs):
@@ -192,7 +206,9 @@ def drive_effects(
             how = finished.failure.value
             raise SkidpadError(f"a run of effects {how}: {finished.detail.strip()}")
         arm = finished.job.key.rsplit("-", 1)[0]
-        rows[finished.job.key] = {"stack": stack, "weather": weather, "arm": arm, **finished.value}
+        rows[finished.job.key] = {
+            "stack": stack, "weather": weather, "map": map, "arm": arm, **finished.value
+        }  # fmt: skip
         on_run(len(rows), len(jobs))
     return pl.DataFrame([rows[job.key] for job in jobs])
 

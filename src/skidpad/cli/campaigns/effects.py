@@ -15,6 +15,9 @@ def effects(
         typer.Option(help="As for `adas`; may be given several times. Default: 2."),
     ] = None,
     weather: Annotated[str, typer.Option(help="A preset or a YAML file.")] = "rain-noon",
+    map: Annotated[
+        str, typer.Option(help="A bundled map's name, or an OpenDRIVE file.")
+    ] = "figure8",
     effect: Annotated[
         list[str] | None,
         typer.Option(help="One effect; may be given several times. Default: all of them."),
@@ -43,11 +46,12 @@ def effects(
             rows = drive_effects(
                 one, weather, range(1, seeds + 1), duration, workers, chosen,
                 lambda done, n: progress.update(task, completed=done, total=n),  # noqa: B023
+                map,
             )  # fmt: skip
         tables.append(rows)
         if out is not None:
             write_csv(out, pl.concat(tables))
-        typer.echo(f"stack {one}, {weather}, {seeds} x {duration:g} s; differences to none")
+        typer.echo(f"stack {one}, {map}, {weather}, {seeds} x {duration:g} s; differences to none")
         typer.echo("| effect | interventions per drive | mean speed, km/h | drives changed |")
         typer.echo("|---|---|---|---|")
         for result in compare_effects(rows):

@@ -114,7 +114,7 @@ def plain(text):
     )
 
 
-@pytest.mark.parametrize("name", ["ours", "lidar", "camera"])
+@pytest.mark.parametrize("name", ["ours", "motorway", "fog", "lidar", "camera"])
 def test_the_page_shows_what_its_rows_say(name):
     page = (RESULTS / "effects.md").read_text(encoding="utf-8")
     table = pl.read_csv(RESULTS / f"effects-{name}.csv", schema_overrides={"stack": pl.String})
@@ -124,7 +124,7 @@ def test_the_page_shows_what_its_rows_say(name):
             found.note or plain(difference_text(d)) for d in (found.interventions, found.speed)
         ]
         line = f"| {found.title} | {cells[0]} | {cells[1]} | {found.changed} of {seeds} |"
-        assert line in page.split(f"(effects-{name}.csv)")[1].split("\n## ")[0]
+        assert line in page.split(f"(effects-{name}.csv)")[1].split("\n```console")[0]
 
 
 def test_our_stack_has_a_row_for_every_effect():

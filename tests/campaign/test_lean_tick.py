@@ -30,6 +30,7 @@ def drive() -> None:
         objects.sense,
         road.read_road,
         think.think,
+        recovery.find_ego,
         ticks.copy_actors,
     ],
     ids=lambda compiled: compiled.py_func.__name__,

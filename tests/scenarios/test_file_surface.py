@@ -9,13 +9,18 @@ import pytest
 from typer.testing import CliRunner
 
 from skidpad.campaign.driving.run_setup import check_scenario
+from skidpad.campaign.runs.rerun import last_ticks
+from skidpad.campaign.runs.run import OpenRun
+from skidpad.campaign.runs.run import run as drive
+from skidpad.campaign.runs.state_files import StateFiles, read_state
 from skidpad.campaign.runs.stored import read_run
 from skidpad.cli.main import app
 from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import FileError
 from skidpad.core.run import Scenario
-from skidpad.recording.run.log_files import read_log
+from skidpad.recording.run.log_files import log_hash, read_log
 from skidpad.recording.run.surfaces import read_run_surface
+from support.cut_runs import go_on
 from support.scenarios.files import at, event, story, time, write
 
 ICE = SurfacePatch(name="ice", ice_mm=3.0, road=1)
@@ -106,3 +111,29 @@ def test_a_file_of_another_tool_is_noted_and_not_read(tmp_path):
     assert found.playable().start.environment.surface == ()
     (note,) = [str(f) for f in found.findings if f.element == "File"]
     assert re.search(r"friction\.bin is not read: surfaces end in \.yaml, \.yml, \.crg", note)
+
+
+def test_a_checkpoint_file_holds_what_events_have_laid(tmp_path):
+    """Written while the ice lies there and after it has gone, the run goes on as one that was not cut."""
+    write_ice(tmp_path)
+    events = event("ice comes", named("ice.yaml"), time(0.5))
+    events += event("ice goes", condition("<Properties/>"), time(1.2))
+    _, spec, _ = played(tmp_path, stories=story(events))
+    log = drive(spec).log
+    run = OpenRun(spec)
+    run.step()
+    files = StateFiles(run)
+    for tick in (16, 30):
+        go_on(run, tick - run.tick)
+        files.write(tmp_path / f"{tick}")
+    go_on(run)
+    assert log_hash(run.finish().log) == log_hash(log)
+    for tick in (16, 30):
+        other = OpenRun(spec)
+        other.step()
+        StateFiles(other).restore(read_state(tmp_path / f"{tick}", spec))
+        go_on(other)
+        rest = other.log.log.finish()
+        assert int(rest.tick[0]) == tick + 1
+        assert log_hash(rest) == log_hash(last_ticks(log, tick + 1))
+        assert (rest.mu[0, 0].max() < 0.2) == (tick == 16)

@@ -87,6 +87,11 @@ class ObjectSuite:
     lanes: for the slope of the road that the radar meets; None: level ground.
     """
 
+    # what kernels hold of attributes that may be others after a change or from a checkpoint
+    UNSAVED = ("_common", "_parts", "_antenna", "_listening")
+    _parts: Common | None = None
+    _listening: Antenna | None = None
+
     def __init__(
         self,
         roadside: Roadside,
@@ -136,8 +141,6 @@ class ObjectSuite:
             for s in self._specs
             if isinstance(s, RadarSpec)
         ]
-        self._held_antennas = [hold(antenna) for antenna in self.antennas]
-        self._common: Held[Common] | None = None
         lit = Beam.LOW if beam is None else beam
         self.limit = SIGHT if weather is None else min(label_range(weather, lit), SIGHT)
 
@@ -152,10 +155,16 @@ class ObjectSuite:
         if len(self._eyes) != 2 or len(self.antennas) != 1 or self.lanes is None:
             return self.segments(states), self.radar(tick, states)
         self._around(states)
-        if self._common is None:
+        around, radar, known = self._surroundings, self.antennas[0], self._parts
+        if (
+            known is None
+            or known.around is not around
+            or known.radar is not radar
+            or known.limit != self.limit
+        ):
             one, other = self._eyes
-            parts = Common(self._surroundings, one, other, self.antennas[0], self.limit)
-            self._common = hold(parts)
+            self._parts = Common(around, one, other, radar, self.limit)
+            self._common = hold(self._parts)
         *runs, m = sense(self._common, self.lanes, tick)
         seen = dict(zip(self.camera_ids, map(copy_runs, self._eyes, runs), strict=True))
         return seen, RadarPoints(*self._radar.echoes[:, :m].copy())
@@ -166,7 +175,9 @@ class ObjectSuite:
             return RadarPoints.none()
         around = self._around(states)
         self._find_slope(states)
-        m = listen(around, self._held_antennas[0], tick)
+        if self.antennas[0] is not self._listening:
+            self._listening, self._antenna = self.antennas[0], hold(self.antennas[0])
+        m = listen(around, self._antenna, tick)
         return RadarPoints(*self._radar.echoes[:, :m].copy())
 
     def _find_slope(self, states: ActorStates) -> None:
@@ -179,7 +190,7 @@ class ObjectSuite:
         if states is not self._states:
             t = self.table
             boxes = Boxes(states.x, states.y, states.z, states.yaw, t.length, t.width, t.height)
-            self._states, self._common = states, None
+            self._states = states
             self._surroundings = Surroundings(
                 states, boxes, self.labels, self.walls, self.posts, self._camera, self._radar
             )

@@ -90,6 +90,9 @@ class Reading(NamedTuple):
 class PhysicalRadar:
     """One radar; `measure` once per tick."""
 
+    UNSAVED = ("_held", "_held_setup")  # made of `setup`
+    _held_setup: RadarSetup | None = None
+
     def __init__(
         self,
         spec: RadarSpec,
@@ -139,7 +142,6 @@ class PhysicalRadar:
     def change(self, weather: Weather | None) -> None:
         """Weather is another from the next tick on."""
         self.setup = setup_of(self.spec, self._key, weather, self._multipath, self._interference)
-        self._held = hold(self.setup)
 
     def measure(self, tick: int, states: ActorStates) -> RadarPoints:
         """Detections of this state, valid until the next call; actor 0 carries the radar."""
@@ -147,6 +149,8 @@ class PhysicalRadar:
 
     def read(self, tick: int, states: ActorStates) -> Reading:
         """Detections of this state as the output asks for, valid until the next call."""
+        if self._held_setup is not self.setup:
+            self._held_setup, self._held = self.setup, hold(self.setup)
         count = find_detections(
             self._held, self._world, self._cells, self._scratch, states, tick, self._out
         )

@@ -65,7 +65,7 @@ class RadarSetup(NamedTuple):
     false: float  # mean number of false alarms per tick
     air: RadarAir
     multipath: bool  # mirrors in walls, rails and the road
-    concrete: complex  # permittivity of walls
+    concrete: np.complex128  # permittivity of walls
     rivals: float  # share of vehicles whose radar disturbs this one
     rival: float  # m^2, what one leaves over the noise from 1 m, both on the axis
 
@@ -89,7 +89,7 @@ def setup_of(
     edge = (1.0 + 1e-9) * tan(last) if last < 0.5 * pi else inf
     return RadarSetup(
         mount_of(spec.mount), key, grid, spec.range, factor, wide, high, edge,
-        cells * FALSE_ALARMS, air, multipath, concrete_permittivity(RADAR_GHZ), rivals,
+        cells * FALSE_ALARMS, air, multipath, np.complex128(concrete_permittivity(RADAR_GHZ)), rivals,
         interference_over_noise(1.0, AFFECTED, RADAR_GHZ),
     )  # fmt: skip
 

@@ -62,6 +62,9 @@ SIDES = {
 class Patches:
     """Resolves patches to friction at each wheel; fitted to the vehicles of a run."""
 
+    UNSAVED = ("_held", "_held_arrays")  # made of `_arrays`
+    _held_arrays: PatchArrays | None = None
+
     def __init__(
         self,
         map: RoadMap,
@@ -104,7 +107,11 @@ class Patches:
         self._wheels = WheelPlaces(
             self._place, np.array([self.kinds.index(n) for n in own], np.int64)
         )
-        self._held = hold(_arrays(self.map, self._here, self.lanes, self.road, self.kinds))
+        self._arrays = _arrays(self.map, self._here, self.lanes, self.road, self.kinds)
+
+    def _hold(self) -> None:
+        """Hands the patches to the kernels, after a change or from a checkpoint."""
+        self._held_arrays, self._held = self._arrays, hold(self._arrays)
 
     def fill(
         self, states: ActorStates, placed: Places, share: Floats, stiffness: Floats, film: Floats
@@ -114,6 +121,8 @@ class Patches:
         placed: where the vehicles stood last. share: of the friction without patches. stiffness: over
         the dry one. film: of water, m.
         """
+        if self._held_arrays is not self._arrays:
+            self._hold()
         fill_patches(
             self.map.held, self._held, self._wheels, states, placed, share, stiffness, film
         )
@@ -148,6 +157,8 @@ class Patches:
         """Returns the friction at wheels (n, 4, 2) of the run's tyres over that without patches, (n, 4)."""
         n = len(wheels)
         tyres = np.full(n, self.kinds.index(self.road.tyres), np.int64)
+        if self._held_arrays is not self._arrays:
+            self._hold()
         share, stiffness, film = (np.zeros((n, 4)) for _ in range(3))
         fill_patches(
             self.map.held, self._held, WheelPlaces(wheels, tyres), states, placed,

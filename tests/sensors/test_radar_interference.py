@@ -1,15 +1,24 @@
 """Radars of others: the rise of noise beside a published table, and what a radar loses by it."""
 
 import csv
-from math import log10
+from dataclasses import replace
+from math import log10, pi
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.core.run import Roads, RunSpec
+from skidpad.core.settings.parts import load_profile
+from skidpad.core.setup import ActorSetup
+from skidpad.core.states import VehicleCommand
+from skidpad.core.vocabulary import Control
 from skidpad.physics.interference import AFFECTED, interference_over_noise
+from skidpad.roads.bundled import load_map
 from skidpad.roads.roadside import Barrier, BarrierKind, Roadside
 from skidpad.sensors.physical_radar.radar import PhysicalRadar
+from skidpad.simulation.embedded.engine import EmbeddedBackend
 from support.sensors.cars import RADAR, world
 
 TABLE = Path(__file__).parents[2] / "docs" / "radar-interference.csv"
@@ -65,3 +74,27 @@ def test_a_rail_between_them_keeps_them_apart():
     beside = Roadside((rail,))
     free = power(AHEAD, ONCOMING, roadside=beside, interference=0.0)
     assert power(AHEAD, ONCOMING, roadside=beside) == free > 0.0
+
+
+def found_in_a_run(share, turned):
+    """Ranges tick by tick of an ego that stands behind a car, which faces it or shows its rear."""
+    map = load_map("figure8")
+    place = map.ahead(map.place(map.ego_start), 15.0).pose
+    other = ActorSetup(
+        name="other", type="hatchback", place=replace(place, yaw=place.yaw + turned),
+        driver=Control.SCRIPTED,
+    )  # fmt: skip
+    settings = {"radar_model": "physical", "radar_interference": share}
+    spec = RunSpec(course=Roads(vehicles=0), settings=load_profile("recommended", settings))
+    setup = replace(stage_of(spec).setup, traffic=None, actors=(other,))
+    backend, found = EmbeddedBackend(), []
+    backend.reset(setup, 3)
+    for _ in range(10):
+        found.append(backend.step(VehicleCommand(brake=1.0)).radar.range.tolist())
+    backend.close()
+    return found
+
+
+def test_in_a_run_a_car_that_faces_ours_disturbs_it_and_one_ahead_does_not():
+    assert found_in_a_run(1.0, pi) != found_in_a_run(0.0, pi)
+    assert found_in_a_run(1.0, 0.0) == found_in_a_run(0.0, 0.0)

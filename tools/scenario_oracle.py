@@ -159,10 +159,11 @@ def play_without_controllers(
 ) -> PlayedScenario:
     """Plays a file as esmini does with --disable_controllers: no name of a controller is known.
 
-    end: s after which it stops; maps: folders with roads.
+    What has no stop trigger goes on to the end. end: s after which it stops; maps: folders with roads.
     """
     with patch.dict(registry.BUILT_IN, clear=True):
-        return play_ideal(compile_scenario(file, maps=maps), end, STEP)
+        scenario = compile_scenario(file, maps=maps)
+        return play_ideal(scenario, end, STEP, ends_with_acts=False)
 
 
 def compare(folders: Sequence[Path]) -> int:

@@ -117,15 +117,22 @@ class IdealWorld:
 
 
 def play_ideal(
-    scenario: Scenario, duration: float, dt: float = DT, seed: int = 0
+    scenario: Scenario,
+    duration: float,
+    dt: float = DT,
+    seed: int = 0,
+    *,
+    ends_with_acts: bool = True,
 ) -> PlayedScenario:
     """Plays a scenario with every entity exactly where the file puts it, for `duration` s at most.
 
-    Earlier when the scenario ends; dt: s per step; seed: of the traffic that actions bring.
+    Earlier when the scenario ends; dt: s per step; seed: of the traffic that actions bring;
+    ends_with_acts: a story without a stop trigger ends when all its acts are complete.
     """
     stage = IdealWorld(scenario)
     modes = dict.fromkeys(scenario.entities, ActorMode.IDEAL)
     player = Player(scenario, modes=modes, dt=dt, seed=seed)
+    player.telling.ends = player.telling.ends and ends_with_acts
     rows: list[Row] = []
     for _ in range(round(duration / dt) + 1):
         words = player.step(stage.truth())

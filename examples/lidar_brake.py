@@ -24,7 +24,8 @@ class LidarBrake:
         here = self.map.project(pose.x, pose.y, pose.z)
         aim = self.map.ahead(here, 10.0 + v) if here else None
         x, y, z = frame.extra["lidar"].xyz.T
-        gap = min(x[(x > 2.0) & (abs(y) < 1.0) & (z > -1.2)], default=50.0) - 2.0
+        ahead = sorted(x[(x > 2.0) & (abs(y) < 1.0) & (z > -1.2)])
+        gap = (ahead[2] if len(ahead) > 2 else 50.0) - 2.0  # one or two returns may be drops
         if aim is None or gap < 2.0 + v * v / 8.0:
             return VehicleCommand(brake=1.0)
         steer = wrap_angle(atan2(aim.y - pose.y, aim.x - pose.x) - pose.yaw)

@@ -174,6 +174,13 @@ def test_the_example_with_a_lidar_follows_and_does_not_hit() -> None:
     assert 10.0 < run.log.v_ego.max() < 15.0
 
 
+def test_a_run_is_shown_in_one_line() -> None:
+    run = drive(0, duration=0.5, vehicles=2, sensors="objects", seed=3)
+    assert repr(run.log) == "<RunLog: 10 ticks of 0.05 s, 3 actors, 0 contacts of the ego>"
+    assert repr(run).startswith("<Run of ")
+    assert "completed after 0.5 s on figure8, clear-noon, seed 3; 0 contacts" in repr(run)
+
+
 class Wrapped:
     """The embedded simulator with something changed on the way."""
 

@@ -90,6 +90,14 @@ class Run:
     readings: SensorReadings | None = None
     surface: tuple[SurfacePatch, ...] = ()
 
+    def __repr__(self) -> str:
+        log, about = self.log, self.log.header.about
+        where = f"{self.road}, {', '.join(log.weathers)}, seed {about.get('seed', '-')}"
+        return (
+            f"<Run of {about.get('config', 'a driver')}: {self.outcome.value} after "
+            f"{len(log) * log.header.dt:g} s on {where}; {len(log.contacts)} contacts of the ego>"
+        )
+
 
 def drive(
     stack: type[Stack] | str | int,

@@ -121,6 +121,12 @@ class RunLog:
     def __len__(self) -> int:
         return len(self.tick)
 
+    def __repr__(self) -> str:
+        return (
+            f"<RunLog: {len(self)} ticks of {self.header.dt:g} s, {len(self.table)} actors, "
+            f"{len(self.contacts)} contacts of the ego>"
+        )
+
     @property
     def t(self) -> Floats:
         """Returns (T,) s of simulated time."""

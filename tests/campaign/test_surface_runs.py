@@ -107,6 +107,17 @@ def test_a_surface_that_does_not_fit_the_map_is_refused_before_anything_drives(
     assert not out.exists()
 
 
+def test_a_surface_that_does_not_fit_a_played_scenario_is_named_with_its_file(tmp_path):
+    file = tmp_path / "ice.yaml"
+    file.write_text("patches:\n  - {ice_mm: 4, road: 999}\n", encoding="utf-8")
+    call = ["play", "lead_slowdown", "--sensors", "objects", "--surface", str(file), "--out"]
+    done = CliRunner().invoke(app, [*call, str(tmp_path / "out")])
+    sentence = "ice.yaml: patches[0]: map straight has no road 999; it has 1"
+    with pytest.raises(ConfigError, match=re.escape(sentence)):
+        raise done.exception
+    assert not (tmp_path / "out").exists()
+
+
 def coast(*surface, **settings):
     """Roll from 18 m/s for 2 s with hands off: the turn in rad, and the speed that is left."""
     stage = stage_of(

@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from msgspec import structs
 
-from skidpad.core.environment.surface import SurfacePatch, place_in_file
-from skidpad.core.errors import ConfigError
+from skidpad.core.environment.surface import PatchError, SurfacePatch, place_in_file
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.roadside import Bridge
 
@@ -15,7 +14,7 @@ from skidpad.roads.roadside import Bridge
 def spread_over_bridges(map: RoadMap, surface: Sequence[SurfacePatch]) -> tuple[SurfacePatch, ...]:
     """Returns the patches, those of `bridges` as one stretch of road for each bridge of the map.
 
-    ConfigError where a patch asks for bridges and the map names none.
+    PatchError where a patch asks for bridges and the map names none.
     """
     return tuple(part for k, patch in enumerate(surface) for part in _parts(map, k, patch))
 
@@ -27,7 +26,7 @@ def _parts(map: RoadMap, k: int, patch: SurfacePatch) -> Iterator[SurfacePatch]:
         return
     bridges = map.roadside.bridges
     if not bridges:
-        raise ConfigError(
+        raise PatchError(
             f"{place_in_file(k, patch)}: map {map.name} names no <bridge>; say road and s of each one"
         )
     for bridge in bridges:

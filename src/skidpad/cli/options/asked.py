@@ -211,7 +211,11 @@ class Tuned(Struct, frozen=True):
         try:
             fit_patches(load_map(road_file(roads)), surface)
         except ConfigError as error:
-            raise ConfigError(f"{self.surface}: {error}") from None
+            raise self.name_surface(error) from None
+
+    def name_surface(self, error: ConfigError) -> ConfigError:
+        """Returns an error on a patch that fits no road with the name of the surface's file."""
+        return ConfigError(f"{self.surface}: {error}")
 
 
 class PlayCross(Struct, frozen=True):

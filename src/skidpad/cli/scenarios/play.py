@@ -75,6 +75,7 @@ def play(
     ] = False,
 ) -> None:
     """Play a scenario, or all of a folder; ends with verdicts, a page and a table."""
+    from skidpad.core.environment.surface import PatchError
     from skidpad.core.errors import ConfigError
     from skidpad.scenarios.shipped import find_scenario
 
@@ -98,7 +99,10 @@ def play(
     runs = play_runs(template, cross, [file], seeds)
     if len(runs) > 1:
         raise ConfigError("one file is one run: several weathers, grips or seeds take a folder")
-    driven = run_to(runs[0], out, checkpoints)
+    try:
+        driven = run_to(runs[0], out, checkpoints)
+    except PatchError as error:
+        raise tuned.name_surface(error) from None
     if driven.error:
         typer.echo(driven.error.strip().split("\n")[-1], err=True)
     played, text = expected.conclude(out)

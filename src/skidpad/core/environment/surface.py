@@ -33,6 +33,10 @@ NUMBERS = {  # ranges of the fields that are one number
 }
 
 
+class PatchError(ConfigError):
+    """A patch that does not fit the map; says which of its file, but not the file."""
+
+
 class SurfacePatch(
     Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True
 ):

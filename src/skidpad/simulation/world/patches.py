@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from skidpad.core.arrays import Floats
 from skidpad.core.environment.surface import (
     PATH_OFFSET,
+    PatchError,
     SurfacePatch,
     place_in_file,
     present_patches,
 )
-from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
 from skidpad.core.kernels.jit import hold
 from skidpad.core.states import ActorStates
@@ -78,7 +78,7 @@ class Patches:
         sheet_flow: what rain adds to the patches; None: nothing.
 
         Raises:
-            ConfigError: a patch lies on no road of the map, none of its lanes has such a stretch, or it
+            PatchError: a patch lies on no road of the map, none of its lanes has such a stretch, or it
                 asks for bridges where the map names none.
         """
         self.map, self.lanes, self.sheet_flow = map, lanes or {}, sheet_flow
@@ -303,7 +303,7 @@ def zoned_tyres(
 def fit_patches(map: RoadMap, patches: Sequence[SurfacePatch]) -> tuple[SurfacePatch, ...]:
     """Returns the patches as they lie on a map, those of its bridges one by one.
 
-    Raises ConfigError where a patch lies on no road of the map, none of its lanes has such a stretch, or it
+    Raises PatchError where a patch lies on no road of the map, none of its lanes has such a stretch, or it
     asks for bridges where the map names none.
     """
     for k, patch in enumerate(patches):
@@ -312,7 +312,7 @@ def fit_patches(map: RoadMap, patches: Sequence[SurfacePatch]) -> tuple[SurfaceP
 
 
 def _check(k: int, patch: SurfacePatch, map: RoadMap) -> None:
-    """Raises ConfigError where the patch's road is unknown or its stretch covers nothing of the lane."""
+    """Raises PatchError where the patch's road is unknown or its stretch covers nothing of the lane."""
     where = place_in_file(k, patch)
     if patch.road is None:
         return
@@ -320,11 +320,11 @@ def _check(k: int, patch: SurfacePatch, map: RoadMap) -> None:
     if patch.road not in roads:
         known = ", ".join(str(road) for road in roads[:LISTED])
         more = ", ..." if len(roads) > LISTED else ""
-        raise ConfigError(f"{where}: map {map.name} has no road {patch.road}; it has {known}{more}")
+        raise PatchError(f"{where}: map {map.name} has no road {patch.road}; it has {known}{more}")
     if not _samples(patch, map).any():
         on = map.samples.s_road[map.lanes.road[map.samples.lane] == patch.road]
         lanes = sorted({int(i) for i in map.lanes.lane_id[map.lanes.road == patch.road]})
-        raise ConfigError(
+        raise PatchError(
             f"{where}: road {patch.road} has lanes {', '.join(f'{i}' for i in lanes)} and runs from "
             f"{on.min():.1f} to {on.max():.1f} m; the patch asks for lane {patch.lane} from "
             f"{patch.stretch[0]:g} to {patch.stretch[1]:g} m"

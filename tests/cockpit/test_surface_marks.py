@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
-from skidpad.cockpit.marks import PX_MOST, patch_marks
+from skidpad.cockpit.marks import PX_MOST, Lying, patch_marks
 from skidpad.cockpit.pictures import SURFACES, draw
 from skidpad.cockpit.studio import FOLLOW, TOP
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.geometry import Pose
+from skidpad.recording.run.surfaces import LaidSurface
+from skidpad.roads.bundled import load_map
 from skidpad.roads.surface_outlines import PatchOutline
 
 EGO = Pose(100.0, 50.0, 0.0, 0.0, 0.0, 0.3)
@@ -54,3 +57,13 @@ def test_a_patch_is_a_coat_of_its_colour():
     assert picture[5, 5].tolist() == [0, 0, 0]
     inside = picture[30, 30].astype(float)
     assert inside / inside.max() == pytest.approx(np.array(SURFACES["water"]) / 200.0, abs=0.03)
+
+
+def test_what_events_lay_is_outlined_from_their_tick_on():
+    road = load_map("straight")
+    place = road.at(0, 300.0)
+    puddle = SurfacePatch(water_mm=2.0, circle=(place.x, place.y, 4.0))
+    ice = SurfacePatch(ice_mm=2.0, circle=(place.x + 20.0, place.y, 4.0))
+    lying = Lying(road, [puddle], (LaidSurface(4, (puddle, ice)), LaidSurface(10, ())))
+    kinds = [[outline.kind for outline in lying.outlines(tick)] for tick in (0, 3, 4, 9, 10, 2)]
+    assert kinds == [["water"], ["water"], ["water", "ice"], ["water", "ice"], [], ["water"]]

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from skidpad.core.environment.surface import SurfacePatch
-from skidpad.recording.run.surfaces import read_run_surface
+from skidpad.core.errors import FileError
+from skidpad.recording.run.surfaces import (
+    LaidSurface,
+    read_laid_surfaces,
+    read_run_surface,
+    write_laid_surfaces,
+)
 from skidpad.report.elements.replay import UNIT, replay, replay_run
 from skidpad.roads.bundled import load_map
 from skidpad.roads.surface_outlines import outline_patches
@@ -75,3 +81,29 @@ def test_a_folder_says_its_surface_and_one_without_says_none(tmp_path):
         assert len(read_run_surface(tmp_path)) == there
     (tmp_path / "config.yaml").write_text("version: 2\n")
     assert read_run_surface(tmp_path) == ()
+
+
+@pytest.mark.parametrize("cut", [lambda log, laid: replay(log, ROAD, 5, surface=[PUDDLE], laid=laid),
+                                 lambda log, laid: replay_run(log, ROAD, None, [PUDDLE], laid)])  # fmt: skip
+def test_what_events_lay_is_drawn_while_it_lies_there(cut):
+    laid = (LaidSurface(4, (PUDDLE, ICE)), LaidSurface(10, (ICE,)))
+    shown = cut(drive(), laid)["patches"]
+    dt = drive().header.dt
+    times = [round(4 * dt, 3), round(10 * dt, 3)]
+    assert [(kind, *when) for kind, _, *when in shown] == [
+        ("water", 0.0, times[0]),
+        ("water", *times),
+        ("ice", *times),
+        ("ice", times[1]),
+    ]
+
+
+def test_laid_surfaces_are_stored_and_read(tmp_path):
+    write_laid_surfaces(tmp_path, ())
+    assert read_laid_surfaces(tmp_path) == ()
+    laid = (LaidSurface(4, (PUDDLE, ICE)), LaidSurface(10, ()))
+    write_laid_surfaces(tmp_path, laid)
+    assert read_laid_surfaces(tmp_path) == laid
+    (tmp_path / "surfaces.json").write_text('[{"tick": "x"}]')
+    with pytest.raises(FileError, match=r"surfaces.json: .*tick"):
+        read_laid_surfaces(tmp_path)

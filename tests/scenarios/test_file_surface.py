@@ -6,9 +6,11 @@ import re
 
 import numpy as np
 import pytest
+from msgspec import structs
 from typer.testing import CliRunner
 
-from skidpad.campaign.driving.run_setup import check_scenario
+from skidpad.campaign.driving.outdoors import NO_SURFACE, FileChanges
+from skidpad.campaign.driving.run_setup import check_scenario, stage_of
 from skidpad.campaign.runs.rerun import last_ticks
 from skidpad.campaign.runs.run import OpenRun
 from skidpad.campaign.runs.run import run as drive
@@ -18,8 +20,10 @@ from skidpad.cli.main import app
 from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import FileError
 from skidpad.core.run import Scenario
+from skidpad.core.simulator import BackendKind
 from skidpad.recording.run.log_files import log_hash, read_log
-from skidpad.recording.run.surfaces import read_run_surface
+from skidpad.recording.run.surfaces import read_laid_surfaces, read_run_surface, surface_at
+from skidpad.scenarios.reading.environment import Environment
 from support.cut_runs import go_on
 from support.scenarios.files import at, event, story, time, write
 
@@ -76,7 +80,16 @@ def test_an_event_lays_a_surface_and_another_takes_it_away(tmp_path):
         + event("nothing new", condition(""), time(0.8))
         + event("ice goes", condition("<Properties/>"), time(1.2))
     )
-    log, run, _ = played(tmp_path, stories=story(events))
+    log, run, out = played(tmp_path, stories=story(events))
+    laid = read_laid_surfaces(out)
+    assert [(one.tick, one.surface) for one in laid] == [
+        (pytest.approx(10, abs=2), (ICE,)),
+        (pytest.approx(24, abs=2), ()),
+    ]
+    felt = log.mu[:, 0].max(axis=-1) < 0.2
+    for tick in (laid[0].tick - 1, laid[0].tick + 1, laid[1].tick - 1, laid[1].tick + 1):
+        there = surface_at(read_run_surface(out), laid, tick)
+        assert (there == (ICE,)) == felt[np.searchsorted(log.tick, tick)]
     ego = log.mu[:, 0].max(axis=-1)
     assert run.surface == ()
     assert ego[(log.t > 0.1) & (log.t <= 0.5)].min() > 0.7
@@ -137,3 +150,17 @@ def test_a_checkpoint_file_holds_what_events_have_laid(tmp_path):
         assert int(rest.tick[0]) == tick + 1
         assert log_hash(rest) == log_hash(last_ticks(log, tick + 1))
         assert (rest.mu[0, 0].max() < 0.2) == (tick == 16)
+
+
+def test_a_carla_server_says_that_it_lays_no_surface_of_an_event(tmp_path):
+    write_ice(tmp_path)
+    events = event("ice comes", named("ice.yaml"), time(0.5))
+    _, spec, _ = played(tmp_path, stories=story(events))
+    for kind in (BackendKind.EMBEDDED, BackendKind.CARLA):
+        player = stage_of(spec).player
+        backend = structs.replace(spec.backend, backend=kind)
+        changes = FileChanges(player, structs.replace(spec, backend=backend))
+        scene = player.scene
+        scene.environments.append(Environment(surface=(ICE,)))
+        assert changes.news() is not None
+        assert changes.new_notices() == ([NO_SURFACE] if kind == BackendKind.CARLA else [])

@@ -14,15 +14,14 @@ from PIL import Image
 from skidpad.campaign.driving.loop import Moment
 from skidpad.cockpit import hud
 from skidpad.cockpit.companion import Companion
-from skidpad.cockpit.marks import LightAhead, marks_of, patch_marks
+from skidpad.cockpit.marks import LightAhead, Lying, marks_of, patch_marks
 from skidpad.cockpit.pictures import Picture, colours, draw
 from skidpad.cockpit.source import Source, index_at
 from skidpad.cockpit.studio import FOR_PEOPLE, Looks, Studio, View, plane
 from skidpad.cockpit.turn_signals import TurnSignals
 from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.setup import DT
-from skidpad.recording.run.surfaces import read_run_surface
-from skidpad.roads.surface_outlines import outline_patches
+from skidpad.recording.run.surfaces import read_laid_surfaces, read_run_surface
 from skidpad.simulation.world.world import BRAKING
 
 SHADOW = (0, 0, 0)
@@ -83,7 +82,7 @@ def frames(
     studio = Studio(source.map, source.table, first, source.seed, looks=looks)
     companion = None if other is None else Companion(other, source.tick(0), looks)
     camera, light = studio.suite.cameras[view.value], LightAhead(source.map)
-    outlines = outline_patches(source.map, read_run_surface(source.folder))
+    lying = Lying(source.map, read_run_surface(source.folder), read_laid_surfaces(source.folder))
     signals = TurnSignals(source)
     for k in moments:
         moment = source.moment(k)
@@ -95,7 +94,7 @@ def frames(
         images = studio.look(truth.tick, truth.states, truth.lights, braking, crash, turns)
         picture = colours(plane(images[view.value]))
         seen = marks_of(camera, moment.frame.radar, moment.report, light.mark(camera, moment))
-        patches = patch_marks(camera, outlines, truth.states.pose(0))
+        patches = patch_marks(camera, lying.outlines(truth.tick), truth.states.pose(0))
         draw(picture, *msgspec.to_builtins(seen._replace(patches=patches)))
         _inset(picture, {v: colours(plane(images[v.value])) for v, _ in INSETS})
         _say(

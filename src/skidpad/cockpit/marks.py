@@ -9,13 +9,15 @@ import numpy as np
 
 from skidpad.campaign.driving.loop import Moment
 from skidpad.core.arrays import Floats
+from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.frames import RadarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import CameraSpec, RadarSpec
 from skidpad.core.states import StackReport
+from skidpad.recording.run.surfaces import LaidSurface, surface_at
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.roadside import SignalHead
-from skidpad.roads.surface_outlines import PatchOutline
+from skidpad.roads.surface_outlines import PatchOutline, outline_patches
 from skidpad.sensors.published_sensors import RADAR_ID, twelve_sensors
 from skidpad.sensors.raster.view import camera_view
 from skidpad.stack.perception.lights import LightScan
@@ -68,6 +70,25 @@ def project(camera: CameraSpec, points: Floats, body: Pose = BODY) -> Floats:
     u = view.cx + view.focal * p[:, 0] / depth
     v = view.cy + view.focal * p[:, 1] / depth
     return np.stack([u, v, p[:, 2]], axis=1)
+
+
+class Lying:
+    """Outlines of what lies on a run's road, tick by tick."""
+
+    def __init__(
+        self, map: RoadMap, begin: Sequence[SurfacePatch], laid: Sequence[LaidSurface] = ()
+    ) -> None:
+        """begin: patches before any event; laid: what events lay later."""
+        self.map, self.begin, self.laid = map, begin, laid
+        self._outlines: dict[int, Sequence[PatchOutline]] = {}
+
+    def outlines(self, tick: int) -> Sequence[PatchOutline]:
+        """Returns the outlines of a tick."""
+        since = sum(one.tick <= tick for one in self.laid)
+        if since not in self._outlines:
+            there = surface_at(self.begin, self.laid, tick)
+            self._outlines[since] = outline_patches(self.map, there)
+        return self._outlines[since]
 
 
 def patch_marks(camera: CameraSpec, outlines: Sequence[PatchOutline], ego: Pose) -> list[PatchMark]:

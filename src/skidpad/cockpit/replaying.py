@@ -22,7 +22,7 @@ from skidpad.core.errors import OutputError, SkidpadError
 from skidpad.core.inputs import Beam
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Bodywork, Scenery
-from skidpad.recording.run.surfaces import read_run_surface
+from skidpad.recording.run.surfaces import read_laid_surfaces, read_run_surface
 
 PATIENCE = 0.02  # s between two looks at the words
 FILMS = "films"  # folder within the run's
@@ -69,8 +69,9 @@ class Replayer:
         self.dt = source.step * DT
         surface = read_run_surface(source.folder)
         self.screen = Screen(
-            feed, link, source.map, self._describe_moment, source.seed, surface, looks
-        )
+            feed, link, source.map, self._describe_moment, source.seed, surface, looks,
+            read_laid_surfaces(source.folder),
+        )  # fmt: skip
         self.screen.signals = TurnSignals(source).at
         self.screen.begin(source.table)
         if other is not None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from skidpad.campaign.driving.loop import Moment, Sink
 from skidpad.cockpit import hud
 from skidpad.cockpit.feed import Feed
-from skidpad.cockpit.marks import LightAhead, Marks, marks_of, patch_marks
+from skidpad.cockpit.marks import LightAhead, Lying, Marks, marks_of, patch_marks
 from skidpad.cockpit.studio import FOR_PEOPLE, MAIN, Looks, Studio, View, plane
 from skidpad.cockpit.words import Link
 from skidpad.core.environment.surface import SurfacePatch
@@ -22,8 +22,8 @@ from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Outside
 from skidpad.core.setup import DT
 from skidpad.core.states import ActorTable
+from skidpad.recording.run.surfaces import LaidSurface
 from skidpad.roads.queries import RoadMap
-from skidpad.roads.surface_outlines import outline_patches
 from skidpad.sensors.finish.extras import Extra
 from skidpad.simulation.world.world import BRAKING
 
@@ -55,9 +55,13 @@ class Screen(Sink):
         seed: int = 0,
         surface: Sequence[SurfacePatch] = (),
         looks: Looks = FOR_PEOPLE,
+        laid: Sequence[LaidSurface] = (),
     ) -> None:
-        """surface: what lies on parts of the road; looks: of the world in the pictures."""
-        self.outlines = outline_patches(map, surface)
+        """surface: what lies on parts of the road; laid: what events lay there later.
+
+        looks: of the world in the pictures.
+        """
+        self.lying = Lying(map, surface, laid)
         self.feed, self.link, self.map, self.ask, self.seed = feed, link, map, ask, seed
         self.looks = looks
         self.shown = self.dropped = self.collisions = 0
@@ -122,7 +126,7 @@ class Screen(Sink):
         ego = moment.truth.states.pose(0)
         for view in {self.link.main, View.TOP} & {*MARKED, View.TOP}:
             camera = self.cameras[view.value]
-            patches = patch_marks(camera, self.outlines, ego)
+            patches = patch_marks(camera, self.lying.outlines(frame.tick), ego)
             if view in MARKED:
                 light = self.light.mark(camera, moment)
                 seen = marks_of(camera, frame.radar, moment.report, light)

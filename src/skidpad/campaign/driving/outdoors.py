@@ -16,6 +16,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Outside
 from skidpad.core.run import RunSpec, Scenario
 from skidpad.core.setup import ActorCommand, Setup
+from skidpad.core.simulator import BackendKind
 from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.weather import RANGES, Weather
 from skidpad.physics.grip import RAIN_FULL
@@ -94,12 +95,16 @@ def branch_backend(backend: Backend, name: str) -> None:
     branch(name)
 
 
+NO_SURFACE = "a CARLA server does not lay the surface of the file's event: the road stays as it was"
+
+
 class FileChanges:
     """Turns actions of a played file into surroundings: weather, road, lights, lamps, hidden actors."""
 
     def __init__(self, player: Player, spec: RunSpec) -> None:
         self.player, self.done, self.noticed = player, 0, 0
         settings = spec.settings
+        self.serves_surface = spec.backend.backend != BackendKind.CARLA
         assert isinstance(spec.course, Scenario)
         # a speed among the settings goes before what the file says
         self.takes_wind = settings.world.wind_speed is None
@@ -137,6 +142,8 @@ class FileChanges:
                 now = replace(now, mu_ref=self.mu_ref * environment.friction_scale)
             if environment.surface is not None:
                 now = replace(now, patches=lay_beside(self.surface, environment))
+                if not self.serves_surface:
+                    scene.notices.append(NO_SURFACE)
             if environment.wind is not None and self.takes_wind:
                 now = replace(now, wind=environment.wind)
         self.outside = now

@@ -16,6 +16,7 @@ from skidpad.recording.campaign.results import Timing
 from skidpad.recording.files import csv_text, output_error, write_bytes
 from skidpad.recording.run.log_files import write_log
 from skidpad.recording.run.readings import write_readings
+from skidpad.recording.run.surfaces import write_laid_surfaces
 from skidpad.scenarios.playing.results import write_results
 
 if TYPE_CHECKING:
@@ -61,6 +62,7 @@ def write_config(folder: Path, config: dict[str, Any]) -> None:
 def write_run(folder: Path, driven: Run) -> str:
     """Writes log, events, sensor readings and the stack's error; returns the log's content hash."""
     digest = write_log(folder, driven.log)
+    write_laid_surfaces(folder, driven.laid)
     if driven.readings is not None:
         write_readings(folder, driven.readings)
     if driven.error:

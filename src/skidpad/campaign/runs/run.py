@@ -49,6 +49,7 @@ from skidpad.physics.presets import find_weather
 from skidpad.recording.run.events import NoticeSource, Relocation
 from skidpad.recording.run.log import LogHeader, RunLog
 from skidpad.recording.run.readings import SensorReadings
+from skidpad.recording.run.surfaces import LaidSurface
 from skidpad.recording.run.ticks import TickLog
 from skidpad.roads.queries import RoadMap
 from skidpad.scenarios.playing.player import Played
@@ -76,6 +77,7 @@ class Run:
         played: the story of a scenario, where one was played.
         readings: numbers of the further sensors that the stack asked for, where they give any.
         surface: what lay on parts of the road at the begin, by the run and by its scenario's file.
+        laid: what its events have laid later.
     """
 
     log: RunLog
@@ -89,6 +91,7 @@ class Run:
     played: Played | None = None
     readings: SensorReadings | None = None
     surface: tuple[SurfacePatch, ...] = ()
+    laid: tuple[LaidSurface, ...] = ()
 
     def __repr__(self) -> str:
         log, about = self.log, self.log.header.about
@@ -217,6 +220,7 @@ class Log(Sink):
 
     def __init__(self, header: LogHeader, weather: str, ticks: int) -> None:
         self.header, self.weather, self.ticks = header, weather, ticks
+        self.laid: list[LaidSurface] = []  # by events of a file
 
     def begin(self, table: ActorTable) -> None:
         """Makes room for as many ticks as the run may have."""
@@ -227,6 +231,7 @@ class Log(Sink):
         frame, truth, action = moment.frame, moment.truth, moment.action
         if self.changes is not None and self.changes.done:
             self.log.set_weather(self.changes.weather.name)
+            self._note_surface(truth.tick, self.changes)
         self.log.append(truth, frame, moment.command, moment.report, frame.supervision)
         for text in truth.notices:
             self.log.notice(truth.tick, NoticeSource.TRAFFIC, text)
@@ -237,6 +242,13 @@ class Log(Sink):
         if action.relocate is not None and action.relocate.moved is not None:
             m = action.relocate.moved
             self.log.relocated(Relocation(truth.tick, m.reason, m.shift, m.old, m.new))
+
+    def _note_surface(self, tick: int, changes: FileChanges) -> None:
+        """Notes what the events of a file have laid on the road since the tick before."""
+        now = changes.outside.patches
+        last = self.laid[-1].surface if self.laid else None
+        if changes.serves_surface and now is not None and now != last:
+            self.laid.append(LaidSurface(tick, now))
 
 
 class DeskLog(Log):
@@ -411,6 +423,7 @@ class OpenRun:
             None if stage.player is None else stage.player.played,
             None if self.recorder is None else self.recorder.finish(),
             stage.setup.patches,
+            tuple(self.log.laid),
         )
 
     def _begin(self) -> Stepper | None:

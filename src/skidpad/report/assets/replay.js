@@ -1,5 +1,5 @@
 // Top-down replays. Data: {dt, unit, lanes: [[x, y, ...]], walls: [[x, y, ...]], size: [[length, width]],
-// patches: [[kind, [x, y, ...]]] where something lies on the road,
+// patches: [[kind, [x, y, ...], from, to]] where something lies on the road, and when if events lay it,
 // ego: index, t0, mark: frame of the event, label: what it is called, frames: [[x, y, yaw_mrad, ...per actor]],
 // points: [[x, y, ...]] per frame, of a lidar}; coordinates are integers in `unit` metres; an actor that is absent
 // has null. With pictures, an array of one per frame, these are shown instead.
@@ -53,7 +53,8 @@ for (const figure of document.querySelectorAll(".replay")) {
       const back = []; for (let j = right.length - 2; j >= 0; j -= 2) back.push(right[j], right[j + 1]);
       fill([...left, ...back], "#1d252e");
     });
-    for (const [kind, points] of data.patches ?? []) fill(points, SURFACES[kind]);
+    const now = data.t0 + k * data.dt + 1e-6;
+    for (const [kind, points, from = 0, to = Infinity] of data.patches ?? []) if (from <= now && now < to) fill(points, SURFACES[kind]);
     c.setLineDash([3, 2]); for (const lane of data.lanes) line(lane, "#5b6875", .15); c.setLineDash([]);
     for (const wall of data.walls ?? []) line(wall, "#8996a3", .3);
     const way = []; for (let i = 0; i <= k; i++) way.push(data.frames[i][e], data.frames[i][e + 1]);

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
 from skidpad.core.environment.surface import SurfacePatch
+from skidpad.core.setup import DT
 from skidpad.recording.run.log import RunLog
+from skidpad.recording.run.surfaces import LaidSurface
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.surface_outlines import outline_patches
@@ -32,6 +34,7 @@ def replay(
     before_s: float = BEFORE_S,
     after_s: float = AFTER_S,
     surface: Sequence[SurfacePatch] = (),
+    laid: Sequence[LaidSurface] = (),
 ) -> dict[str, Any]:
     """Returns the s around tick row `row` for the page's script, centred on the ego's place there.
 
@@ -41,7 +44,7 @@ def replay(
     stride = max(round(STEP_S / dt), 1)
     first = max(row - round(before_s / dt) // stride * stride, row % stride)
     rows = np.arange(first, min(row + round(after_s / dt), len(log) - 1) + 1, stride)
-    return _cut_log(log, road_map, rows, row, np.array([row]), surface)
+    return _cut_log(log, road_map, rows, row, np.array([row]), surface, laid)
 
 
 def replay_run(
@@ -49,6 +52,7 @@ def replay_run(
     road_map: RoadMap,
     mark: int | None = None,
     surface: Sequence[SurfacePatch] = (),
+    laid: Sequence[LaidSurface] = (),
 ) -> dict[str, Any]:
     """Returns a whole run for the page's script, with FRAMES frames at most, lanes along its way.
 
@@ -56,7 +60,7 @@ def replay_run(
     """
     stride = max(round(STEP_S / log.header.dt), -(-len(log) // FRAMES))
     rows = np.arange(0, len(log), stride)
-    return _cut_log(log, road_map, rows, mark, rows, surface)
+    return _cut_log(log, road_map, rows, mark, rows, surface, laid)
 
 
 def replay_stretch(
@@ -82,6 +86,7 @@ def _cut_log(
     mark: int | None,
     stops: NDArray[np.int64],
     surface: Sequence[SurfacePatch],
+    laid: Sequence[LaidSurface] = (),
 ) -> dict[str, Any]:
     """Returns these rows of a log for the page's script, lanes and barriers near the places in `stops`.
 
@@ -108,7 +113,7 @@ def _cut_log(
         "frames": frames,
         "lanes": lane_borders(road_map, way),
         "walls": barriers(road_map, way),
-        **patches(road_map, surface, way),
+        **patches(road_map, surface, way, laid, log.header.dt),
     }
 
 
@@ -175,14 +180,26 @@ def barriers(road_map: RoadMap, way: Floats) -> list[list[int]]:
     return stretches
 
 
-def patches(road_map: RoadMap, surface: Sequence[SurfacePatch], way: Floats) -> dict[str, Any]:
+def patches(
+    road_map: RoadMap,
+    surface: Sequence[SurfacePatch],
+    way: Floats,
+    laid: Sequence[LaidSurface] = (),
+    dt: float = DT,
+) -> dict[str, Any]:
     """Returns what lies on the road within reach of a way (n, 3); nothing without a surface.
 
-    `patches` holds [kind, [x, y, ...]] of each polygon, from the way's first place.
+    `patches` holds [kind, [x, y, ...]] of each polygon, from the way's first place; where events have
+    `laid` others, also from and to when it lies there, s.
     """
-    found = [
-        [outline.kind, _whole(outline.corners[:, :2] - way[0, :2])]
-        for outline in outline_patches(road_map, surface)
-        if _near(outline.corners, way).any() or _near(outline.corners.mean(axis=0)[None], way)[0]
-    ]
+    starts = [0.0, *(one.tick * dt for one in laid)]
+    found: list[list[Any]] = []
+    for k, lying in enumerate([surface, *(one.surface for one in laid)]):
+        times = [round(t, 3) for t in starts[k : k + 2]] if laid else []
+        found += [
+            [outline.kind, _whole(outline.corners[:, :2] - way[0, :2]), *times]
+            for outline in outline_patches(road_map, lying)
+            if _near(outline.corners, way).any()
+            or _near(outline.corners.mean(axis=0)[None], way)[0]
+        ]
     return {"patches": found} if found else {}

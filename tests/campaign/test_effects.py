@@ -90,6 +90,12 @@ def test_what_is_not_read_says_so_and_never_0(stack, arm, note):
     assert found.note == note
 
 
+def test_a_sensor_through_which_another_effect_acts_is_read():
+    same, moved = [(0, 60.0, "h")], [(0, 50.0, "g")]
+    found = compare_effects(rows("mine:Stack", none=same, lidar=moved, window=same, radar=same))
+    assert [result.note for result in found] == ["", NO_CHANGE, NOT_READ]
+
+
 def test_the_command_prints_a_table_and_writes_its_rows(tmp_path):
     out = tmp_path / "rows.csv"
     call = ["effects", "--effect", "lidar", "--effect", "wind", "--seeds", "1", "--duration", "2"]

@@ -118,15 +118,19 @@ class Result:
     interventions: Comparison
     speed: Comparison  # km/h
     changed: int  # of the pairs, drives that differ at all
+    is_read: bool  # the sensor through which the effect acts; true for one that needs none
 
     @property
     def note(self) -> str:
         """Returns why no drive changed: the stack does not read the sensor, or nothing did; "" if one did."""
         if self.changed:
             return ""
-        sensor = EFFECTS[self.effect].sensor if self.effect in EFFECTS else ""
-        is_read = sensor in READS.get(self.stack, ())
-        return NOT_READ if sensor and not is_read else NO_CHANGE
+        return NO_CHANGE if self.is_read else NOT_READ
+
+
+def sensor_of(arm: str) -> str:
+    """Returns the sensor through which alone an arm acts; "" for an arm that needs none."""
+    return EFFECTS[arm].sensor if arm in EFFECTS else ""
 
 
 def settings_of_arm(arm: str) -> dict[str, Any]:
@@ -215,28 +219,28 @@ def drive_effects(
 
 def compare_effects(rows: pl.DataFrame) -> list[Result]:
     """Returns each arm compared with none, pair by pair of equal seeds; rows: of one stack and weather."""
-    order = rows["arm"].unique(maintain_order=True).to_list()
-    base = rows.filter(pl.col("arm") == NONE).sort("seed")
+    arms = [arm for arm in rows["arm"].unique(maintain_order=True).to_list() if arm != NONE]
+    by_arm = {arm: rows.filter(pl.col("arm") == arm).sort("seed") for arm in (NONE, *arms)}
+    base, stack = by_arm[NONE], rows["stack"][0]
+    changed = {arm: int((by_arm[arm]["log_hash"] != base["log_hash"]).sum()) for arm in arms}
+    # a sensor through which one effect acts is read by the stack, whatever the others do
+    read = {"", *READS.get(stack, ()), *(sensor_of(arm) for arm in arms if changed[arm])}
     found = []
-    for arm in order:
-        if arm == NONE:
-            continue
-        these = rows.filter(pl.col("arm") == arm).sort("seed")
-        differences = {
-            name: (these[name] - base[name]).to_numpy().astype(float)
+    for arm in arms:
+        pairs = {
+            name: compare_pairs((by_arm[arm][name] - base[name]).to_numpy().astype(float))
             for name in ("interventions", "mean_speed_kmh")
         }
         title = "all together" if arm == ALL else EFFECTS[arm].title
-        changed = int((these["log_hash"] != base["log_hash"]).sum())
-        pairs = {name: compare_pairs(values) for name, values in differences.items()}
         found.append(
             Result(
-                these["stack"][0],
+                stack,
                 arm,
                 title,
                 pairs["interventions"],
                 pairs["mean_speed_kmh"],
-                changed,
+                changed[arm],
+                sensor_of(arm) in read,
             )
         )
     return found

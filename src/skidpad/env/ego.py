@@ -48,7 +48,7 @@ class EgoEpisode:
     @property
     def t(self) -> float:
         """Returns the time of the present tick, s."""
-        return self.run.tick * self.run.stage.setup.dt
+        return self.world.tick * self.run.stage.setup.dt
 
     def restart(self) -> None:
         """Goes back to the first tick."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -21,7 +22,7 @@ from skidpad.sensors.physical_radar.radar import PhysicalRadar
 from skidpad.sensors.suite import PixelSettings, PixelSuite
 
 NO_IMAGES: Mapping[str, CameraImage] = {}
-NO_SEGMENTS: Mapping[str, Segments] = {}
+NO_SEGMENTS: Mapping[str, Segments] = MappingProxyType({})
 
 
 class CameraRadarReadings(NamedTuple):
@@ -32,6 +33,9 @@ class CameraRadarReadings(NamedTuple):
     radar: RadarPoints
     radar_objects: RadarObjects | None = None
     radar_tracks: RadarTracks | None = None
+
+
+NO_READINGS = CameraRadarReadings(NO_IMAGES, NO_SEGMENTS, RadarPoints.none())
 
 
 class Sensing(Protocol):
@@ -106,6 +110,7 @@ class Objects:
             weather=setup.weather if physical else None,
             lanes=map.held,
         )
+        self.is_blind = not (self.suite.cameras or self.suite.antennas)
 
     def read(
         self,
@@ -116,6 +121,8 @@ class Objects:
     ) -> CameraRadarReadings:
         """Segments of the depth cameras; lights and lamps play no part at this level."""
         del lights, braking
+        if self.is_blind:
+            return NO_READINGS
         return CameraRadarReadings(NO_IMAGES, *self.suite.read(tick, states))
 
     def change(self, outside: Outside) -> None:

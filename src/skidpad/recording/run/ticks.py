@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from math import nan
 from operator import attrgetter
+from struct import Struct
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,6 +39,7 @@ read_report = attrgetter(*REPORT_FIELDS)
 NO_REPORT = (None,) * len(REPORT_FIELDS)
 N_EGO, N_COMMAND, N_REPORT = len(EgoSeries._fields), len(CommandSeries._fields), len(REPORT_FIELDS)
 N_ROW = N_EGO + 2 * N_COMMAND + N_REPORT
+TICK, ROW = Struct("3q"), Struct(f"{N_ROW}d")  # a row of each array
 GROWTH = 2
 
 
@@ -109,15 +112,18 @@ class TickLog:
         k = self._n
         if k == len(self._tick):
             self._grow()
-        self._tick[k] = (truth.tick, supervision, self._weather)
+        TICK.pack_into(self._tick.data, k * TICK.size, truth.tick, supervision, self._weather)
         ego = frame.ego
-        self._row[k] = (
+        told = NO_REPORT if report is None else read_report(report)
+        ROW.pack_into(
+            self._row.data,
+            k * ROW.size,
             *(ego.pose.x, ego.pose.y, ego.pose.yaw),
             *(ego.speed, ego.yaw_rate, ego.ax, ego.ay, ego.gear),
             *truth.commands[0].tolist(),
             *(command.throttle, command.brake, command.steer),
             *(command.handbrake, command.reverse),
-            *(NO_REPORT if report is None else read_report(report)),
+            *[nan if value is None else value for value in told],
         )
         if truth.states is not self._states:
             self._states, self._held = truth.states, hold(truth.states)

@@ -16,7 +16,7 @@ from skidpad.core.inputs import Outside
 from skidpad.core.maths.randomness import stream, stream_key
 from skidpad.core.setup import ActorCommand, Setup
 from skidpad.core.states import EgoEstimate, VehicleCommand, WorldTruth
-from skidpad.core.vocabulary import Supervision
+from skidpad.core.vocabulary import SensorLevel, Supervision
 from skidpad.physics.fleet import shown_gear
 from skidpad.physics.grip import road_of
 from skidpad.roads.queries import RoadMap
@@ -27,6 +27,7 @@ from skidpad.simulation.world.stage import build_world, patches_of
 from skidpad.simulation.world.world import EGO, World
 
 REVERSE = 4  # column of the commands
+UNLIT = np.zeros(0, dtype=np.bool_)  # brake lamps where no sensor sees any
 
 
 class EmbeddedBackend:
@@ -61,6 +62,7 @@ class EmbeddedBackend:
         self._outside: Outside | None = None  # as told last
         self.sensing = sensing_of(self.map, self.world.table, setup, seed, self.poison)
         self._asked = self._make_asked() if setup.asked else None
+        self._sees_lamps = setup.level is SensorLevel.PIXELS or bool(setup.asked)
         return self._frame()
 
     def step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand] = ()) -> Frame:
@@ -139,9 +141,11 @@ class EmbeddedBackend:
         states = w.states
         if self._unseen is not None:
             states = states._replace(present=states.present & ~self._unseen)
-        lights, braking = w.lights.by_id, w.braking()
-        for row, lit in self._brake_lamps:
-            braking[row] = lit
+        lights, braking = w.lights.by_id, UNLIT
+        if self._sees_lamps:
+            braking = w.braking()
+            for row, lit in self._brake_lamps:
+                braking[row] = lit
         seen = self.sensing.read(w.tick, states, lights, braking)
         extra = {} if asked is None else asked.read(w.tick, states, seen.images, lights, braking)
         return SensorFrame(

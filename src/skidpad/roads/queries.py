@@ -135,6 +135,10 @@ class RoadMap:
         """
         return self._make_point(*entries.project(self.held, float(x), float(y), float(z), driving))
 
+    def name_of(self, lane: int) -> tuple[int, int]:
+        """Returns the ids of road and lane of a lane, given by its index."""
+        return self._names[lane]
+
     def _make_point(self, lane: int, s: float, offset: float, *place: float) -> LanePoint | None:
         """Returns the point of a kernel's answer, None for lane -1.
 

@@ -252,11 +252,10 @@ class Actor:
             return self._place_command(t + dt, dt)
         if self.track is not None:
             demand = track_demand(self.track, self.motion, t, dt, self.centre)
+            command = self.driver.command(self.motion, demand)
         else:
-            demand = self.guide.demand(self.motion)
-        return ActorCommand(
-            self.name, command=self.overridden(self.driver.command(self.motion, demand))
-        )
+            command = self.guide.command(self.motion, self.driver)
+        return ActorCommand(self.name, None, None, self.overridden(command))
 
     def overridden(self, command: VehicleCommand) -> VehicleCommand:
         """Returns what a driver does, with the inputs that the file works itself."""

@@ -81,7 +81,7 @@ class ActorDriver:
     def __init__(self, kind: str, skill: float = 1.0) -> None:
         t = vehicle_type(kind)
         self.type = t
-        self._hands = hold(
+        self.hands = hold(
             Hands(
                 speed_gain=SPEED_GAIN * skill,
                 omega=OMEGA * skill,
@@ -104,7 +104,7 @@ class ActorDriver:
             return self._backwards(motion, d)
         return VehicleCommand(
             *drive_forwards(
-                self._hands, motion.yaw, motion.vx, motion.vy, d.v, d.a, d.curvature, d.error,
+                self.hands, motion.yaw, motion.vx, motion.vy, d.v, d.a, d.curvature, d.error,
                 d.error_rate, d.a_lateral,
             )
         )  # fmt: skip
@@ -115,7 +115,7 @@ class ActorDriver:
         Over the way driven the offset obeys e'' = -2 (e + L e') / L^2, as in pure pursuit.
         """
         v, look = abs(motion.speed), max(LOOK_BACK, LOOK_BACK_TIME * abs(motion.speed))
-        throttle, brake = press_pedals(self._hands, -motion.speed, -d.v, -d.a)
+        throttle, brake = press_pedals(self.hands, -motion.speed, -d.v, -d.a)
         slope = d.error_rate / max(v, V_STANDING)
         kappa = d.curvature - 2.0 * (d.error + look * slope) / (look * look)
         angle = atan(self.type.wheelbase * kappa)

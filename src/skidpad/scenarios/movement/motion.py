@@ -7,9 +7,11 @@ from enum import Enum
 from math import atan2, copysign, cos, hypot, pi, sin, sqrt
 
 from skidpad.core.geometry import Pose, wrap_angle
+from skidpad.core.states import VehicleCommand
 from skidpad.roads.queries import LanePoint
+from skidpad.scenarios.movement.following import Followed, follow_lane
 from skidpad.scenarios.movement.network import Network, Place
-from skidpad.simulation.scripted import Demand, Motion
+from skidpad.simulation.scripted import ActorDriver, Demand, Motion
 
 SLOW = 1e-6  # m/s, nothing moves
 REACHED = 1e-6  # m from the end of a road, which is the end
@@ -82,7 +84,8 @@ class Guide:
 
     def __init__(self, network: Network, place: Place, v: float) -> None:
         point, pose = place.lane, place.pose
-        self.network, self.base = network, point
+        self.network, self._base = network, point
+        self._followed: Followed | None = None  # the answer of this tick, whose point is the base
         self.free = pose  # where there is no lane: straight on
         self.v, self.a = v, 0.0
         self.dv = self.da = 0.0  # of a disturbance, on top of v and a
@@ -97,6 +100,22 @@ class Guide:
         look = 0.0 if point is None else wrap_angle(pose.yaw - point.heading)
         self.along = 1.0 if abs(look) <= pi / 2.0 else -1.0
         self.turn = look if self.along > 0.0 else wrap_angle(look - pi)
+
+    @property
+    def base(self) -> LanePoint | None:
+        """The reference point on the lane's centre, made when it is asked for; None without a lane."""
+        if self._followed is not None:
+            lane, s, offset, x, y, z, heading, curvature, width, *_ = self._followed
+            road, lane_id = self.network.map.name_of(lane)
+            self.base = LanePoint(
+                lane, s, x, y, z, heading, curvature, width, road, lane_id, offset
+            )
+        return self._base
+
+    @base.setter
+    def base(self, point: LanePoint | None) -> None:
+        """Sets the reference point."""
+        self._base, self._followed = point, None
 
     @property
     def v_now(self) -> float:
@@ -160,6 +179,29 @@ class Guide:
             a_lateral=self.along * self.offset_bend,
             reverse=self.v < 0.0,
         )
+
+    def command(self, motion: Motion, driver: ActorDriver) -> VehicleCommand:
+        """Moves the reference point abreast of an actor, and returns what its driver does.
+
+        By one kernel, without the reference point as an object, where it goes forwards without a route.
+        """
+        network, before, base = self.network, self._followed, self._base
+        if base is None or self.v < 0.0 or self.roads or network.even_forks:
+            return driver.command(motion, self.demand(motion))
+        if before is None:
+            lane, s, x, y = base.lane, base.s, base.x, base.y
+            heading, curvature = base.heading, base.curvature
+        else:
+            lane, s, _, x, y, _, heading, curvature, _, _, _, _ = before
+        found = follow_lane(
+            network.map.held, driver.hands, lane, s, x, y, heading, curvature,
+            motion.x, motion.y, motion.yaw, motion.vx, motion.vy, self.v + self.dv,
+            self.a + self.da, self.along, self.offset, self.offset_rate, self.offset_bend,
+        )  # fmt: skip
+        self.at_end = found[0] < 0
+        if not self.at_end:
+            self._followed = found
+        return VehicleCommand(found[9], found[10], found[11])
 
     def ideal(self, dt: float) -> Pose:
         """Moves on by dt s exactly as demanded and returns the pose there.

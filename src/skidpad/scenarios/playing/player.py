@@ -259,9 +259,9 @@ def pilot(scene: Scene, actor: Actor, controller: Controlling) -> VehicleCommand
         return asked
     if actor.track is not None:
         demand = track_demand(actor.track, actor.motion, scene.t, scene.dt, actor.centre)
+        own = actor.driver.command(actor.motion, demand)
     else:
-        demand = actor.guide.demand(actor.motion)
-    own = actor.driver.command(actor.motion, demand)
+        own = actor.guide.command(actor.motion, actor.driver)
     if paces:
         return replace(asked, steer=own.steer)
     return replace(own, steer=asked.steer) if steers else own

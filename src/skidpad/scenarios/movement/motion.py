@@ -114,7 +114,7 @@ class Guide:
 
     @base.setter
     def base(self, point: LanePoint | None) -> None:
-        """Sets the reference point."""
+        """Sets the reference point; None: there is no lane."""
         self._base, self._followed = point, None
 
     @property

@@ -14,8 +14,10 @@ from skidpad.core.vocabulary import ActorKind
 from skidpad.core.weather import Weather
 from skidpad.physics import camera
 from skidpad.physics.droplets import rain_drops
+from skidpad.physics.grip import road_surface
 from skidpad.physics.optics import CONTRAST_SEEN, sight
 from skidpad.physics.presets import preset
+from skidpad.physics.spray import spray_density
 from skidpad.sensors.pictures.exposure import DARKEST, LUMA, expose, exposure_of
 from skidpad.sensors.pictures.lens import cover_glass, glass_of
 from skidpad.sensors.pictures.lighting import lighting
@@ -206,3 +208,51 @@ def test_a_picture_at_dusk_is_darker_only_where_the_camera_ends():
     grey = [brightness(Weather(sun_altitude_deg=h), exposed) for h in (60.0, 5.0, -4.0, -14.0)]
     assert grey[1] == pytest.approx(grey[0], rel=0.25)
     assert grey[3] < 0.7 * min(grey[:3])
+
+
+SPRAY = CameraOptics(spray=True)
+FLOOD = Weather(precipitation=100.0, wetness=100.0, precipitation_deposits=60.0)
+
+
+def behind_a_lorry(weather, speed, optics=SPRAY, rows=None, gap=20.0):
+    """Linear light of a picture in whose middle is a lorry's rear, and the table of its vehicles."""
+    table = table_of([ActorKind.TRUCK])
+    ahead = 50.0 + gap + 0.5 * table.length[1]
+    states = states_at([(50, -7, 0, 0.0), (ahead, -7, 0, 0.0)])
+    states.vx[:] = speed
+    settings = PixelSettings(camera_effect=False, optics=optics)
+    suite = PixelSuite(straight(400, rails=False), table, [EYE], weather, settings)
+    suite.observe(0, states, {})
+    return (suite.render("eye", rows).rgb.copy() / 255.0) ** 2, table
+
+
+@pytest.mark.parametrize("speed", [20.0, 30.0])
+def test_spray_leaves_of_contrast_what_steps_through_it_leave(speed):
+    """Along the axis, in the lane's middle, through 20 m of a cloud that thins out with the distance."""
+    plain, table = behind_a_lorry(FLOOD, speed, CameraOptics())
+    veiled, _ = behind_a_lorry(FLOOD, speed)
+    film = road_surface(FLOOD).film_mm / 1000.0
+    first = spray_density(film, speed, float(table.width[1]), float(table.height[1]))
+    steps = (np.arange(2000) + 0.5) / 2000 * 20.0
+    left = np.prod(camera.spray_transmission(1.0, 0.01) ** (first * np.exp(-steps / speed)))
+    horizon = lighting(FLOOD).horizon
+    row, column = 150, 200
+    through = (veiled[row, column] - horizon) / (plain[row, column] - horizon)
+    assert through == pytest.approx(left, abs=STEP)
+    assert left < 0.9
+
+
+def test_spray_is_drawn_behind_fast_vehicles_on_wet_road_alone():
+    for weather, speed in ((FLOOD, 10.0), (Weather(), 30.0)):
+        assert np.array_equal(
+            *(behind_a_lorry(weather, speed, o)[0] for o in (SPRAY, CameraOptics()))
+        )
+    # from 70 m the eye is behind the cloud, which reaches 54 m
+    veiled, plain = (behind_a_lorry(FLOOD, 30.0, o, gap=70.0)[0] for o in (SPRAY, CameraOptics()))
+    changed = (veiled != plain).any(axis=2)
+    assert changed[120:180, 190:210].any()
+    assert not changed[:60].any()
+    assert not changed[:, :40].any()
+    rows = range(140, 170)
+    part = behind_a_lorry(FLOOD, 30.0, rows=rows)[0]
+    assert np.array_equal(part[140:170], behind_a_lorry(FLOOD, 30.0)[0][140:170])

@@ -269,7 +269,7 @@ def pictures(settings: Settings, weather: str, *ids: str) -> list[bytes]:
     return found
 
 
-def picture_while_driving(settings: Settings) -> bytes:
+def picture_while_driving(settings: Settings, camera: str = "rgb_front") -> bytes:
     """What a camera shows after half a second at speed in rain."""
     ready = cell(settings, "rain-noon", sensors=SensorLevel.PIXELS)
     setup = stage_of(ready).setup
@@ -277,7 +277,7 @@ def picture_while_driving(settings: Settings) -> bytes:
     backend.reset(replace(setup, ego=replace(setup.ego, speed=25.0)), ready.seed)
     for _ in range(9):
         backend.step(VehicleCommand(throttle=0.5))
-    rgb = backend.step(VehicleCommand(throttle=0.5)).images["rgb_front"].rgb
+    rgb = backend.step(VehicleCommand(throttle=0.5)).images[camera].rgb
     found = np.ascontiguousarray(rgb).tobytes()
     backend.close()
     return found
@@ -383,6 +383,7 @@ OTHERS: dict[str, Scenario] = {
     "camera_haze": Scenario(True, lambda s: pictures(s, "rain-noon", "rgb_front")),
     "camera_exposure": Scenario(True, lambda s: pictures(s, "rain-noon", "rgb_front")),
     "camera_drops": Scenario(True, picture_while_driving),
+    "camera_spray": Scenario(True, lambda s: picture_while_driving(s, "rgb_rear")),
     "night_rain": Scenario("rain_only", lambda s: pictures(s, "rain-night", "rgb_front")),
     "headways": Scenario("field", short_drive("clear-noon")),
     "drivers": Scenario(False, short_drive("rain-noon")),

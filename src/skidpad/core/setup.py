@@ -95,6 +95,7 @@ class CameraOptics:
 
     haze: bool = False  # contrast by visibility
     drops: bool = False  # of rain on the glass
+    spray: bool = False  # behind vehicles on wet road
     exposure: bool = False  # by daylight, within a camera's limits
 
 

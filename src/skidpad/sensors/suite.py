@@ -18,7 +18,7 @@ from skidpad.core.specs import CameraSpec, Modality, RadarSpec, SensorSpec
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import Bodywork, LightState, RangeModel
 from skidpad.core.weather import Weather
-from skidpad.physics.grip import rain_rate
+from skidpad.physics.grip import rain_rate, road_surface
 from skidpad.physics.optics import depth_range, label_range, radar_range
 from skidpad.sensors.finish.extras import NO_EXTRAS, Extra
 from skidpad.sensors.finish.finish import Finish
@@ -29,7 +29,9 @@ from skidpad.sensors.pictures.lens import LensDrops
 from skidpad.sensors.pictures.lighting import lighting
 from skidpad.sensors.pictures.perception_noise import PerceptionNoise
 from skidpad.sensors.pictures.shading import Shading
+from skidpad.sensors.pictures.spray import veil_by_spray
 from skidpad.sensors.ranging.beam import beam_of
+from skidpad.sensors.ranging.clouds import SprayClouds
 from skidpad.sensors.ranging.radar import Radar
 from skidpad.sensors.raster.live_scene import LiveScene, SceneMap
 from skidpad.sensors.raster.passes import NOTHING, UNLIMITED, Pass, Sight, poison
@@ -145,6 +147,10 @@ class PixelSuite:
         if settings.optics.drops:
             rain = rain_rate(weather)
             self._drops = {id: LensDrops(self.cameras[id], seed, rain, dt) for id in self._rgb}
+        self._spray: SprayClouds | None = None
+        if settings.optics.spray:
+            self._spray = SprayClouds(self._table, road_surface(weather).film_mm / 1000.0)
+        self._clouds = np.empty((0, 8))
         self.radars = [
             Radar(s, beam_of(s, seed, dt), radar_range(weather, s.range) if limited else s.range)
             for s in self._specs
@@ -180,6 +186,8 @@ class PixelSuite:
         speed = float(np.hypot(states.vx[EGO], states.vy[EGO]))
         for drops in self._drops.values():
             drops.move(tick, speed)
+        if self._spray is not None:
+            self._clouds = self._spray.at(states)
         for one in self._passes.values():
             one.drawn = NOTHING
             if self.settings.poison_old:
@@ -231,6 +239,8 @@ class PixelSuite:
         if self.settings.extras:
             own = self.cameras[id].shows_own_body
             self._finish.add(self.settings.extras, view, own, one, packed)
+        if len(self._clouds):
+            veil_by_spray(view, self._clouds, one.inverse, self.shading.light.horizon, packed)
         if id in self._drops:
             self._drops[id].draw(view, self.shading.light, packed)
         if id in self._degraded:

@@ -331,6 +331,7 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
         camera_optics=CameraOptics(
             haze=sensors.camera_haze,
             drops=sensors.camera_drops,
+            spray=sensors.camera_spray,
             exposure=sensors.camera_exposure,
         ),
         rain_hides_night=sensors.night_rain is NightRain.RAIN_ONLY,

@@ -191,6 +191,9 @@ class SensorSettings(SettingsPart):
         "M-4, T-11",
         "drops of rain on the glass before RGB cameras, between strokes of a wiper",
     )
+    camera_spray: bool = setting_field(
+        False, "M-4, T-11", "spray behind fast vehicles on wet road, in RGB images"
+    )
     night_rain: NightRain = setting_field(
         NightRain.BOTH, "D-094", "camera effects of rain at night"
     )

@@ -49,6 +49,9 @@ OFF_ROAD_TIME = 1.0  # s with all wheels off every lane (decision R-6)
 OFF_ROAD_LIMIT = 3.0  # m that the car's middle lies beyond the road's edge
 MARGIN = 0.3  # m around the ego's own box where it is put
 
+DRIVEN = (
+    Supervision.NONE
+)  # by the stack; a member looked up in its class takes longer than the test
 FULL_STOP = VehicleCommand(brake=1.0, handbrake=True)
 HELD = VehicleCommand(brake=1.0)
 ROLLING = VehicleCommand()
@@ -141,7 +144,7 @@ class Supervisor:
         self.truth = truth
         self.contacts_seen += len(truth.contacts)
         self.over |= 0 in truth.rolled
-        if self.phase is not Supervision.NONE:
+        if self.phase is not DRIVEN:
             if self.left == 0:
                 self._next_phase()
         elif truth.contacts and self.cool_down == 0:
@@ -159,21 +162,28 @@ class Supervisor:
         Counts the tick down; may begin a relocation of an ego that is stuck.
         """
         assert self.truth is not None, "observe() comes first"
-        self.cool_down, self.grace = max(self.cool_down - 1, 0), max(self.grace - 1, 0)
-        self.left = max(self.left - 1, 0)
-        states = self.truth.states
+        if self.cool_down:
+            self.cool_down -= 1
+        if self.grace:
+            self.grace -= 1
+        if self.left:
+            self.left -= 1
+        if self.phase is not DRIVEN:
+            return self._recover(self.truth.states)
+        if self._is_stuck(self.truth, report):
+            self._begin(Supervision.REALIGN, 0.0, RelocationReason.STUCK)
+            return self._realign(self.truth.states)
+        return Action(command)
+
+    def _recover(self, states: ActorStates) -> Action:
+        """Returns the action of a phase in which the supervisor drives."""
         if self.phase is Supervision.BRAKE:
             return Action(FULL_STOP)
         if self.phase is Supervision.REVERSE:
             return Action(self._reverse(states))
         if self.phase is Supervision.REALIGN:
             return self._realign(states)
-        if self.phase is Supervision.WARM_UP:
-            return self._warm_up(states)
-        if self._is_stuck(self.truth, report):
-            self._begin(Supervision.REALIGN, 0.0, RelocationReason.STUCK)
-            return self._realign(states)
-        return Action(command)
+        return self._warm_up(states)
 
     def _begin(self, phase: Supervision, duration: float, reason: RelocationReason) -> None:
         """Begins a phase that lasts `duration` in s and clears the counters."""
@@ -294,10 +304,11 @@ class Supervisor:
         lane, s, offset, turned, inside = find_ego(self.map.held, self._hold(states))
         if lane >= 0:
             self._last = lane, s, offset
-            self.first = self.first or self.map.at(lane, s, offset)
-            crossing = self.map.lanes.junction[lane] >= 0  # its lanes lead all ways
-            if turned < WRONG_WAY_DOT and not crossing:
-                return RelocationReason.WRONG_WAY  # more than 120 deg off (A-196, A-197)
+            if self.first is None:
+                self.first = self.map.at(lane, s, offset)
+            # more than 120 deg off (A-196, A-197); lanes of a crossing lead all ways
+            if turned < WRONG_WAY_DOT and self.map.lanes.junction[lane] < 0:
+                return RelocationReason.WRONG_WAY
         if inside or self._last is None:
             self.off = 0
             return None

@@ -397,7 +397,8 @@ class World:
             stages &= ~DECIDE
             for word in words:
                 self._obey(word)
-        self._feel_road()
+        if self.patches is not None or self.zones or self._zoned:
+            self._feel_road()
         if self.gusts is not None:
             self.air = self.gusts.advance(self.dt)
         self.notices, self.put_back, self.moved_on = (), (), ()

@@ -38,7 +38,10 @@ class AnyEntity:
 
     def probe(self) -> Probe:
         """Returns a function of the scene: whether the condition holds for any entity, or for all."""
-        return self._holds
+        if len(self.names) > 1:
+            return self._holds
+        (name,), holds = self.names, self.condition.holds
+        return lambda scene: scene.actors[name].present and holds(scene, name)
 
     def holding(self, scene: Scene) -> list[str]:
         """Returns the entities for which it holds now."""
@@ -83,22 +86,24 @@ class Watched:
 
     def __init__(self, timed: Timed, path: Path) -> None:
         self.timed, self.probe, self.path = timed, timed.condition.probe(), path
+        self.is_immediate = timed.edge is Edge.NONE and timed.delay <= 0.0
         self.said = False
         self.before: bool | None = None
         self.past: deque[tuple[float, bool]] = deque()
 
     def holds(self, scene: Scene) -> bool:
         """Returns the result of `delay` s ago; adds a change of it to the story. Once per step."""
-        result = self._result(scene)
+        result = bool(self.probe(scene))  # a value of NumPy would be neither True nor False
+        if not self.is_immediate:
+            result = self._at_edge(scene, result)
         if result is not self.said:
             self.said = result
             what = f"condition {self.timed.name} {'holds' if result else 'ends'}"
             scene.story.append(Happening(scene.t, self.path, what))
         return result
 
-    def _result(self, scene: Scene) -> bool:
-        """Returns whether the condition, with its edge applied, held `delay` seconds ago."""
-        now = bool(self.probe(scene))  # a value of NumPy would be neither True nor False
+    def _at_edge(self, scene: Scene, now: bool) -> bool:
+        """Returns whether the condition, with its edge applied, held `delay` seconds ago; now: it holds."""
         before, self.before = self.before, now
         edge = self.timed.edge
         if edge is not Edge.NONE:
@@ -118,9 +123,6 @@ class Watch:
     def __init__(self, trigger: Trigger, path: Path = ()) -> None:
         self.groups = [[Watched(c, path) for c in group] for group in trigger.groups]
         self.fired: list[list[Watched]] = []  # the groups that hold, when it was looked at last
-
-    def __bool__(self) -> bool:
-        return bool(self.groups)
 
     def fires(self, scene: Scene) -> bool:
         """Returns whether all conditions of any group hold; to be called once per step.

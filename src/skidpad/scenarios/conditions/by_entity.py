@@ -31,6 +31,9 @@ class Quantity(Enum):
     AT_END = "EndOfRoadCondition"
 
 
+TRAVELLED, STOOD = Quantity.TRAVELLED, Quantity.STOOD  # asked in every step
+
+
 @dataclass(frozen=True, slots=True)
 class Reaches:
     """A count of an entity is at least a value."""
@@ -41,21 +44,23 @@ class Reaches:
     def holds(self, scene: Scene, actor: str) -> bool:
         """Returns whether the count has reached the value now; before the first tick nothing has lasted."""
         a = scene.actors[actor]
-        if self.quantity is Quantity.OFF_ROAD:
+        quantity = self.quantity
+        if quantity is TRAVELLED:
+            return a.travelled >= max(self.value - SOME, 0.0)
+        if quantity is STOOD:
+            lasted = a.stood
+        elif quantity is Quantity.OFF_ROAD:
             lasted = time_off_road(a, scene.network, scene.t)
-        elif self.quantity is Quantity.AT_END:
-            lasted = time_past_road(a, scene.network, scene.t)
         else:
-            lasted = a.travelled if self.quantity is Quantity.TRAVELLED else a.stood
-        least = 0.0 if self.quantity is Quantity.TRAVELLED else SOME
-        return lasted >= max(self.value - SOME, least)
+            lasted = time_past_road(a, scene.network, scene.t)
+        return lasted >= max(self.value - SOME, SOME)
 
 
 def _reaches(node: Node, ctx: Context) -> EntityCondition:
     """Compiles a condition on the distance in m travelled, or on the duration in s of another quantity."""
     del ctx
     quantity = Quantity(node.tag)
-    name = "value" if quantity is Quantity.TRAVELLED else "duration"
+    name = "value" if quantity is TRAVELLED else "duration"
     return Reaches(quantity, node.number(name))
 
 

@@ -26,7 +26,8 @@ class SimulationTime:
 
     def probe(self) -> Probe:
         """Returns the function of a scene that compares its time in s with the value."""
-        return lambda scene: self.rule.is_met(scene.t)
+        is_met = self.rule.is_met
+        return lambda scene: is_met(scene.t)
 
 
 def _time(node: Node, ctx: Context) -> Condition:
@@ -95,7 +96,8 @@ class ElementState:
 
     def probe(self) -> Probe:
         """Returns a function of the scene: whether the element is in the state now."""
-        return lambda scene: scene.states.get(self.path, State.STANDBY) is self.state
+        path, state, before = self.path, self.state, State.STANDBY
+        return lambda scene: scene.states.get(path, before) is state
 
 
 @dataclass(frozen=True, slots=True)

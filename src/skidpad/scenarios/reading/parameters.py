@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Mapping
 
 from skidpad.core.errors import FileError
@@ -11,12 +12,12 @@ from skidpad.scenarios.reading.moments import moment
 
 NUMBERS = ("double", "integer", "int", "unsignedInt", "unsignedShort")
 RULES: Mapping[str, Callable[[float | str, float | str], bool]] = {
-    "equalTo": lambda a, b: a == b,
-    "notEqualTo": lambda a, b: a != b,
-    "greaterThan": lambda a, b: a > b,  # type: ignore[operator]
-    "lessThan": lambda a, b: a < b,  # type: ignore[operator]
-    "greaterOrEqual": lambda a, b: a >= b,  # type: ignore[operator]
-    "lessOrEqual": lambda a, b: a <= b,  # type: ignore[operator]
+    "equalTo": operator.eq,
+    "notEqualTo": operator.ne,
+    "greaterThan": operator.gt,
+    "lessThan": operator.lt,
+    "greaterOrEqual": operator.ge,
+    "lessOrEqual": operator.le,
 }
 
 

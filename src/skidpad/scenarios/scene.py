@@ -26,6 +26,7 @@ from skidpad.simulation.scripted import ActorDriver, Motion
 
 STANDING = 0.05, 1e-3  # m/s, of what drives on tyres, and of what is where the file says
 JUST = 1e-9  # s, what has begun to last
+PHYSICAL = ActorMode.PHYSICAL  # asked in every step
 TOUCHING = 0.05  # m, bodies that the physics keeps apart are this near
 Path = tuple[str, ...]
 
@@ -158,7 +159,7 @@ class Actor:
     @property
     def placed_by_file(self) -> bool:
         """Tells whether it is moved exactly as the scenario says, without physics."""
-        moved = self.driver is None or self.mode is not ActorMode.PHYSICAL
+        moved = self.driver is None or self.mode is not PHYSICAL
         return self.driven_by_file and self.piloted is None and moved
 
     @property
@@ -248,7 +249,7 @@ class Actor:
             return word
         if not self.present or not self.driven_by_file:
             return None
-        if self.driver is None or self.placed_by_file:
+        if self.driver is None or (self.mode is not PHYSICAL and self.piloted is None):
             return self._place_command(t + dt, dt)
         if self.track is not None:
             demand = track_demand(self.track, self.motion, t, dt, self.centre)
@@ -307,25 +308,28 @@ class Actor:
 
         z: of the ground, m, for an actor that the file does not place. dt: s since the tick before.
         """
-        placed, v, before = self.placed_by_file, self.v, self.motion
-        self.motion = motion
-        now = self.v
-        dt, self.seen = dt if self.seen else 0.0, True
+        placed, before, self.motion = self.placed_by_file, self.motion, motion
+        vx, vy, old_vx, old_vy = motion.vx, motion.vy, before.vx, before.vy
+        v, now = hypot(old_vx, old_vy), hypot(vx, vy)
         box = self.entity.box
-        was = self.pose
-        tilt = (was.z, was.roll, was.pitch) if placed else (z, 0.0, 0.0)
-        at = Pose(motion.x, motion.y, *tilt, motion.yaw)
+        if placed:
+            was = self.pose
+            at = Pose(motion.x, motion.y, was.z, was.roll, was.pitch, motion.yaw)
+        else:
+            at = Pose(motion.x, motion.y, z, 0.0, 0.0, motion.yaw)
         if box.forward or box.left:
             at = at.moved(forward=-box.forward, left=-box.left)
         self.pose = at
-        self.a, self.acceleration = 0.0, (0.0, 0.0)
-        if dt > 0.0:
-            self.a = (now - v) / dt
-            self.acceleration = (motion.vx - before.vx) / dt, (motion.vy - before.vy) / dt
+        if self.seen and dt > 0.0:
+            self.a, self.acceleration = (now - v) / dt, ((vx - old_vx) / dt, (vy - old_vy) / dt)
+        else:
+            self.a, self.acceleration, dt, self.seen = 0.0, (0.0, 0.0), 0.0, True
         self.travelled += now * dt
         self.stood = self.stood + dt if max(v, now) < STANDING[placed] else 0.0
-        waited = self.at_end + dt if self.at_end else JUST
-        self.at_end = waited if self.guide.at_end else 0.0
+        if self.guide.at_end:
+            self.at_end = self.at_end + dt if self.at_end else JUST
+        else:
+            self.at_end = 0.0
 
 
 class Flow(Protocol):
@@ -373,12 +377,15 @@ class Scene:
         s = truth.states
         x, y, z, yaw = s.x.tolist(), s.y.tolist(), s.z.tolist(), s.yaw.tolist()
         vx, vy = s.vx.tolist(), s.vy.tolist()
+        dt = self.dt
         for actor in self.actors.values():
             i = actor.row
-            actor.observe(Motion(x[i], y[i], yaw[i], vx[i], vy[i]), z[i], self.dt)
-            if actor.pose.pitch or actor.pose.roll:
-                self.tilts.append(Tilted(self.t, actor.name, actor.pose.pitch, actor.pose.roll))
-        self.contacts = {c.static or truth.table.names[c.actor] for c in truth.contacts}
+            actor.observe(Motion(x[i], y[i], yaw[i], vx[i], vy[i]), z[i], dt)
+            pose = actor.pose
+            if pose.pitch or pose.roll:
+                self.tilts.append(Tilted(self.t, actor.name, pose.pitch, pose.roll))
+        contacts, names = truth.contacts, truth.table.names
+        self.contacts = {c.static or names[c.actor] for c in contacts} if contacts else set()
 
     def between(self, a: str, b: str) -> Point:
         """Returns where b lies as seen from a: m forward, m left."""

@@ -72,7 +72,8 @@ def connect_at_begin(actors: Mapping[str, Actor]) -> None:
 def tractors_first(actors: Iterable[Actor]) -> list[Actor]:
     """Returns the actors in their order, but a trailer after the vehicle that tows it."""
     found = list(actors)
-    return sorted(found, key=_depth) if any(a.towed_by for a in found) else found
+    towed = [a for a in found if a.towed_by is not None]
+    return sorted(found, key=_depth) if towed else found
 
 
 def _depth(actor: Actor) -> int:

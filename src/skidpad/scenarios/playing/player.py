@@ -30,6 +30,7 @@ from skidpad.scenarios.trailers import connect_at_begin, tow_command, tractors_f
 from skidpad.simulation.scripted import ActorDriver, Motion
 
 DURATION_MAX = 3600.0  # s, for files that never end
+PHYSICAL = ActorMode.PHYSICAL  # asked in every step
 WAY_BACK = 1.0  # m, less is no reversing; assumption
 ASIDE = Place(Pose(0.0, 0.0))  # of what is not in the world yet
 
@@ -142,28 +143,30 @@ class Player:
         first = not self.actors
         if first:
             self._cast(truth)
-        self.scene.observe(truth)
-        for actor in self.actors.values():
-            go_on_after_track(actor, self.scenario.network)
+        scene, telling, actors = self.scene, self.telling, self.actors
+        scene.observe(truth)
+        for actor in actors.values():
+            if actor.v_after_track is not None:
+                go_on_after_track(actor, self.scenario.network)
         if first:
             self._begin()
         self.hit = self.hit or bool(truth.contacts)
-        ego = self.actors[self.scenario.ego]
-        self.way_back += max(-ego.motion.speed, 0.0) * self.scene.dt
-        if self.modes.get(ego.name, ActorMode.PHYSICAL) is None:
+        ego, dt, t = actors[self.scenario.ego], scene.dt, scene.t
+        self.way_back += max(-ego.motion.speed, 0.0) * dt
+        if self.modes.get(ego.name, PHYSICAL) is None:
             self.way.look(ego)
-        self.signals.step(self.scene)
-        self.telling.look(self.scene)
-        self.going = [action for action in self.going if not action.step(self.scene)]
-        self.telling.step(self.scene)
-        drive(self.scene)
-        control(self.scene)
+        self.signals.step(scene)
+        telling.look(scene)
+        if self.going:
+            self.going = [action for action in self.going if not action.step(scene)]
+        telling.step(scene)
+        drive(scene)
+        control(scene)
         if not first:  # so that a run may branch at its first tick with nothing drawn
-            self.disturbances.step(self.actors, self.scene.dt)
-        t = self.scene.t
+            self.disturbances.step(actors, dt)
         stopped = self.hit and self.end_on_collision
-        self.ended = self.telling.ended or stopped or t >= self.duration
-        commands = (self._command(a, t) for a in tractors_first(self.actors.values()))
+        self.ended = telling.ended or stopped or t >= self.duration
+        commands = [self._command(a, t) for a in tractors_first(actors.values())]
         return [c for c in commands if c is not None]
 
     def _command(self, actor: Actor, t: float) -> ActorCommand | None:

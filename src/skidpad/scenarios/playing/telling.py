@@ -49,10 +49,8 @@ class StatefulElement:
 
 def is_complete(elements: Iterable[StatefulElement]) -> bool:
     """Returns whether each of some elements is in the state COMPLETE."""
-    for element in elements:  # a generator for `all` takes twice as long, at several levels a step
-        if element.state is not COMPLETE:
-            return False
-    return True
+    # a list, as a generator for `all` takes twice as long, at several levels in every step
+    return not [element for element in elements if element.state is not COMPLETE]
 
 
 class ToldEvent(StatefulElement):

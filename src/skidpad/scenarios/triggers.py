@@ -129,14 +129,14 @@ class Watch:
 
         Every condition is looked at each time, so that delays and edges stay true.
         """
-        self.fired = []
+        self.fired = fired = []
         for group in self.groups:
             are_met = True
             for condition in group:
                 are_met = condition.holds(scene) and are_met
             if are_met:
-                self.fired.append(group)
-        return bool(self.fired)
+                fired.append(group)
+        return bool(fired)
 
     def triggering(self, scene: Scene) -> list[str]:
         """Returns the entities that made it fire just now."""

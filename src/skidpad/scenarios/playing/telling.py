@@ -47,12 +47,6 @@ class StatefulElement:
         return self.state is COMPLETE
 
 
-def is_complete(elements: Iterable[StatefulElement]) -> bool:
-    """Returns whether each of some elements is in the state COMPLETE."""
-    # a list, as a generator for `all` takes twice as long, at several levels in every step
-    return not [element for element in elements if element.state is not COMPLETE]
-
-
 class ToldEvent(StatefulElement):
     """An event of a run, with its actions under way."""
 
@@ -155,21 +149,16 @@ class ToldParent(StatefulElement):
             if isinstance(child, ToldParent):
                 child.start(scene)
 
-    def look(self, scene: Scene) -> None:
-        """Checks the triggers of the elements inside, while it is running."""
-        if self.state is RUNNING:
-            for child in self.children:
-                if isinstance(child, ToldParent):
-                    child.look(scene)
-
     def step(self, scene: Scene) -> None:
         """Steps the elements inside, and ends when all of them are complete."""
         if self.state is not RUNNING:
             return
         for child in self.children:
             child.step(scene)
-        if is_complete(self.children):
-            self.end(scene)
+        for child in self.children:
+            if child.state is not COMPLETE:
+                return
+        self.end(scene)
 
     def end(self, scene: Scene) -> None:
         """Sets the element complete, as all inside is complete."""
@@ -191,9 +180,7 @@ class ToldManoeuvre(ToldParent):
         super().__init__(manoeuvre.path, self.events)
 
     def look(self, scene: Scene) -> None:
-        """Launches every event that is due, while the manoeuvre is running."""
-        if self.state is not RUNNING:
-            return
+        """Launches every event that is due."""
         for event in self.events:
             if event.due(scene):
                 event.launch(scene, [e for e in self.events if e is not event])
@@ -238,7 +225,13 @@ class ToldAct(ToldParent):
             self.turn(scene, State.RUNNING, Move.START)
             for group in self.groups:
                 group.start(scene)
-        super().look(scene)
+        if self.state is not RUNNING:
+            return
+        for group in self.groups:
+            if group.state is RUNNING:
+                for manoeuvre in group.manoeuvres:
+                    if manoeuvre.state is RUNNING:
+                        manoeuvre.look(scene)
 
 
 class ToldStory(ToldParent):
@@ -280,11 +273,15 @@ class Telling:
         if self.halt.groups and self.halt.fires(scene):
             self.ended = True
         for story in self.stories:
-            story.look(scene)
+            if story.state is RUNNING:
+                for act in story.acts:
+                    act.look(scene)
 
     def step(self, scene: Scene) -> None:
         """Goes on with what is under way; `ended` when all acts are complete, where that ends it."""
         for story in self.stories:
             story.step(scene)
-        if self.ends and is_complete(self.acts):
-            self.ended = True
+        for act in self.acts if self.ends else ():
+            if act.state is not COMPLETE:
+                return
+        self.ended = self.ended or self.ends

@@ -99,13 +99,12 @@ EFFECTS: dict[str, Effect] = {
     ),
     "pictures": Effect("colour pictures", {"camera": True}, "pictures"),
     "lens": Effect(
-        "colour pictures with haze, exposure, spray and drops on the glass",
+        "colour pictures with haze, exposure and drops on the glass",
         {
             "camera": True,
             "camera_haze": True,
             "camera_exposure": True,
             "camera_drops": True,
-            "camera_spray": True,
         },
         "pictures",
     ),

@@ -99,6 +99,15 @@ def test_full_throttle_stays_below_the_limit_and_its_name_is_recorded():
     assert set(run.readings.table["envelope.binding"].to_list()) == {Binding.TABLE}
 
 
+@pytest.mark.parametrize(
+    ("weather", "kmh"), [("clear-noon", 50.0), ("rain-noon", 40.0), ("snow", 30.0)]
+)
+def test_a_table_has_a_speed_for_dry_rain_and_cold(weather, kmh):
+    run = governed_run(Straight, 25.0, weather, table_kmh=(50.0, 40.0, 30.0))
+    allowed = run.readings.table["envelope.speed_mps"].to_numpy() * 3.6
+    assert allowed == pytest.approx(np.full(len(allowed), kmh))
+
+
 def test_a_stack_of_ours_that_was_held_back_does_not_shoot_forward_when_released():
     """Its integral does not wind up: on release it accelerates no harder than from the same speed."""
     from skidpad.stack.adas import AdasStack

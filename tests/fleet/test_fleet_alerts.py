@@ -235,6 +235,14 @@ def test_a_webhook_goes_to_its_host_and_nowhere_else():
     assert not Webhook("red", good, ["127.0.0.1"]).wants("blue")
 
 
+def test_a_webhook_takes_no_way_that_the_environment_names(monkeypatch):
+    for name in ("HTTP_PROXY", "http_proxy", "ALL_PROXY"):
+        monkeypatch.setenv(name, "http://127.0.0.1:9")  # where nobody listens
+    with http_server(200) as (good, got):
+        Webhook("red", good, ["127.0.0.1"], 120.0).send({"id": "a"})
+        assert got == [{"id": "a"}]
+
+
 def test_two_webhooks_of_an_operator_on_one_host_get_every_alert(lite):
     with http_server(200) as (one, first), http_server(200) as (other, second):
         operator = lite.accounts["red operator"].principal.tenant

@@ -30,12 +30,14 @@ RADAR = {"radar_model": "physical"}
 TICKS = 20
 
 
-def calls(settings, *, lidar=False, vehicles=20):
+def calls(settings, *, lidar=False, vehicles=20, blind=False):
     """How often each Python function of the package is entered in TICKS ticks and reads of sensors."""
     values = load_profile("recommended", settings)
     spec = adas_run(2, settings=values, sensors=SensorLevel.OBJECTS, weather=RAIN, duration=10.0)
     setup = stage_of(spec).setup
     setup = replace(setup, traffic=replace(setup.traffic, vehicles=vehicles))
+    if blind:
+        setup = replace(setup, specs=())
     if lidar:
         setup = replace(setup, specs=(*setup.specs, LIDAR), asked=frozenset({"lidar"}))
     setup = replace(setup, ego=replace(setup.ego, speed=30.0))
@@ -79,3 +81,8 @@ def test_a_lidar_with_every_effect_adds_a_few_calls_a_tick_however_many_vehicles
     assert few == many
     added = sum(many.values()) - sum(calls(PHYSICAL, lidar=True).values())
     assert 0 < added <= 9 * TICKS  # the window's share, the clouds' places, one compiled call
+
+
+def test_a_run_without_sensors_enters_none():
+    assert calls({})
+    assert not calls({}, blind=True)

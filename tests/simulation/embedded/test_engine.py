@@ -60,6 +60,15 @@ def test_a_used_backend_repeats_what_a_fresh_one_does() -> None:
     assert first != trace(EmbeddedBackend(), SETUP, seed=4)
 
 
+def test_readings_without_sensors_are_empty_and_stay_so() -> None:
+    frame = EmbeddedBackend().reset(replace(ALONE, specs=()), 1)
+    assert not frame.images
+    assert not frame.segments
+    assert [(len(column), column.dtype) for column in frame.radar] == [(0, np.float32)] * 4
+    with pytest.raises(TypeError):
+        frame.segments["depth_roof"] = None  # type: ignore[index]
+
+
 @pytest.mark.req("X-8", "X-12")
 def test_another_process_gives_the_same_bytes() -> None:
     program = (

@@ -4,7 +4,7 @@
 // points: [[x, y, ...]] per frame, of a lidar}; coordinates are integers in `unit` metres; an actor that is absent
 // has null. With pictures, an array of one per frame, these are shown instead.
 // Data stands in the figure, or in skidpadReplays under the figure's id.
-const SURFACES = {water: "#1d4f7c", ice: "#7fb8c9", snow: "#aab4bd", friction: "#6b4a78"};
+const SURFACES = {water: "#1d4f7c", ice: "#3c6674", snow: "#65707a", friction: "#6b4a78"};
 for (const figure of document.querySelectorAll(".replay")) {
   const canvas = figure.querySelector("canvas"), own = figure.querySelector("script");
   const data = own ? JSON.parse(own.textContent) : window.skidpadReplays?.[figure.id];

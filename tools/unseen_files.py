@@ -150,7 +150,11 @@ def beside_esmini(
         return None
     states = {n: {t: s for t, s in e.items() if t <= END * 1000.0}
               for n, e in reference.entities.items()}  # fmt: skip
-    told = play_without_controllers(file, END, maps)
+    try:
+        told = play_without_controllers(file, END, maps)
+    except SkidpadError as error:
+        print(f"{file}: without controllers: {error}")
+        return None
     return deviations(told, replace(reference, entities=states))
 
 

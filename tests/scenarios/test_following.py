@@ -16,6 +16,7 @@ from skidpad.simulation.scripted import ActorDriver, Motion
 def test_the_kernel_answers_as_guide_and_driver_do_apart(name, against):
     map = load_map(name)
     network, driver = Network(map, name), ActorDriver("saloon", 1.1)
+    assert not network.even_forks  # the kernel goes straight on
     rng = np.random.default_rng(29)
     ends = 0
     for _ in range(200):
@@ -44,3 +45,8 @@ def test_the_kernel_answers_as_guide_and_driver_do_apart(name, against):
 
 def floats_of(values):
     return [float(value) for value in values]
+
+
+def test_a_lane_behind_which_nothing_is_drivable_is_no_fork(monkeypatch):
+    monkeypatch.setattr(Network, "_exits", lambda self, lane: [])
+    assert Network(load_map("town"), "town").even_forks == {}

@@ -114,8 +114,9 @@ laneId="-1" s="300"/></Position></Waypoint></Route>"""
     place = f"""<Position><Route><RouteRef>{route}</RouteRef><Position><LaneCoord pathS="60"
 laneId="-1"/></Position></Route></Position>"""
     there = EVENT.format("there", place, NEAR.format(41), "none")
-    row = played_file(tmp_path, there).of("other")[-1]
-    assert row.y == pytest.approx(-1.75, abs=0.01)
+    rows = played_file(tmp_path, there).of("other")
+    assert rows[-1].y == pytest.approx(-1.75, abs=0.01)
+    assert next(r for r in rows if r.y > -2.0).x == pytest.approx(160.0, abs=0.6)
 
 
 def test_two_cars_of_0_9_1_meet_at_their_places(tmp_path):

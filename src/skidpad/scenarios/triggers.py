@@ -38,7 +38,7 @@ class AnyEntity:
 
     def probe(self) -> Probe:
         """Returns a function of the scene: whether the condition holds for any entity, or for all."""
-        if len(self.names) > 1:
+        if len(self.names) != 1:
             return self._holds
         (name,), holds = self.names, self.condition.holds
         return lambda scene: scene.actors[name].present and holds(scene, name)

@@ -29,7 +29,7 @@ from skidpad.campaign.driving.snapshots import Snapshots
 from skidpad.campaign.runs.checkpoints import RunCheckpoint
 from skidpad.campaign.runs.state_files import CheckpointWriter
 from skidpad.campaign.takeover.desk import Desk, DeskBackend, DeskDriver, DeskScript, DeskSupervisor
-from skidpad.core.environment.surface import SurfacePatch
+from skidpad.core.environment.surface import SurfacePatch, present_patches
 from skidpad.core.errors import CheckpointError, StackError, require_choice
 from skidpad.core.run import (
     DriverSpec,
@@ -245,10 +245,12 @@ class Log(Sink):
 
     def _note_surface(self, tick: int, changes: FileChanges) -> None:
         """Notes what the events of a file have laid on the road since the tick before."""
-        now = changes.outside.patches
-        last = self.laid[-1].surface if self.laid else None
-        if changes.serves_surface and now is not None and now != last:
-            self.laid.append(LaidSurface(tick, now))
+        patches, last = changes.outside.patches, self.laid[-1].surface if self.laid else None
+        if not changes.serves_surface or patches is None:
+            return
+        there = present_patches(patches, changes.weather.air_temperature_c)
+        if there != last:
+            self.laid.append(LaidSurface(tick, there))
 
 
 class DeskLog(Log):

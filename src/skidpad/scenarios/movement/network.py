@@ -241,7 +241,9 @@ class Network:
         starts = self.map.arrays.next_start
         for lane in np.flatnonzero(np.diff(starts) > 1).tolist():
             turns = {following: self._turn(lane, following) for following in self._exits(lane)}
-            least = min(map(abs, turns.values()), default=0.0)
+            if not turns:  # nobody may drive on: the end of the road
+                continue
+            least = min(map(abs, turns.values()))
             even = [k for k, turn in turns.items() if abs(turn) < least + EVEN]
             if min(turns[k] for k in even) < -EVEN and max(turns[k] for k in even) > EVEN:
                 left_hand = (self.map.lanes.lane_id[lane] > 0) == self.forward(

@@ -175,6 +175,32 @@ def test_stale_frames_after_a_relocation_brake_nobody(stale, level):
         tick += 1
 
 
+# what a stack that was put elsewhere still knows, and what every tick writes anew
+KEPT = {
+    "lane", "s", "bend", "reference", "reference_s", "yaw_error", "kappa", "resume_ticks",
+    "in_curve", "past_curve",
+}  # fmt: skip
+RENEWED = {
+    "status", "distance", "bumper", "roof", "fused", "radar_pre", "radar_lane", "radar_velocity",
+    "radar_points",
+}  # fmt: skip
+
+
+def test_a_stack_that_was_put_elsewhere_remembers_no_more_than_a_new_one():
+    new, stack = stack_on(), stack_on()
+    names = set(stack.memory.dtype.names) - KEPT - RENEWED
+    for name in names:
+        stack.memory[name] = 3
+    stack._samples.fill(3.0)
+    stack._history.fill(3.0)
+    stack.relocated()
+    for name in names:
+        is_number = stack.memory.dtype[name].kind == "f"
+        assert np.array_equal(stack.memory[name], new.memory[name], equal_nan=is_number), name
+    assert np.array_equal(stack._samples, new._samples)
+    assert np.array_equal(stack._history, new._history)
+
+
 @pytest.mark.req("A-109", "A-195")
 def test_a_relocation_clears_everything_that_was_seen_and_summed():
     stack = stack_on(ArcMap(lights=((7, 0, 60.0),)))

@@ -79,6 +79,7 @@ def survivors_of(
     run(guard.test)
     if house == STACK:
         interpret(monkeypatch, [module_of(guard.test.partition("::")[0])])
+        run(guard.test)  # without a change it passes in Python, too
     changed = list(guard.values or mutants(value))
     if constant.endswith("_GAINS"):  # limits of the output are tested with the tiers
         changed = changed[:6]

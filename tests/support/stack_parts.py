@@ -206,7 +206,7 @@ def confirm(cameras, frame, distance):
         pairs = cameras.bumper, cameras.roof
         by = front.verify_runs(
             *(frame.segments[pair.depth_id] for pair in pairs), tuple(p.keep for p in pairs),
-            float(distance), 0.0, 0.0, np.empty((400, 2)),
+            float(distance), 0.0, 0.0, np.empty((max(len(frame.segments[p.depth_id].u) for p in pairs), 2)),
         )  # fmt: skip
     else:
         by = cameras.verify(frame, float(distance), 0.0, 0.0)
@@ -307,10 +307,15 @@ class Smoothing:
         return steering.smooth(self.m, self.rules, float(command))
 
 
-def read_radar(rules, points, at, map, on_highway, tracking=False):
-    """One measurement of the radar."""
-    m, kept = memory.new_memory()[0], np.empty(max(len(points.range), 1), np.int64)
-    found = radar.read_radar(m, rules, points, kept, tracking, at, map.arrays, on_highway, WAYS)
+def read_radar(rules, points, at, map, on_highway, tracking=False, known_before=None):
+    """One measurement of the radar, after those that left (memory, kept) where it is given."""
+    whole, kept = known_before or (
+        memory.new_memory(),
+        np.empty(max(len(points.range), 1), np.int64),
+    )
+    found = radar.read_radar(
+        whole[0], rules, points, kept, tracking, at, map.arrays, on_highway, WAYS
+    )
     return RadarReading(*(known(n) for n in found[:3]), found.points)
 
 

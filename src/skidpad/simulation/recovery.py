@@ -49,9 +49,8 @@ OFF_ROAD_TIME = 1.0  # s with all wheels off every lane (decision R-6)
 OFF_ROAD_LIMIT = 3.0  # m that the car's middle lies beyond the road's edge
 MARGIN = 0.3  # m around the ego's own box where it is put
 
-DRIVEN = (
-    Supervision.NONE
-)  # by the stack; a member looked up in its class takes longer than the test
+# by the stack; a member that is looked up in its class takes longer than the test
+DRIVEN = Supervision.NONE
 FULL_STOP = VehicleCommand(brake=1.0, handbrake=True)
 HELD = VehicleCommand(brake=1.0)
 ROLLING = VehicleCommand()
@@ -132,9 +131,8 @@ class Supervisor:
         self.off = 0  # ticks with all wheels off every lane
         self.over = False  # the ego lies on its side
         self.first: LanePoint | None = None  # where the run began
-        self._last: tuple[int, float, float] | None = (
-            None  # lane, s, offset, as long as there was one
-        )
+        # lane, s, offset, as long as there was one
+        self._last: tuple[int, float, float] | None = None
 
     def observe(self, truth: WorldTruth) -> Supervision:
         """Returns the phase of the tick that `truth` begins, a new one where it is due.

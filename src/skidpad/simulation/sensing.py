@@ -21,7 +21,7 @@ from skidpad.sensors.object_level.objects import ObjectSuite
 from skidpad.sensors.physical_radar.radar import PhysicalRadar
 from skidpad.sensors.suite import PixelSettings, PixelSuite
 
-NO_IMAGES: Mapping[str, CameraImage] = {}
+NO_IMAGES: Mapping[str, CameraImage] = MappingProxyType({})
 NO_SEGMENTS: Mapping[str, Segments] = MappingProxyType({})
 
 

@@ -20,7 +20,6 @@ MEMORY = np.dtype(
         ("reference", np.int64),  # index of the lane that is followed; -1: none
         ("reference_s", np.float64),
         ("yaw_error", np.float64),  # rad, heading minus lane heading
-        ("curvature", np.float64),  # 1/m, at the reference point ahead
         ("kappa", np.float64),  # 1/m, of the parabola
         ("steer", np.float64),  # smoothed
         # what the tick shows ahead
@@ -62,7 +61,10 @@ Record = Any  # that row, as kernels take it
 
 
 def new_memory() -> Memory:
-    """Returns the memory of a stack that has seen nothing and stopped nowhere."""
+    """Returns the memory of a stack on no lane that has stopped nowhere, all else zero.
+
+    `forget_sight` and `forget_tiers` write what a stack knows that has seen nothing.
+    """
     memory = np.zeros(1, MEMORY)
     memory["lane"] = memory["reference"] = memory["resume_ticks"] = -1
     return memory

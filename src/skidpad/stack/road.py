@@ -75,7 +75,7 @@ def read_road(
     """
     m, r, a, lines = memory[0], parts.value.rules, parts.value.lanes, parts.value.lines
     view = view_lane(a, on_highway, r.first_branch, ways, x, y, z, yaw)
-    m.lane, m.s, m.yaw_error, m.curvature = view.lane, view.s, view.yaw_error, view.curvature
+    m.lane, m.s, m.yaw_error = view.lane, view.s, view.yaw_error
     m.kappa = view.kappa
     m.bend, m.reference, m.reference_s = view.bend, view.reference, view.reference_s
     steer, trigger, line, distance = 0.0, -1, -1, nan

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from skidpad.core.arrays import Floats, Floats32
 from skidpad.core.frames import RadarPoints, Segments
 from skidpad.core.kernels.jit import Held, kernel
-from skidpad.core.vocabulary import DetectionStatus
 from skidpad.roads.kernels import LaneArrays
 from skidpad.stack.control.bends import slow_for_bend
 from skidpad.stack.control.caps import CapRules, caps_kmh, count_resume
@@ -30,14 +29,13 @@ from skidpad.stack.perception.front import BY_NONE, look_ahead, verify_runs
 from skidpad.stack.perception.fusion import NOTHING, PERCENTILE, FusionRules
 from skidpad.stack.perception.lane_view import Place
 from skidpad.stack.perception.persistence import (
+    RADAR_ACTIVE,
     DetectionRules,
     conclude,
     forget_detections,
     is_confirmed,
 )
 from skidpad.stack.perception.radar import RadarRules, forget_radar
-
-RADAR_ACTIVE = int(DetectionStatus.RADAR_ACTIVE)
 
 
 class Rules(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from skidpad.core.settings.stack import StackSettings
-from skidpad.core.vocabulary import Tier
+from skidpad.core.vocabulary import DetectionStatus, Tier
 from skidpad.stack.configurations import functions_of
 from skidpad.stack.control.pid import DISTANCE_GAINS, SPEED_GAINS
 from skidpad.stack.control.steering import lookahead_distance, steer_command, steering_gain
@@ -102,6 +102,11 @@ def test_pid_by_hand():
     pid.reset()
     assert (pid.previous, pid.integral) == (0.0, 0.0)
     assert Pid(DISTANCE_GAINS, 0.05).update(0.02) == approx(0.004 + 0.000005 + 0.48)
+
+
+def test_numbers_of_tiers_and_of_detections_are_their_places():
+    for words in (Tier, DetectionStatus):
+        assert tuple(map(int, words)) == tuple(range(len(words)))
 
 
 @pytest.mark.req("A-143", "A-144", "A-145", "A-146")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from math import cos, radians, sin
 
 import numpy as np
@@ -11,6 +12,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import DetectionStatus
 from skidpad.roads.bundled import load_map
 from skidpad.stack.adas import AdasStack
+from skidpad.stack.memory import new_memory
 from skidpad.stack.perception.lane_view import NOWHERE as STRAIGHT
 from skidpad.stack.perception.radar import (
     HALF_WIDTH,
@@ -27,11 +29,13 @@ MAP = ArcMap()
 NOWHERE = np.zeros(len(MAP.lanes.road), np.bool_)
 
 
-def prefilter(*points, v=20.0, view=STRAIGHT, tracking=False, half_width=HALF_WIDTH):
+def prefilter(
+    *points, v=20.0, view=STRAIGHT, tracking=False, half_width=HALF_WIDTH, known_before=None
+):
     """Nearest point that passes, with its number of companions; no lane check."""
     rules = RadarRules(True, half_width, by_map=False, nearest_only=False)
     at = place_of(Pose(0.0, 0.0), v, view)
-    return read_radar(rules, radar_points(*points), at, MAP, NOWHERE, tracking)
+    return read_radar(rules, radar_points(*points), at, MAP, NOWHERE, tracking, known_before)
 
 
 def passes(*point, **options):
@@ -125,7 +129,7 @@ def test_tracking_begins_the_tick_after_vision_confirmed():
 def test_each_measurement_stands_alone():
     far, near, side = (50.0, 0.0, 0.0, -4.0), (30.0, 0.01, 0.0, -6.0), (30.0, 0.5, 0.0, 0.0)
 
-    measure = prefilter
+    measure = partial(prefilter, known_before=(new_memory(), np.empty(400, np.int64)))
     two = measure(far, side, near)
     assert (two.pre, two.lane, two.velocity, two.points) == (30.0, 30.0, -6.0, 2)
     assert measure() == NO_RADAR

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import inf, isfinite
+from types import MappingProxyType
 from typing import Any, NamedTuple
 from zlib import crc32
 
@@ -42,7 +43,7 @@ USUAL_NUMBER = 2  # adaptive cruise control and lane centring
 SPEEDS = tuple(mps_from_kmh(v) for v in CRUISE_RANGE)  # m/s
 NAME = "SkidpadStack"
 CLEAR = "clear-noon"  # the weather where no run says one
-NO_IMAGES: Mapping[str, Any] = {}
+NO_IMAGES: Mapping[str, Any] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)

@@ -241,7 +241,7 @@ class Network:
         starts = self.map.arrays.next_start
         for lane in np.flatnonzero(np.diff(starts) > 1).tolist():
             turns = {following: self._turn(lane, following) for following in self._exits(lane)}
-            if not turns:  # nobody may drive on: the end of the road
+            if not turns:  # no drivable lane follows: the end of the road
                 continue
             least = min(map(abs, turns.values()))
             even = [k for k, turn in turns.items() if abs(turn) < least + EVEN]

@@ -125,13 +125,13 @@ def _away(w: np.float32) -> np.float32:
 
 @inner_kernel
 def _less(a: np.float32, b: np.float32) -> np.float32:
-    """Returns the smaller one."""
+    """Returns the smaller one of two numbers."""
     return a if a < b else b
 
 
 @inner_kernel
 def _more(a: np.float32, b: np.float32) -> np.float32:
-    """Returns the larger one."""
+    """Returns the larger one of two numbers."""
     return a if a > b else b
 
 

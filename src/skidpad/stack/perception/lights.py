@@ -121,6 +121,8 @@ def scan_lights(
 class LightScan:
     """Finds the next light on the walked lane; any stop line counts (M-5)."""
 
+    UNSAVED = ("lines", "held")  # of the map
+
     def __init__(self, map: RoadMap) -> None:
         self.lines = stop_lines(map)
         self.held = hold(self.lines)

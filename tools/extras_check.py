@@ -1,26 +1,40 @@
 """Resolves the package with each extra alone on each Python, from wheels only, and prints a table.
 
-    python tools/extras_check.py              # all extras; needs uv (pip install uv) and the package index
-    python tools/extras_check.py osi carla    # some of them
+    python tools/extras_check.py                # all extras; needs uv (pip install uv) and the index
+    python tools/extras_check.py osi carla      # some of them
+    python tools/extras_check.py --install osi  # installed, and tested; Pythons of PATH and of pyenv
 
-Nothing is installed: uv asks the index which versions have wheels for this platform and the other Python.
-A cell is the number of distributions of the whole installation, base included; where a requirement of the
-extra is left out by its marker, its name follows.
+Without `--install` nothing is installed: uv asks the index which versions have wheels for this platform and
+the other Python. A cell is the number of distributions of the whole installation, base included; where a
+requirement of the extra is left out by its marker, its name follows.
+
+With it, the wheel and the one extra go into an empty environment, every module of the package is imported
+there, and the quick tests run that name a module which the extra brings. A cell says how many passed.
 """
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from versions_check import MINORS, ROOT
+from versions_check import IMPORT_ALL, MINORS, ROOT, copy_source, pythons
 
 PROJECT = ROOT / "pyproject.toml"
 BASE = ""  # no extra
+TOOLS = ("pytest>=8", "hypothesis>=6.100", "pytest-xdist>=3.5")  # what tests themselves need
+MODULES_OF = """
+import sys
+from importlib.metadata import packages_distributions
+for module, names in packages_distributions().items():
+    if not module.startswith("_") and {n.lower().replace("_", "-") for n in names} & set(sys.argv[1:]):
+        print(module)
+"""
 AFTER_NAME = re.compile(r"[^A-Za-z0-9._-]")  # brackets, comparisons, markers
 
 
@@ -61,9 +75,74 @@ def describe(done: subprocess.CompletedProcess[str], named: Sequence[str]) -> st
     return f"{len(got)}" + (f", without {', '.join(missing)}" if missing else "")
 
 
+def files_that_ask(modules: Sequence[str], folder: Path = ROOT / "tests") -> list[str]:
+    """Returns the files of tests that import one of the modules, or ask whether it is there."""
+    if not modules:
+        return []
+    names = "|".join(map(re.escape, modules))
+    is_asked = re.compile(rf'(?:import|from|importorskip\("|find_spec\(") ?(?:{names})\b')
+    files = sorted(folder.rglob("test_*.py"))
+    return [str(file) for file in files if is_asked.search(file.read_text(encoding="utf-8"))]
+
+
+def install(extra: str, python: str, wheel: Path, named: Sequence[str]) -> tuple[bool, str]:
+    """Installs the wheel with an extra alone, imports all of it and runs its tests; returns how that went."""
+    alone = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "VIRTUAL_ENV")}
+    with tempfile.TemporaryDirectory() as folder:
+        own = str(Path(folder) / "bin" / "python")
+        asked = f"{wheel}[{extra}]" if extra else str(wheel)
+        put = ["uv", "pip", "install", "--quiet", "--no-build", "--python", own]
+        steps = [
+            ["uv", "venv", "--quiet", "--clear", "--python", python, folder],
+            [*put, asked],
+            ["uv", "pip", "check", "--quiet", "--python", own],
+            [own, "-c", IMPORT_ALL],
+            [*put, *TOOLS],
+        ]
+        for step in steps:
+            done = subprocess.run(
+                step, cwd=folder, env=alone, capture_output=True, text=True, check=False
+            )
+            if done.returncode:
+                return False, f"**no**: {' '.join((done.stdout + done.stderr).split())[-300:]}"
+        asking = [own, "-c", MODULES_OF, *named]
+        brought = subprocess.run(asking, capture_output=True, text=True, check=True).stdout.split()
+        files = files_that_ask(brought)
+        if not files:
+            return True, "imported"
+        call = [own, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-m", "not slow"]
+        call += ["--hypothesis-profile", "quick", *files]
+        done = subprocess.run(
+            call, cwd=ROOT, env=alone, capture_output=True, text=True, check=False
+        )
+        if done.returncode:
+            print(done.stdout[-3000:], file=sys.stderr)
+        lines = [line for line in done.stdout.splitlines() if " in " in line] or ["no test ran"]
+        return done.returncode == 0, lines[-1].rpartition(" in ")[0].strip("= ")
+
+
+def install_all(extras: dict[str, list[str]], chosen: Sequence[str]) -> int:
+    """Prints a row for each extra that is installed on each Python; returns 1 where one of them fails."""
+    at_hand = pythons()
+    failed = False
+    with tempfile.TemporaryDirectory() as folder:
+        source = copy_source(Path(folder) / "source")
+        building = ["uv", "build", "--quiet", "--wheel", "--out-dir", folder, str(source)]
+        subprocess.run(building, check=True)
+        (wheel,) = Path(folder).glob("skidpad-*.whl")
+        for extra in chosen:
+            done = [install(extra, python, wheel, extras[extra]) for python in at_hand]
+            failed |= not all(ok for ok, _ in done)
+            row = " | ".join(said for _, said in done)
+            print(f"| {f'`{extra}`' if extra else 'none'} | {row} |", flush=True)
+    return int(failed)
+
+
 def main(words: list[str]) -> int:
     """Prints a row for each extra; returns 1 where one of them cannot be installed on one Python."""
     extras = {BASE: [], **extras_of(PROJECT.read_text(encoding="utf-8"))}
+    is_installed = "--install" in words
+    words = [word for word in words if word != "--install"]
     unknown = [word for word in words if word not in extras]
     if unknown:
         print(f"no extra of {PROJECT.name}: {', '.join(unknown)}", file=sys.stderr)
@@ -71,6 +150,8 @@ def main(words: list[str]) -> int:
     print(
         f"| extra | {' | '.join(f'3.{minor}' for minor in MINORS)} |\n|---{'|---' * len(MINORS)}|"
     )
+    if is_installed:
+        return install_all(extras, words or list(extras))
     failed = False
     with ThreadPoolExecutor(2) as pool:
         for extra in words or extras:

@@ -8,7 +8,7 @@ from subprocess import CompletedProcess
 import pytest
 
 import extras_check
-from extras_check import ROOT, describe, extras_of
+from extras_check import ROOT, describe, extras_of, files_that_ask
 
 TEXT = extras_check.PROJECT.read_text(encoding="utf-8")
 
@@ -46,3 +46,11 @@ def test_a_cell_says_how_many_what_is_left_out_or_why_not(done, cell):
 def test_an_unknown_extra_is_refused(capsys):
     assert extras_check.main(["colour"]) == 2
     assert "colour" in capsys.readouterr().err
+
+
+def test_tests_of_an_extra_are_those_that_name_what_it_brings(tmp_path):
+    (tmp_path / "test_a.py").write_text('optuna = pytest.importorskip("optuna")\n')
+    (tmp_path / "test_b.py").write_text("    from optuna.trial import Trial\n")
+    (tmp_path / "test_c.py").write_text("import optunable\nassert 'optuna'\n")
+    assert files_that_ask(["optuna"], tmp_path) == [str(tmp_path / f"test_{k}.py") for k in "ab"]
+    assert files_that_ask([], tmp_path) == []

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from skidpad.campaign.driving import quick_kernel
 from skidpad.campaign.runs.run import run
 from skidpad.recording.run import ticks
 from skidpad.sensors.object_level import objects
 from skidpad.simulation import recovery
 from skidpad.simulation.world import feel, step
 from skidpad.stack import road, think
-from skidpad.stack.perception import hsv
+from skidpad.stack.perception import hsv, lights
 from support.refcounts import counts_references
 from support.runs import adas_run
 
@@ -32,6 +33,8 @@ def drive() -> None:
         think.think,
         recovery.find_ego,
         ticks.copy_actors,
+        lights.heed_light,
+        quick_kernel.drive_ticks,
     ],
     ids=lambda compiled: compiled.py_func.__name__,
 )
@@ -49,3 +52,10 @@ def test_the_supervisors_kernel_counts_nothing() -> None:
     states = step.ActorStates.empty(3)
     assert not recovery.has_actor_ahead(recovery.hold(states), 0.0, 0.0, 0.0, 0.0)
     assert not counts_references(recovery.has_actor_ahead)
+
+
+def test_the_kernel_that_asks_why_the_ego_stands_counts_nothing() -> None:
+    run(
+        adas_run(2, duration=12.0, vehicles=0)
+    )  # its machine code is looked up with that of the others
+    assert not counts_references(recovery.has_reason)

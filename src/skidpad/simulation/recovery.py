@@ -7,12 +7,15 @@ nothing of how the backend works, and the stack knows nothing of the truth.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import cos, hypot, sin
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import require_range
 from skidpad.core.geometry import Pose, mps_from_kmh
 from skidpad.core.kernels.jit import Held, hold, kernel
@@ -51,6 +54,7 @@ MARGIN = 0.3  # m around the ego's own box where it is put
 
 # by the stack; a member that is looked up in its class takes longer than the test
 DRIVEN = Supervision.NONE
+RED, YELLOW = int(LightState.RED), int(LightState.YELLOW)
 FULL_STOP = VehicleCommand(brake=1.0, handbrake=True)
 HELD = VehicleCommand(brake=1.0)
 ROLLING = VehicleCommand()
@@ -109,11 +113,34 @@ class Action:
     notice: str = ""
 
 
+class Stops(NamedTuple):
+    """Where lights of a map stop whom they govern, by lane."""
+
+    id: NDArray[np.int64]  # of the signal
+    lane: NDArray[np.int64]
+    s: Floats  # m along it
+
+    def show(self, lights: Mapping[int, LightState]) -> NDArray[np.uint8]:
+        """Returns the LightState at each of them; lights: by signal id, a missing one is UNKNOWN."""
+        return np.array(
+            [lights.get(i, LightState.UNKNOWN) for i in self.id.tolist()], dtype=np.uint8
+        )
+
+
+def stops_of(map: RoadMap) -> Stops:
+    """Returns the stops of a map's lights."""
+    signals = map.signals
+    chosen = signals.kind == SignalKind.LIGHT
+    ids, lanes = (np.asarray(c[chosen], dtype=np.int64) for c in (signals.id, signals.lane))
+    return Stops(ids, lanes, np.asarray(signals.s[chosen], dtype=np.float64))
+
+
 class Supervisor:
     """State: phase, its age, cool-down and grace, time near standstill, counters."""
 
     def __init__(self, map: RoadMap, settings: RecoverySettings, dt: float) -> None:
         self.map, self.settings, self.dt = map, settings, dt
+        self.stops = stops_of(map)
         self.reset()
 
     def reset(self) -> None:
@@ -172,6 +199,13 @@ class Supervisor:
             self._begin(Supervision.REALIGN, 0.0, RelocationReason.STUCK)
             return self._realign(self.truth.states)
         return Action(command)
+
+    def pass_ticks(self, ticks: int, last: tuple[int, float, float]) -> None:
+        """Takes in so many ticks in which the stack drove, as it should; last: lane, s and offset there."""
+        self.cool_down = max(self.cool_down - ticks, 0)
+        self.grace = max(self.grace - ticks, 0)
+        self.standing = self.off = 0
+        self._last = last
 
     def _recover(self, states: ActorStates) -> Action:
         """Returns the action of a phase in which the supervisor drives."""
@@ -348,34 +382,15 @@ class Supervisor:
         """Returns whether the stack says that it holds, or an actor or a red light stands ahead."""
         if report is not None and report.tier in HOLDING:
             return True
-        ego = self._find_lane(truth.states)
-        if ego is None:
-            return False
-        here = replace(
-            ego, x=float(truth.states.x[0]), y=float(truth.states.y[0]), z=float(truth.states.z[0])
-        )
-        return not self._is_clear_of_others(here) or self._light_ahead(ego, truth)
-
-    def _is_clear_of_others(self, here: LanePoint) -> bool:
-        """Returns whether no actor stands at or ahead of the lane point."""
-        assert self.truth is not None
-        held = self._hold(self.truth.states)
-        return not has_actor_ahead(held, here.x, here.y, here.z, here.heading)
+        held, stops = self._hold(truth.states), self.stops
+        lit = stops.show(truth.lights)
+        return bool(has_reason(self.map.held, held, stops.lane, stops.s, lit, LIGHT_REACH))
 
     def _hold(self, states: ActorStates) -> Held[ActorStates]:
         """Returns the states for kernels; they are held anew when they are another object."""
         if states is not self._states:
             self._states, self._held = states, hold(states)
         return self._held
-
-    def _light_ahead(self, ego: LanePoint, truth: WorldTruth) -> bool:
-        """Returns whether a red or yellow light is within LIGHT_REACH ahead on the ego's lane."""
-        signals = self.map.signals
-        distance = signals.s - ego.s
-        near = (signals.kind == SignalKind.LIGHT) & (signals.lane == ego.lane)
-        near &= (distance > 0.0) & (distance < LIGHT_REACH)
-        stop = (LightState.RED, LightState.YELLOW)
-        return any(truth.lights.get(int(i)) in stop for i in signals.id[near])
 
 
 def is_past_the_end(map: RoadMap, x: float, y: float, last: LanePoint) -> bool:
@@ -425,5 +440,28 @@ def has_actor_ahead(held: Held[ActorStates], x: float, y: float, z: float, headi
         forward, aside = dx * c + dy * sn, abs(dy * c - dx * sn)
         near = 0.0 < forward < CLEAR_AHEAD and aside < CLEAR_ASIDE and abs(s.z[i] - z) < LEVEL
         if near and s.present[i]:
+            return True
+    return False
+
+
+@kernel
+def has_reason(
+    map: Held[LaneArrays], held: Held[ActorStates], lanes: NDArray[np.int64], s: Floats,
+    shown: NDArray[np.uint8], reach: float,
+) -> bool:  # fmt: skip
+    """Returns whether an actor is ahead, or a red or yellow light within `reach` m along the lane.
+
+    lanes, s, shown: where lights stop the traffic, and what they show; False off every lane.
+    """
+    states = held.value
+    x, y, z = states.x[0], states.y[0], states.z[0]
+    lane, here, _, _, _, _, heading, _, _ = project_point(map.value, x, y, z, True)
+    if lane < 0:
+        return False
+    if has_actor_ahead(held, x, y, z, heading):
+        return True
+    for k in range(len(lanes)):
+        stops = shown[k] == RED or shown[k] == YELLOW
+        if lanes[k] == lane and 0.0 < s[k] - here < reach and stops:
             return True
     return False

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, nan
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,10 +44,10 @@ from skidpad.stack.perception.fusion import (
     rate_samples,
 )
 from skidpad.stack.perception.hsv import LampCamera
-from skidpad.stack.perception.lights import NO_LIGHT, LightReading, StopLock
+from skidpad.stack.perception.lights import NO_LIGHT, LightReading, StopLock, Way
 from skidpad.stack.perception.persistence import detection_rules
 from skidpad.stack.perception.radar import radar_rules
-from skidpad.stack.road import Road, Way, road_rules
+from skidpad.stack.road import Road, road_rules
 from skidpad.stack.think import (
     Answer,
     Parts,
@@ -105,6 +105,16 @@ class AdasConfig:
         return cls(functions=functions, added=added, settings=settings, **numbers)
 
 
+class StackParts(NamedTuple):
+    """Rules and arrays of a stack, besides its memory, that kernels of a tick are given."""
+
+    held: Held[Parts]
+    samples: Floats
+    history: Floats
+    kept: NDArray[np.int64]  # room
+    room: Floats
+
+
 class AdasStack:
     """One vehicle's driver. Deterministic: its commands depend on the frames alone."""
 
@@ -122,7 +132,7 @@ class AdasStack:
         self._samples, self._history = far_samples(MEDIAN_SAMPLES), rate_samples(dt)
         self._kept, self._room = np.empty(ROOM, dtype=np.int64), np.empty((ROOM, 2))
         self.lamps = LampCamera(specs)
-        self.lock = StopLock(dt, options.hsv_required)
+        self.lock = StopLock(dt, options.hsv_required, self.memory)
         self.added = AddedFunctions(self.config.added, map, dt)
         self.supervision = Supervision.NONE
         self.verified_by = ""
@@ -165,8 +175,8 @@ class AdasStack:
 
     def follow_rules(self, rules: Rules) -> None:
         """Drives by these rules from now on; tiers start afresh."""
-        self.rules, self._held = rules, hold_rules(rules, self.road.map.held)
-        forget_tiers(self.memory, self._held)
+        self.rules, self.held = rules, hold_rules(rules, self.road.map.held)
+        forget_tiers(self.memory, self.held)
 
     def limit_speed(self, v: float) -> None:
         """Cruises no faster than v m/s until told otherwise: whatever governs this stack says so."""
@@ -175,7 +185,7 @@ class AdasStack:
     def relocated(self) -> None:
         """Forgets what was seen and summed before, as the ego now stands elsewhere (A-109)."""
         forget_sight(self.memory, self._samples, self._history)
-        forget_tiers(self.memory, self._held)
+        forget_tiers(self.memory, self.held)
         self.lock.reset()
         self.added.reset()
         if self.bends is not None:
@@ -225,7 +235,7 @@ class AdasStack:
             self.road.on_highway, pose.x, pose.y, pose.z, pose.yaw, rest[0],
         )  # fmt: skip
         by = self.cameras.verify(frame, float(m["distance"]), yaw_error, kappa) if asks else 0
-        return act(self.memory, self._held, by, *rest)
+        return act(self.memory, self.held, by, *rest)
 
     def _memories(
         self, frame: SensorFrame
@@ -233,7 +243,21 @@ class AdasStack:
         """Returns memory and rules, with room for the frame's radar points."""
         if len(frame.radar.range) > len(self._kept):
             self._kept = np.empty(len(frame.radar.range), dtype=np.int64)
-        return self.memory, self._held, self._samples, self._history, self._kept, self.road.ways
+        return self.memory, self.held, self._samples, self._history, self._kept, self.road.ways
+
+    def why_not_quick(self) -> str:
+        """Returns the first reason why a kernel cannot drive ticks by this stack; "": it can."""
+        if self.added.kinds:
+            return f"function {self.added.kinds[0].name} is a package's"
+        return "the stack slows down in bends" if self.bends is not None else ""
+
+    def parts(self, runs: int, points: int) -> StackParts:
+        """Returns what kernels of a tick are given, with room for so many runs of pixels and radar points."""
+        if points > len(self._kept):
+            self._kept = np.empty(points, dtype=np.int64)
+        if runs > len(self._room):
+            self._room = np.empty((runs, 2))
+        return StackParts(self.held, self._samples, self._history, self._kept, self._room)
 
     def _follow_supervision(self, phase: Supervision) -> None:
         """Notes which supervisor drives; forgets the old place where a warm-up begins (A-185)."""

@@ -157,6 +157,10 @@ class GuardedStack:
         _check(self.name, command, frame.tick)
         return command
 
+    def check(self, command: VehicleCommand, tick: int) -> None:
+        """Raises StackError where a value of the command is out of range."""
+        _check(self.name, command, tick)
+
     def close(self) -> None:
         """Ends the stack's run by its `close`, if any; what it does wrong here no longer matters."""
         with suppress(*FOREIGN):

@@ -49,6 +49,10 @@ MEMORY = np.dtype(
         ("distance_previous", np.float64),  # m, error of the distance PID
         ("distance_integral", np.float64),
         ("steady_integral", np.float64),  # share of throttle
+        # the light at which it stops
+        ("stops", np.bool_),
+        ("stop_signal", np.int64),  # id
+        ("stop_left", np.float64),  # m to its line
         # resume protocol
         ("resume_ticks", np.int64),  # since the last tick at a stop; -1: no stop yet
         ("in_curve", np.bool_),

@@ -26,9 +26,7 @@ from skidpad.stack.control.steering import (
 )
 from skidpad.stack.memory import KMH, Memory
 from skidpad.stack.perception.lane_view import WAYS, follow_lane, view_lane
-from skidpad.stack.perception.lights import LightScan, StopLines, find_light, find_trigger
-
-Way = tuple[int, float, float, float, float, int, int, float]  # what `read_road` returns
+from skidpad.stack.perception.lights import LightScan, StopLines, Way, find_light, find_trigger
 
 
 class RoadRules(NamedTuple):
@@ -135,7 +133,7 @@ class Road:
 
     def follow_rules(self, rules: RoadRules) -> None:
         """Reads the map by these rules from now on."""
-        self._parts = hold_parts(rules, self.map.held, self.scan.lines)
+        self.parts = hold_parts(rules, self.map.held, self.scan.lines)
 
     def read(self, pose: Pose, v: float, drives: bool) -> Way:
         """Returns what `read_road` does; the first pose on a lane traces the highway (A-212)."""
@@ -145,10 +143,10 @@ class Road:
                 self.on_highway = np.isin(self.map.lanes.road, list(self.map.traced_roads(point)))
                 self.is_traced = True
         return read_road(
-            self.memory, self._parts, self.on_highway, self.ways,
+            self.memory, self.parts, self.on_highway, self.ways,
             pose.x, pose.y, pose.z, pose.yaw, v, drives,
         )  # fmt: skip
 
     def curvature(self, distance: float, heading: float) -> float:
         """Returns the 1/m of the lane that is followed, so many m on; 0 without one."""
-        return read_curvature(self.memory, self._parts, self.ways, distance, heading)
+        return read_curvature(self.memory, self.parts, self.ways, distance, heading)

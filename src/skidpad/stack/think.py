@@ -28,6 +28,7 @@ from skidpad.stack.perception.corridor import Corridor, read_segments
 from skidpad.stack.perception.front import BY_NONE, look_ahead, verify_runs
 from skidpad.stack.perception.fusion import NOTHING, PERCENTILE, FusionRules
 from skidpad.stack.perception.lane_view import Place
+from skidpad.stack.perception.lights import Way
 from skidpad.stack.perception.persistence import (
     RADAR_ACTIVE,
     DetectionRules,
@@ -63,6 +64,7 @@ Answer = tuple[
     int, float, float, bool, int, float, int, float, float, float, float, float, float, float,
     float, int, int,
 ]  # fmt: skip
+Light = tuple[int, int, float, float]
 
 
 @kernel
@@ -172,3 +174,31 @@ def think(
     )  # fmt: skip
     by = verify_runs(bumper, roof, r.keep, m.distance, turn, m.kappa, room) if asks else 0
     return act(memory, parts, by, v, drives, stop_distance, v_bends, v_told)
+
+
+@kernel
+def write_report(
+    row: Floats, at: int, told: Answer, way: Way, light: Light, assists: bool, dt: float
+) -> None:
+    """Writes what the stack says of a tick as numbers in the order of `StackReport`; NaN: none.
+
+    at: where in the row it begins; told, way: of `think` and `read_road`; light: source, state (-1:
+    none), m, and m to a stop. As `AdasStack.report` has it where no lamp is seen.
+    """
+    source, state, there, stop = light
+    row[at], row[at + 1], row[at + 2] = told[6], told[0], 0.0 if isnan(told[7]) else 1.0
+    row[at + 3], row[at + 4] = or_nan(told[7]), or_nan(told[8])
+    row[at + 5], row[at + 6], row[at + 7] = or_nan(told[9]), or_nan(told[10]), or_nan(told[11])
+    row[at + 8], row[at + 9], row[at + 10] = or_nan(told[12]), or_nan(told[13]), or_nan(told[14])
+    row[at + 11], row[at + 12], row[at + 13] = told[15], told[5] / KMH, or_nan(there)
+    row[at + 14] = state if state >= 0 else nan
+    row[at + 15] = source if assists else nan
+    row[at + 16], row[at + 17] = 0.0 if isnan(stop) else 1.0, nan
+    row[at + 18], row[at + 19], row[at + 20] = or_nan(way[1]), or_nan(way[2]), or_nan(way[3])
+    row[at + 21] = told[16] * dt if told[16] >= 0 else nan
+
+
+@kernel
+def or_nan(value: float) -> float:
+    """Returns a number, and for every NaN the same one."""
+    return nan if isnan(value) else value

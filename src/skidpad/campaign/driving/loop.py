@@ -88,7 +88,12 @@ class Moment:
 
 
 class Sink:
-    """Looks on and keeps what it wants; it changes nothing."""
+    """Looks on and keeps what it wants; it changes nothing.
+
+    sees_all: it is shown each tick. If not, `pass_ticks` may tell of many in which nothing happened.
+    """
+
+    sees_all = True
 
     def begin(self, table: ActorTable) -> None:
         """Takes the actors of a run that begins; does nothing unless overridden."""
@@ -102,6 +107,9 @@ class Sink:
     def see(self, moment: Moment) -> None:
         """Takes in what happened in one tick."""
         raise NotImplementedError
+
+    def pass_ticks(self, ticks: int) -> None:
+        """Takes in that so many ticks went by without an event; does nothing unless overridden."""
 
 
 class Unsupervised:
@@ -191,6 +199,9 @@ class Stepper:
         self.failure: StackError | None = None
         self.action: Action | None = None  # of the last tick; None before the first one
         self.words: Sequence[ActorCommand] = ()  # what the script said in it
+        self.next_frame: SensorFrame | None = (
+            None  # of the next tick, if the world is there already
+        )
         driver.begin(self.truth.table)
         for sink in sinks:
             sink.begin(self.truth.table)
@@ -205,9 +216,12 @@ class Stepper:
         if self.failure is not None or (action is not None and self.script.ended):
             return False
         if action is not None:
-            if action.relocate is not None:
-                self.backend.relocate(action.relocate.pose, action.relocate.v)
-            self.frame = self.backend.step(action.command, self.words)
+            if self.next_frame is not None:
+                self.frame, self.next_frame = self.next_frame, None
+            else:
+                if action.relocate is not None:
+                    self.backend.relocate(action.relocate.pose, action.relocate.v)
+                self.frame = self.backend.step(action.command, self.words)
             self.truth = self.backend.truth()
         phase = self.supervisor.observe(self.truth)
         if phase is not Supervision.NONE:

@@ -14,6 +14,8 @@ SLOW = 0.9  # real-time factor below which a tick counts as slow (A-246)
 class Pace(Sink):
     """Counts the ticks of a run, and those whose wall time was slow."""
 
+    sees_all = False
+
     def __init__(self, dt: float) -> None:
         self.dt = dt
         self.slow = self.ticks = 0
@@ -25,6 +27,13 @@ class Pace(Sink):
         now = perf_counter()
         self.slow += self.dt < SLOW * (now - self.last)
         self.ticks += 1
+        self.last = now
+
+    def pass_ticks(self, ticks: int) -> None:
+        """Counts ticks that took the same time each."""
+        now = perf_counter()
+        self.slow += ticks * (self.dt * ticks < SLOW * (now - self.last))
+        self.ticks += ticks
         self.last = now
 
     @property

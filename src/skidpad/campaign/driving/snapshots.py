@@ -27,6 +27,8 @@ FATAL = (  # without a contact
 class Snapshots(Sink):
     """Writes PNG files named by configuration, weather and time; without a folder it does nothing."""
 
+    sees_all = False
+
     def __init__(self, folder: Path | None, driver: str, weather: str, dt: float) -> None:
         self.folder = None if folder is None else folder / SNAPSHOTS
         self.stem, self.dt = path_part(f"{slug(driver)}_{weather}"), dt

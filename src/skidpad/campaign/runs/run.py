@@ -17,6 +17,7 @@ from skidpad.campaign.driving.backends import make_backend
 from skidpad.campaign.driving.drivers import describe_driver
 from skidpad.campaign.driving.loop import Driver, Moment, Sink, Stepper
 from skidpad.campaign.driving.outdoors import ChangedBackend, FileChanges, branch_backend
+from skidpad.campaign.driving.quick import QuickDrive, find_parts
 from skidpad.campaign.driving.readings import ReadingsRecorder
 from skidpad.campaign.driving.run_setup import (
     StackAtWheel,
@@ -78,6 +79,8 @@ class Run:
         readings: numbers of the further sensors that the stack asked for, where they give any.
         surface: what lay on parts of the road at the begin, by the run and by its scenario's file.
         laid: what its events have laid later.
+        quick_ticks: how many ticks were driven in compiled blocks.
+        why_not_quick: the first reason why none were; empty where some could be.
     """
 
     log: RunLog
@@ -92,6 +95,8 @@ class Run:
     readings: SensorReadings | None = None
     surface: tuple[SurfacePatch, ...] = ()
     laid: tuple[LaidSurface, ...] = ()
+    quick_ticks: int = 0
+    why_not_quick: str = ""
 
     def __repr__(self) -> str:
         log, about = self.log, self.log.header.about
@@ -217,6 +222,7 @@ class Log(Sink):
     """The tick log of a run as a sink. changes: of a file that may change the weather."""
 
     changes: FileChanges | None = None
+    sees_all = False
 
     def __init__(self, header: LogHeader, weather: str, ticks: int) -> None:
         self.header, self.weather, self.ticks = header, weather, ticks
@@ -243,6 +249,10 @@ class Log(Sink):
             m = action.relocate.moved
             self.log.relocated(Relocation(truth.tick, m.reason, m.shift, m.old, m.new))
 
+    def pass_ticks(self, ticks: int) -> None:
+        """Takes in rows that a kernel has written."""
+        self.log.add(ticks)
+
     def _note_surface(self, tick: int, changes: FileChanges) -> None:
         """Notes what the events of a file have laid on the road since the tick before."""
         patches, last = changes.outside.patches, self.laid[-1].surface if self.laid else None
@@ -255,6 +265,8 @@ class Log(Sink):
 
 class DeskLog(Log):
     """A log whose weather a person may change."""
+
+    sees_all = True
 
     def __init__(self, header: LogHeader, weather: str, ticks: int, desk: Desk) -> None:
         super().__init__(header, weather, ticks)
@@ -292,7 +304,7 @@ def run(
         every = max(round(checkpoints_s / opened.stage.setup.dt), 1)
         writer = CheckpointWriter(opened, folder, every)
     try:
-        while opened.step() is not None:
+        while opened.drive(1_000_000 if writer is None else writer.left):
             if writer is not None:
                 writer.note_tick()
     finally:
@@ -305,6 +317,8 @@ class OpenRun:
 
     at_wheel: what stands between the driver and the loop, as a desk does.
     """
+
+    UNSAVED = ("quick",)  # it holds what others are
 
     def __init__(
         self,
@@ -340,10 +354,19 @@ class OpenRun:
         self.driver: StackAtWheel | None = None
         self.stepper: Stepper | None = None
         self.over = False
+        self.quick: QuickDrive | None = None
+        self.why_not_quick = "nothing was driven"
 
     def step(self) -> Moment | None:
         """Drives one tick and returns its moment; None when the run is over, also by a stack that fails."""
         return self.answer() if self.sense() else None
+
+    def drive(self, most: int) -> int:
+        """Drives up to `most` ticks, the quick way where there is one; returns how many, 0 at the end."""
+        ticks = 0 if self.quick is None else self.quick.drive(most)
+        if ticks and self.stepper is not None and self.stepper.next_frame is None:
+            return ticks
+        return ticks + (self.step() is not None)  # so that each tick that has begun is whole
 
     def sense(self) -> bool:
         """Steps the world to the next tick, which `answer` completes; False when the run is over."""
@@ -426,6 +449,8 @@ class OpenRun:
             None if self.recorder is None else self.recorder.finish(),
             stage.setup.patches,
             tuple(self.log.laid),
+            0 if self.quick is None else self.quick.ticks,
+            self.why_not_quick,
         )
 
     def _begin(self) -> Stepper | None:
@@ -449,7 +474,13 @@ class OpenRun:
         frame = backend.reset(setup, self.spec.seed)
         self.driver = driver
         wheel = driver if self._at_wheel is None else self._at_wheel(driver)
-        return Stepper(backend, frame, wheel, stage.supervisor, stage.script, sinks)
+        stepper = Stepper(backend, frame, wheel, stage.supervisor, stage.script, sinks)
+        parts = find_parts(stepper)
+        if isinstance(parts, str):
+            self.why_not_quick = parts
+        else:
+            self.why_not_quick, self.quick = "", QuickDrive(stepper, parts, self.log.log)
+        return stepper
 
     def _end(self) -> None:
         """Closes the stack, and notes in the log how it failed, if it did."""

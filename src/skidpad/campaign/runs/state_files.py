@@ -171,6 +171,14 @@ class CheckpointWriter:
     def __init__(self, run: Parts, folder: Path, every: int) -> None:
         self.run, self.folder, self.every = run, folder / CHECKPOINTS, every
         self.files: StateFiles | None = None
+        self.refused = False
+
+    @property
+    def left(self) -> int:
+        """How many ticks may be driven before the next one that it must see."""
+        if self.files is None:
+            return self.every if self.refused else 1
+        return self.every - self.run.tick % self.every
 
     def note_tick(self) -> None:
         """Takes in that a tick was driven, from the first one on."""
@@ -180,7 +188,7 @@ class CheckpointWriter:
             elif self.files is not None and self.run.tick % self.every == 0:
                 self.files.write(self.folder / f"{self.run.tick:07d}{SUFFIX}")
         except CheckpointError as error:
-            self.files = None
+            self.files, self.refused = None, True
             write_bytes(self.folder / REFUSED, f"{error}\n".encode())
 
 

@@ -39,6 +39,8 @@ read_report = attrgetter(*REPORT_FIELDS)
 NO_REPORT = (None,) * len(REPORT_FIELDS)
 N_EGO, N_COMMAND, N_REPORT = len(EgoSeries._fields), len(CommandSeries._fields), len(REPORT_FIELDS)
 N_ROW = N_EGO + 2 * N_COMMAND + N_REPORT
+# where in a row they begin; the estimate is at its beginning
+APPLIED, REQUESTED, REPORT = N_EGO, N_EGO + N_COMMAND, N_EGO + 2 * N_COMMAND
 TICK, ROW = Struct("3q"), Struct(f"{N_ROW}d")  # a row of each array
 GROWTH = 2
 
@@ -49,6 +51,16 @@ class ActorColumns(NamedTuple):
     actors: NDArray[np.float32]  # (fields of ActorSeries in their order, T, n)
     present: NDArray[np.bool_]  # (T, n)
     mu: NDArray[np.float32]  # (T, n, 4)
+
+
+class TickArrays(NamedTuple):
+    """Where a kernel may write ticks."""
+
+    at: int  # row
+    weather: int  # number of it
+    ticks: NDArray[np.int64]
+    rows: NDArray[np.float64]
+    columns: Held[ActorColumns]
 
 
 class TickLog:
@@ -143,6 +155,16 @@ class TickLog:
         if truth.lights != self._lights:
             self._note_lights(truth)
         self._n = k + 1
+
+    def reserve(self, ticks: int) -> TickArrays:
+        """Returns the arrays, with room for so many more ticks, and the row at which they begin."""
+        while self._n + ticks > len(self._tick):
+            self._grow()
+        return TickArrays(self._n, self._weather, self._tick, self._row, self._columns)
+
+    def add(self, ticks: int) -> None:
+        """Takes in that so many rows were written there."""
+        self._n += ticks
 
     def set_weather(self, slug: str) -> None:
         """Sets the weather from the next moment on (A-217, A-231)."""

@@ -11,7 +11,7 @@ level of an overpass counts as hidden by deck and parapet.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -152,8 +152,32 @@ class ObjectSuite:
 
     def read(self, tick: int, states: ActorStates) -> tuple[dict[str, Segments], RadarPoints]:
         """Returns what `segments` and `radar` do, in one call of a kernel for the common sensors."""
-        if len(self._eyes) != 2 or len(self.antennas) != 1 or self.lanes is None:
+        common = self.hold_common(states)
+        if common is None or self.lanes is None:
             return self.segments(states), self.radar(tick, states)
+        *runs, m = sense(common, self.lanes, tick)
+        seen = dict(zip(self.camera_ids, map(copy_runs, self._eyes, runs), strict=True))
+        return seen, RadarPoints(*self._radar.echoes[:, :m].copy())
+
+    @property
+    def most_runs(self) -> int:
+        """How many runs of pixels a camera can see."""
+        return max((eye.runs.shape[1] for eye in self._eyes), default=0)
+
+    @property
+    def most_points(self) -> int:
+        """How many points the radar can see."""
+        return int(self._radar.echoes.shape[1])
+
+    def sample_arrays(self) -> tuple[tuple[NDArray[Any], ...], tuple[NDArray[np.float32], ...]]:
+        """Returns empty arrays of the types in which a camera and the radar tell what they see."""
+        eye, echoes = self._eyes[0], self._radar.echoes
+        return (*(row[:0] for row in eye.runs), eye.classes[:0]), tuple(row[:0] for row in echoes)
+
+    def hold_common(self, states: ActorStates) -> Held[Common] | None:
+        """Returns surroundings and the common sensors, held; None where there are others."""
+        if len(self._eyes) != 2 or len(self.antennas) != 1 or self.lanes is None:
+            return None
         self._around(states)
         around, radar, known = self._surroundings, self.antennas[0], self._parts
         if (
@@ -165,9 +189,7 @@ class ObjectSuite:
             one, other = self._eyes
             self._parts = Common(around, one, other, radar, self.limit)
             self._common = hold(self._parts)
-        *runs, m = sense(self._common, self.lanes, tick)
-        seen = dict(zip(self.camera_ids, map(copy_runs, self._eyes, runs), strict=True))
-        return seen, RadarPoints(*self._radar.echoes[:, :m].copy())
+        return self._common
 
     def radar(self, tick: int, states: ActorStates) -> RadarPoints:
         """Returns the points of the first radar; none when the suite has no radar."""

@@ -71,6 +71,19 @@ class EmbeddedBackend:
         self.world.step(actor_commands)
         return self._frame()
 
+    def read_frame(self) -> SensorFrame:
+        """Returns the frame of the present tick, to which a kernel may have stepped the world."""
+        return self._frame()
+
+    def why_not_quick(self) -> str:
+        """Returns the first reason why a kernel cannot make steps of this world alone; "": it can."""
+        w = self.world
+        if self._noise > 0.0 or self._unseen is not None or self._asked is not None:
+            return "localisation is noisy, or further sensors are read"
+        if w.patches is not None or w.zones or w.gusts is not None or w.conditions.roll_over:
+            return "patches, wind or roll-over are looked at in each tick"
+        return "the world has no traffic" if w.traffic is None else ""
+
     def truth(self) -> WorldTruth:
         """Returns the ground truth of the present tick."""
         w = self.world

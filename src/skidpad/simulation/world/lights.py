@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from math import pi
+from math import inf, pi
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,12 @@ class Light:
     yellow: float = YELLOW_S
     red: float = RED_S
     elapsed: float = 0.0  # s in this state
+
+    @property
+    def limit(self) -> float:
+        """The s for which it shows its state while it is its phase's turn; inf where that never ends."""
+        times = {LightState.GREEN: self.green, LightState.YELLOW: self.yellow}
+        return self.red if self.state is LightState.RED else times.get(self.state, inf)
 
     def show(self, state: LightState, elapsed: float = 0.0) -> None:
         """Sets the light's state and the time in s for which it has shown it."""
@@ -76,15 +83,14 @@ class Group:
             return False
         phase = self.phases[self.turn]
         first = phase[0]
-        spent = first.elapsed + ROUNDING
-        if first.state is LightState.GREEN and spent >= first.green:
+        if first.elapsed + ROUNDING < first.limit:
+            return False
+        if first.state is LightState.GREEN:
             return _show_all(phase, LightState.YELLOW)
-        if first.state is LightState.YELLOW and spent >= first.yellow:
+        if first.state is LightState.YELLOW:
             return _show_all(phase, LightState.RED)
-        if first.state is LightState.RED and spent >= first.red:
-            self.turn = (self.turn + 1) % len(self.phases)
-            return _show_all(self.phases[self.turn], LightState.GREEN)
-        return False
+        self.turn = (self.turn + 1) % len(self.phases)
+        return _show_all(self.phases[self.turn], LightState.GREEN)
 
 
 def _show_all(phase: list[Light], state: LightState) -> bool:
@@ -92,6 +98,14 @@ def _show_all(phase: list[Light], state: LightState) -> bool:
     for light in phase:
         light.show(state)
     return True
+
+
+class Clocks(NamedTuple):
+    """The times of all lights as arrays."""
+
+    elapsed: NDArray[np.float64]  # (lights,) s for which each has shown its state
+    first: NDArray[np.int64]  # (groups,) the light that decides when its group changes
+    limit: NDArray[np.float64]  # (groups,) s at which it does; inf: never
 
 
 class Lights:
@@ -139,6 +153,22 @@ class Lights:
         if changed:
             self._show()
         return changed
+
+    def clocks(self) -> Clocks:
+        """Returns the time for which each light has shown its state, and when the groups change."""
+        place = {id(light): i for i, light in enumerate(self.lights)}
+        first = [group.phases[group.turn][0] for group in self.groups.values()]
+        held = [self.frozen or group.frozen for group in self.groups.values()]
+        return Clocks(
+            np.array([light.elapsed for light in self.lights]),
+            np.array([place[id(light)] for light in first], dtype=np.int64),
+            np.array([inf if h else light.limit for h, light in zip(held, first, strict=True)]),
+        )
+
+    def set_clocks(self, elapsed: NDArray[np.float64]) -> None:
+        """Sets the s for which each light has shown its state."""
+        for light, time in zip(self.lights, elapsed.tolist(), strict=True):
+            light.elapsed = time
 
     def set_state(self, light: Light, state: LightState) -> None:
         """Sets one lamp; its group's clock goes on from there. Other lamps stay."""

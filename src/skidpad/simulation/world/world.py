@@ -412,16 +412,58 @@ class World:
             self.rolled = tuple(np.flatnonzero(self.fleet.on_side() & ~lay).tolist())
         if words:
             self.moved[:] = False
+        self._end_step()
+
+    def _end_step(self) -> None:
+        """Notes which contacts of a step are new, and lets the lights go on."""
         if self.book is not None:
             book, touching, count = self.book, self.touching, self.touches
             found = book.update(self.tick, touching, count) if count else Touches()
             self.contacts, self.background = found
         self.lights.advance(self.dt)
 
+    def pass_ticks(self, ticks: int) -> None:
+        """Takes in that a kernel has made so many whole steps, lights included, in which nothing happened."""
+        self.tick += ticks
+        self.notices, self.put_back, self.moved_on, self.invasions = (), (), (), ()
+        self.contacts, self.background = Touches()
+        self.touches = 0
+
+    def finish_step(self, touches: int, crossed: int, settled: bool) -> None:
+        """Finishes a step that a kernel has begun, after its contacts and markings were found.
+
+        settled: no actor waits for its place or is to be put elsewhere in this step.
+        """
+        self.pass_ticks(1)
+        self._note_events(MOVE | SETTLE if settled else MOVE, touches, crossed)
+        if not settled:
+            if self.traffic is not None:
+                self._put_vehicles(self.traffic)
+            self._advance(SETTLE)
+        self._end_step()
+
+    @property
+    def is_quiet(self) -> bool:
+        """Whether nothing happened in the last step of which a log or a driver's supervisor is told."""
+        return not (
+            self.contacts
+            or self.background
+            or self.invasions
+            or self.put_back
+            or self.moved_on
+            or self.notices
+        )
+
     def _advance(self, stages: int) -> None:
         """Runs the given stages of a step and stores their contacts and lane invasions."""
         step = advance_undriven if self.traffic is None else advance
-        touches, crossed = step(self.arena, stages, self.tick, self.dt, self.fleet.steps, *self.air)
+        self._note_events(
+            stages,
+            *step(self.arena, stages, self.tick, self.dt, self.fleet.steps, *self.air),
+        )
+
+    def _note_events(self, stages: int, touches: int, crossed: int) -> None:
+        """Stores what the given stages of a step have found."""
         if stages & MOVE:
             self.touches = touches
         if stages & SETTLE:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import cos, hypot, nan, sin
+from math import cos, hypot, isnan, nan, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from skidpad.core.vocabulary import LightSource, LightState
 from skidpad.roads.kernels import LaneArrays, advance_kernel
 from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import RoadMap
+from skidpad.stack.memory import Memory, new_memory
 
 SCAN_MIN = 80.0  # m (A-156)
 SCAN_TIME = 6.0  # s (A-156)
@@ -26,7 +27,14 @@ TRIGGER_BEHIND = 1.0
 YELLOW_DECELERATION = 1.5  # m/s^2, a yellow light that needs more is passed (D-070)
 LANE_STEP = 0.01  # m beyond a lane's end, to arrive on the next one
 MAX_LANES = 64
+# numbers of words, as kernels have them
+RED, YELLOW, GREEN, UNKNOWN = map(
+    int, (LightState.RED, LightState.YELLOW, LightState.GREEN, LightState.UNKNOWN)
+)
+NONE_AHEAD, AT_TRIGGER, BY_SCAN, OFF_LANES = map(int, LightSource)
+NOT_SEEN = -1  # in place of the LightState that a camera sees
 States = Mapping[int, LightState]  # by signal id
+Way = tuple[int, float, float, float, float, int, int, float]  # what `read_road` returns
 
 
 class StopLines(NamedTuple):
@@ -141,20 +149,41 @@ class LightScan:
 
         NO_LIGHT for none, NO_WAYPOINT off every lane. states: by signal id, a missing one is UNKNOWN.
         """
-        if lane < 0:
-            return NO_WAYPOINT
-        if trigger >= 0:
-            for k in range(trigger, self.lines.start[lane + 1]):
-                here, signal = float(self.lines.s[k]) - s, int(self.lines.signal[k])
-                state = states.get(signal, LightState.UNKNOWN)
-                if -TRIGGER_BEHIND <= here <= TRIGGER_BEFORE and state is not LightState.GREEN:
-                    source = LightSource.IMMEDIATE_TRIGGER
-                    return LightReading(source, signal, max(here, 0.0), state)
-        if line < 0:
+        if lane >= 0 and trigger < 0 and line < 0:
             return NO_LIGHT
-        signal = int(self.lines.signal[line])
-        state = states.get(signal, LightState.UNKNOWN)
-        return LightReading(LightSource.MAP_SCAN, signal, distance, state)
+        shown = self.show(states)
+        source, k, there = choose_light(self.held, shown, lane, s, trigger, line, distance)
+        if k < 0:
+            return LightReading(LightSource(source))
+        signal, state = int(self.lines.signal[k]), LightState(shown[k])
+        return LightReading(LightSource(source), signal, there, state)
+
+    def show(self, states: States) -> NDArray[np.uint8]:
+        """Returns the LightState of each stop line; a missing one is UNKNOWN."""
+        signals = self.lines.signal.tolist()
+        return np.array([states.get(id, LightState.UNKNOWN) for id in signals], dtype=np.uint8)
+
+
+@kernel
+def choose_light(
+    held: Held[StopLines], shown: NDArray[np.uint8], lane: int, s: float, trigger: int, line: int,
+    distance: float,
+) -> tuple[int, int, float]:  # fmt: skip
+    """Returns the LightSource, the line (-1: none) and the m to it that govern the ego at s of a lane.
+
+    shown: LightState of each line; trigger, line, distance: of `find_trigger` and `find_light`.
+    """
+    lines = held.value
+    if lane < 0:
+        return OFF_LANES, -1, nan
+    if trigger >= 0:
+        for k in range(trigger, lines.start[lane + 1]):
+            here = lines.s[k] - s
+            if -TRIGGER_BEHIND <= here <= TRIGGER_BEFORE and shown[k] != GREEN:
+                return AT_TRIGGER, k, max(here, 0.0)
+    if line < 0:
+        return NONE_AHEAD, -1, nan
+    return BY_SCAN, line, distance
 
 
 class StopRequest(NamedTuple):
@@ -164,16 +193,26 @@ class StopRequest(NamedTuple):
 
 
 class StopLock:
-    """Whether to stop. Once committed, the chosen line is kept until its light lets go (A-169)."""
+    """Whether to stop. Once committed, the chosen line is kept until its light lets go (A-169).
 
-    def __init__(self, dt: float, hsv_required: bool) -> None:
+    memory: of the stack, where the lock is kept.
+    """
+
+    def __init__(self, dt: float, hsv_required: bool, memory: Memory | None = None) -> None:
         self.dt, self.hsv_required = dt, hsv_required
+        self.memory = new_memory() if memory is None else memory
         self.reset()
+
+    @property
+    def signal(self) -> int | None:
+        """The light at whose line the stack stops; None: at none."""
+        m = self.memory[0]
+        return int(m["stop_signal"]) if m["stops"] else None
 
     def reset(self) -> None:
         """Resets the lock, so that no stop is committed to."""
-        self.signal: int | None = None
-        self.remaining = 0.0
+        m = self.memory[0]
+        m["stops"], m["stop_signal"], m["stop_left"] = False, 0, 0.0
 
     def update(
         self,
@@ -186,26 +225,73 @@ class StopLock:
 
         hsv: what the camera saw, None: nothing or not evaluated. v: m/s.
         """
-        if self.signal is not None:
-            if states.get(self.signal) not in (LightState.RED, LightState.YELLOW):
-                self.reset()
-            elif light.signal == self.signal and light.distance is not None:
-                self.remaining = light.distance
-            else:
-                self.remaining = max(self.remaining - v * self.dt, 0.0)
-        if self.signal is None and light.distance is not None and self._demands(light, v, hsv):
-            self.signal, self.remaining = light.signal, light.distance
-        return StopRequest(self.remaining) if self.signal is not None else None
+        signal, there, distance, state = self.signal, -1, nan, LightState.UNKNOWN
+        if light.signal is not None and light.distance is not None and light.state is not None:
+            there, distance, state = light.signal, light.distance, light.state
+        kept = LightState.UNKNOWN if signal is None else states.get(signal, LightState.UNKNOWN)
+        seen = NOT_SEEN if hsv is None else int(hsv)
+        left = lock_stop(
+            self.memory, int(kept), there, distance, int(state), seen, self.hsv_required, v, self.dt
+        )
+        return None if left != left else StopRequest(left)
 
-    def _demands(self, light: LightReading, v: float, hsv: LightState | None) -> bool:
-        """Returns whether the light demands a stop at v in m/s: red, or yellow with room to brake.
 
-        Never where the camera has to agree and does not.
-        """
-        if self.hsv_required and hsv is not light.state:
-            return False
-        if light.state is LightState.RED:
-            return True
-        if light.state is LightState.YELLOW and light.distance is not None:
-            return v * v <= 2.0 * YELLOW_DECELERATION * light.distance
+@kernel
+def lock_stop(
+    memory: Memory, kept: int, signal: int, distance: float, state: int, hsv: int,
+    hsv_required: bool, v: float, dt: float,
+) -> float:  # fmt: skip
+    """Returns the m to the line at which to stop, NaN for none, and keeps it in memory (A-169).
+
+    kept: LightState at the line of the tick before; signal, distance, state: of the light ahead, NaN m
+    for none; hsv: LightState that the camera saw, or NOT_SEEN.
+    """
+    m = memory[0]
+    there = not isnan(distance)
+    if m.stops:
+        if kept != RED and kept != YELLOW:
+            m.stops = False
+        elif there and signal == m.stop_signal:
+            m.stop_left = distance
+        else:
+            m.stop_left = max(m.stop_left - v * dt, 0.0)
+    if not m.stops and there and demands_stop(distance, state, hsv, hsv_required, v):
+        m.stops, m.stop_signal, m.stop_left = True, signal, distance
+    return m.stop_left if m.stops else nan
+
+
+@kernel
+def demands_stop(distance: float, state: int, hsv: int, hsv_required: bool, v: float) -> bool:
+    """Returns whether the light demands a stop at v in m/s: red, or yellow with room to brake.
+
+    Never where the camera has to agree and does not.
+    """
+    if hsv_required and hsv != state:
         return False
+    if state == YELLOW:
+        return v * v <= 2.0 * YELLOW_DECELERATION * distance
+    return state == RED
+
+
+@kernel
+def heed_light(
+    memory: Memory, lines: Held[StopLines], shown: NDArray[np.uint8], way: Way, hsv_required: bool,
+    v: float, dt: float,
+) -> tuple[int, int, float, float]:  # fmt: skip
+    """Returns what `choose_light` does where no lamp is seen, and the m of `lock_stop`.
+
+    way: of `read_road`.
+    """
+    m, held = memory[0], lines.value
+    lane, trigger, line, distance = way[0], way[5], way[6], way[7]
+    source, k, there = choose_light(lines, shown, lane, m.s, trigger, line, distance)
+    kept = UNKNOWN
+    if m.stops:
+        for i in range(len(held.signal)):
+            if held.signal[i] == m.stop_signal:
+                kept = int(shown[i])
+                break
+    signal = held.signal[k] if k >= 0 else -1
+    state = int(shown[k]) if k >= 0 else UNKNOWN
+    left = lock_stop(memory, kept, signal, there, state, NOT_SEEN, hsv_required, v, dt)
+    return source, k, there, left

@@ -1,0 +1,256 @@
+"""The quick way through a run: many ticks of the loop in one compiled call, as long as nothing happens.
+
+`QuickDrive` works beside the `Stepper` of a run and leaves it as the stepper itself would. Contacts, crossed
+markings, changes of lights, departures, an ego that stands without a reason, and vehicles that are put
+elsewhere end the call; the stepper then drives that tick. `why_not_quick` says which runs have no quick way.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from skidpad.campaign.driving.loop import Stepper, Timer, Unsupervised
+from skidpad.campaign.driving.quick_kernel import (
+    DONE,
+    MOVED,
+    REFUSED,
+    STEPPED,
+    UNUSUAL,
+    Addresses,
+    Request,
+    Rules,
+    Stop,
+    Tables,
+    drive_ticks,
+)
+from skidpad.campaign.driving.run_setup import StackAtWheel
+from skidpad.core.errors import StackError
+from skidpad.core.kernels.calls import find_address
+from skidpad.core.kernels.jit import hold
+from skidpad.core.states import VehicleCommand
+from skidpad.core.vocabulary import LightState, Supervision
+from skidpad.recording.run.ticks import TickArrays, TickLog, copy_actors
+from skidpad.sensors.object_level.objects import ObjectSuite, sense
+from skidpad.simulation.embedded.engine import EmbeddedBackend
+from skidpad.simulation.recovery import (
+    LIGHT_REACH,
+    Action,
+    Supervisor,
+    find_ego,
+    has_reason,
+    stops_of,
+)
+from skidpad.simulation.sensing import Objects
+from skidpad.simulation.world.feel import feel_motion
+from skidpad.simulation.world.step import advance
+from skidpad.simulation.world.world import EGO, World
+from skidpad.stack.adas import AdasStack
+from skidpad.stack.loading import GuardedStack
+from skidpad.stack.perception.lights import heed_light
+from skidpad.stack.road import read_road
+from skidpad.stack.think import think
+
+
+class QuickParts(NamedTuple):
+    """What of a run takes part in its quick way."""
+
+    backend: EmbeddedBackend
+    world: World
+    suite: ObjectSuite
+    guard: GuardedStack
+    stack: AdasStack
+    supervisor: Supervisor | None
+    timer: Timer
+
+
+def find_parts(stepper: Stepper) -> QuickParts | str:
+    """Returns the parts of a run that has begun; else the first reason for which it has no quick way."""
+    driver, backend, script = stepper.driver, stepper.backend, stepper.script
+    if type(backend) is not EmbeddedBackend:
+        return "another simulator drives, or the world is changed from outside"
+    sensing, supervisor = backend.sensing, stepper.supervisor
+    if type(sensing) is not Objects:
+        return "its sensors are pixels, or a radar with noise"
+    if type(driver) is not StackAtWheel or type(driver.stack.stack) is not AdasStack:
+        return "another stack drives, or an envelope governs ours"
+    if driver.lens is not None:
+        return "drops lie on the lens"
+    stack, suite = driver.stack.stack, sensing.suite
+    reason = stack.why_not_quick() or backend.why_not_quick()
+    if reason:
+        return reason
+    if suite.hold_common(backend.world.states) is None:
+        return "it has other sensors than the common ones"
+    if not isinstance(supervisor, (Supervisor, Unsupervised)):
+        return "somebody is at the controls"
+    if type(script) is not Timer or script.script is not None:
+        return "a script or the end of a route is followed in each tick"
+    for sink in stepper.sinks:
+        if sink.sees_all:
+            return f"{type(sink).__name__} is shown each tick"
+    supervising = supervisor if isinstance(supervisor, Supervisor) else None
+    return QuickParts(backend, backend.world, suite, driver.stack, stack, supervising, script)
+
+
+class QuickDrive:
+    """The quick way of a run for which `find_parts` finds no reason.
+
+    Attributes:
+        ticks: how many it has driven.
+    """
+
+    def __init__(self, stepper: Stepper, parts: QuickParts, log: TickLog) -> None:
+        self.stepper, self.parts, self.log, self.ticks = stepper, parts, log, 0
+        self._clocks = parts.world.lights.clocks()
+        self._stops = stops_of(parts.world.map)
+        self._shown: dict[int, LightState] = {}  # of the next two
+        self._lines = parts.stack.road.scan.show(self._shown)
+        self._lit = self._stops.show(self._shown)
+        self._known: tuple[object, ...] = ()  # what `_held` was made of
+        self._held: tuple[Any, ...] = ()
+
+    def drive(self, most: int) -> int:
+        """Drives up to `most` ticks and returns how many; the stepper drives the one after them.
+
+        0 where the next tick is the stepper's.
+        """
+        stepper, world = self.stepper, self.parts.world
+        last = self._last_request()
+        n = min(most, self.parts.timer.left)
+        if n <= 0 or last is None:
+            return 0
+        room, lights = self.log.reserve(n), world.lights
+        rules, driven, begun = self._rules(room), 0, False
+        while driven < n:
+            shown = lights.by_id
+            stop = self._call(rules, room, last, begun, driven, n - driven)
+            last, driven = stop.request, driven + stop.ticks
+            if stop.why in (MOVED, STEPPED):
+                world.finish_step(stop.touches, stop.crossed, settled=stop.why == STEPPED)
+                begun = world.is_quiet and lights.by_id is shown
+                if begun:
+                    continue
+            if stop.why == REFUSED:
+                self._refuse(last)
+            elif stop.why != DONE:
+                stepper.next_frame = self.parts.backend.read_frame()
+            break
+        if driven:
+            stepper.action, stepper.words = Action(VehicleCommand(*last)), ()
+            for sink in stepper.sinks:
+                sink.pass_ticks(driven)
+        self.ticks += driven
+        return driven
+
+    def _last_request(self) -> Request | None:
+        """Returns what the stack asked for in the last tick; None unless it drives on as it did."""
+        stepper, stack, supervisor = self.stepper, self.parts.stack, self.parts.supervisor
+        action = stepper.action
+        if action is None or action.relocate is not None or action.command.reverse:
+            return None
+        if stepper.failure is not None or stepper.next_frame is not None:
+            return None
+        if stack.supervision is not Supervision.NONE or not stack.road.is_traced:
+            return None
+        if supervisor is not None and (supervisor.phase is not Supervision.NONE or supervisor.over):
+            return None
+        c = action.command
+        return Request(c.throttle, c.brake, c.steer, c.handbrake)
+
+    def _call(
+        self, rules: Rules, room: TickArrays, last: Request, begun: bool, driven: int, n: int
+    ) -> Stop:
+        """Drives up to n ticks, of which `driven` went before, and notes those that are whole.
+
+        begun: the world has made the step of the first one already.
+        """
+        world, supervisor = self.parts.world, self.parts.supervisor
+        held, grace = self._hold(room), 0 if supervisor is None else supervisor.grace
+        told: Any = drive_ticks(*held, rules, last, begun, world.tick, n, room.at + driven, grace)  # type: ignore[call-arg]
+        ticks, why, touches, crossed, throttle, brake, steer, handbrake, *place = told
+        steps = ticks + (why in (UNUSUAL, REFUSED)) - begun
+        if steps:
+            world.pass_ticks(steps)
+            world.lights.set_clocks(self._clocks.elapsed)
+        if ticks:
+            self.parts.timer.left -= ticks
+            if supervisor is not None:
+                supervisor.pass_ticks(ticks, (place[0], place[1], place[2]))
+        return Stop(ticks, why, touches, crossed, Request(throttle, brake, steer, handbrake))
+
+    def _refuse(self, request: Request) -> None:
+        """Ends the run as a command out of range does."""
+        try:
+            self.parts.guard.check(VehicleCommand(*request), self.parts.world.tick)
+        except StackError as failure:
+            self.stepper.failure = failure
+
+    def _rules(self, room: TickArrays) -> Rules:
+        """Returns what holds in all ticks of a call."""
+        world, stack, supervisor = self.parts.world, self.parts.stack, self.parts.supervisor
+        return Rules(
+            dt=world.dt,
+            substeps=world.fleet.steps,
+            weather=room.weather,
+            bumper_first=self.parts.suite.camera_ids[0] == stack.cameras.bumper.depth_id,
+            supervised=supervisor is not None,
+            stuck_speed=0.0 if supervisor is None else supervisor.settings.stuck_speed,
+            reach=LIGHT_REACH,
+            v_told=stack.v_told,
+            assists=stack.assists,
+            hsv_required=stack.lock.hsv_required,
+        )
+
+    def _hold(self, room: TickArrays) -> tuple[Any, ...]:
+        """Returns the first arguments of the kernel: addresses, and what is behind pointers."""
+        world, suite, stack = self.parts.world, self.parts.suite, self.parts.stack
+        road, lights = stack.road, world.lights
+        common = suite.hold_common(world.states)
+        parts = stack.parts(suite.most_runs, suite.most_points)
+        for kept, new in zip(self._clocks, lights.clocks(), strict=True):
+            kept[:] = new
+        if lights.by_id is not self._shown:
+            self._shown = lights.by_id
+            self._lines[:], self._lit[:] = (
+                road.scan.show(self._shown),
+                self._stops.show(self._shown),
+            )
+        known = (
+            world.arena, world.states, common, road.parts, parts.held, parts.kept, parts.room,
+            road.on_highway, room.rows, room.columns,
+        )  # fmt: skip
+        if not self._known or any(a is not b for a, b in zip(known, self._known, strict=True)):
+            tables = Tables(
+                stack.memory, parts.samples, parts.history, parts.kept, road.ways, parts.room,
+                road.on_highway, self._lines, room.ticks, room.rows, *self._clocks,
+                self._stops.lane, self._stops.s, self._lit,
+            )  # fmt: skip
+            states, map = hold(world.states), world.map.held
+            held = (
+                world.arena, states, map, common, road.parts, parts.held, room.columns,
+                road.scan.held, hold(tables),
+            )  # fmt: skip
+            self._known, self._held = known, (self._find_addresses(tables, *held[1:7]), *held)
+        return self._held
+
+    def _find_addresses(
+        self, t: Tables, states: Any, map: Any, common: Any, road: Any, stack: Any, columns: Any
+    ) -> Addresses:
+        """Returns where the machine code of each kernel is for what this run holds."""
+        world, lines = self.parts.world, self.parts.stack.road.scan.held
+        runs, points = self.parts.suite.sample_arrays()
+        pose, way = (0.0, 0.0, 0.0, 0.0, 0.0), (0, 0.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
+        return Addresses(
+            advance=find_address(advance, world.arena, 0, 0, 0.0, 0, 0.0, 0.0),
+            feel_motion=find_address(feel_motion, world.arena, EGO),
+            sense=find_address(sense, common, map, 0),
+            read_road=find_address(read_road, t.memory, road, t.on_highway, t.ways, *pose, True),
+            think=find_address(
+                think, t.memory, stack, t.samples, t.history, t.kept, t.ways, t.room, *runs, *runs,
+                *points, t.on_highway, *pose, True, 0.0, 0.0, 0.0,
+            ),
+            find_ego=find_address(find_ego, map, states),
+            has_reason=find_address(has_reason, map, states, t.stop_lane, t.stop_s, t.shown, 0.0),
+            heed_light=find_address(heed_light, t.memory, lines, t.lines, way, False, 0.0, 0.0),
+            copy_actors=find_address(copy_actors, states, world.mu, columns, 0),
+        )  # fmt: skip

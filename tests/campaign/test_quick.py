@@ -1,0 +1,179 @@
+"""The quick way gives the very ticks of the stepper, and takes nearly all of them where a run qualifies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from msgspec import structs
+
+from skidpad.campaign.driving.loop import Moment, Sink
+from skidpad.campaign.runs.run import OpenRun, Run
+from skidpad.core.run import Roads, RunSpec
+from skidpad.core.vocabulary import Govern, Outcome, SensorLevel, TrafficStart
+from skidpad.physics.presets import all_presets
+from skidpad.recording.run.log import RunLog
+from support.runs import adas_run, scenario_run
+
+MAPS = ("figure8", "town", "motorway")
+PROFILES = ("recommended", "thesis_text", "thesis_listing", "preliminary")
+SHARE = 0.95  # of the ticks in which the stack drives
+
+
+def draw_run(k: int) -> RunSpec:
+    """A run that has a quick way: configuration, map, traffic, weather and profile by number."""
+    rng = np.random.default_rng(k)
+    presets = all_presets()
+    names = sorted(set(presets) - {"snow"})
+    return adas_run(
+        k % 5,
+        presets[names[int(rng.integers(len(names)))]],
+        profile=PROFILES[k % 4],
+        course=Roads(
+            map=MAPS[int(rng.integers(3))],
+            vehicles=int(rng.integers(41)),
+            traffic=list(TrafficStart)[int(rng.integers(3))],
+            allow_fewer=True,
+        ),
+        seed=int(rng.integers(1, 1000)),
+        duration=float(rng.uniform(15.0, 45.0)),
+    )
+
+
+def drive_stepwise(spec: RunSpec) -> Run:
+    opened = OpenRun(spec)
+    while opened.step() is not None:
+        pass
+    opened.close()
+    return opened.finish()
+
+
+def drive_quickly(spec: RunSpec, most: int = 100_000) -> tuple[Run, OpenRun]:
+    opened = OpenRun(spec)
+    while opened.drive(most):
+        pass
+    opened.close()
+    return opened.finish(), opened
+
+
+def columns_of(log: RunLog) -> dict[str, Any]:
+    """Every array of a log by name, floats as bits."""
+    found: dict[str, Any] = {"tick": log.tick, "supervision": log.supervision, "mu": log.mu}
+    for part in ("actors", "ego", "applied", "requested", "report"):
+        series = getattr(log, part)
+        found |= {f"{part}.{name}": getattr(series, name) for name in series._fields}
+    return found | {"present": log.present, "weather": log.weather}
+
+
+def first_difference(one: RunLog, other: RunLog) -> str:
+    """Where two logs part ways; empty when they are equal bit by bit."""
+    differing = {}
+    for name, a in columns_of(one).items():
+        b = columns_of(other)[name]
+        if len(a) != len(b):
+            return f"{len(a)} and {len(b)} ticks"
+        bits = [np.ascontiguousarray(c).view(np.uint8).reshape(len(c), -1) for c in (a, b)]
+        ticks = np.flatnonzero((bits[0] != bits[1]).any(axis=1))
+        if len(ticks):
+            differing[name] = int(ticks[0])
+    if not differing:
+        return "" if one.events == other.events else "the events"
+    first = min(differing.values())
+    return f"tick {first}: {', '.join(n for n, tick in differing.items() if tick == first)}"
+
+
+def compare(numbers: range) -> None:
+    """Drives runs both ways; says the first tick that differs and the share that was compiled."""
+    quick = driven = events = 0
+    for k in numbers:
+        spec = draw_run(k)
+        one, (other, opened) = drive_stepwise(spec), drive_quickly(spec)
+        assert opened.quick is not None, opened.why_not_quick
+        assert not first_difference(one.log, other.log), f"run {k}"
+        assert one.outcome == other.outcome
+        quick += opened.quick.ticks
+        driven += int((one.log.supervision == 0).sum())
+        events += len(one.log.events)
+    share = quick / driven
+    print(
+        f"{len(numbers)} runs, {events} events, {driven} ticks of the stack, {share:.1%} compiled"
+    )
+    assert events > len(numbers)
+    assert share > SHARE
+
+
+def test_both_ways_give_the_same_bits() -> None:
+    compare(range(8))
+
+
+def test_both_ways_give_the_same_bits_in_many_runs() -> None:
+    compare(range(8, 68))
+
+
+def test_a_run_may_be_cut_anywhere() -> None:
+    spec = adas_run(4, duration=12.0)
+    whole, opened = drive_quickly(spec)
+    pieces, _ = drive_quickly(spec, most=7)
+    assert opened.quick is not None
+    assert opened.quick.ticks > 0.9 * len(whole.log)
+    assert not first_difference(whole.log, pieces.log)
+
+
+def test_a_fault_of_one_bit_is_found() -> None:
+    """Else the tests above could not fail."""
+    spec = adas_run(2, duration=5.0)
+    one, (other, _) = drive_stepwise(spec), drive_quickly(spec)
+    other.log.report.distance.view(np.int64)[57] ^= 1
+    assert first_difference(one.log, other.log) == "tick 57: report.distance"
+
+
+class Looker(Sink):
+    """Looks at each tick."""
+
+    def see(self, moment: Moment) -> None:
+        del moment
+
+
+@pytest.mark.parametrize(
+    ("spec", "reason"),
+    [
+        (structs.replace(adas_run(2), sensors=SensorLevel.PIXELS), "pixels"),
+        (adas_run(2, govern=Govern.ENVELOPE), "envelope"),
+        (adas_run(2, settings={"wind": True, "wind_speed": 9.0}), "wind"),
+        (adas_run(2, course=Roads(route_km=1.0)), "route"),
+        (scenario_run("front_accident"), "outside"),
+    ],
+)
+def test_a_run_that_has_no_quick_way_says_why(spec: RunSpec, reason: str) -> None:
+    opened = OpenRun(structs.replace(spec, duration=2.0))
+    opened.step()
+    opened.close()
+    assert opened.quick is None
+    assert reason in opened.why_not_quick
+
+
+def test_a_sink_that_sees_all_sees_all() -> None:
+    opened = OpenRun(adas_run(2, duration=2.0), sinks=(Looker(),))
+    opened.step()
+    opened.close()
+    assert opened.why_not_quick == "Looker is shown each tick"
+
+
+def test_a_command_out_of_range_ends_the_run_as_it_does_stepwise() -> None:
+    found = []
+    for quickly in (False, True):
+        opened = OpenRun(adas_run(2, duration=5.0))
+        for _ in range(20):
+            opened.step()
+        assert opened.driver is not None
+        stack: Any = opened.driver.stack.stack
+        stack.memory["steady_integral"] = np.nan  # from which the next brake follows
+        while opened.drive(100) if quickly else opened.step() is not None:
+            pass
+        opened.close()
+        found.append(opened.finish())
+    one, other = found
+    assert one.outcome == other.outcome == Outcome.AGENT_ERROR
+    assert one.error.splitlines()[-1] == other.error.splitlines()[-1]
+    assert not first_difference(one.log, other.log)

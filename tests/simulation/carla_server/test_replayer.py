@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-import json
+from dataclasses import replace
 from math import hypot
 from pathlib import Path
 
 import pytest
 
+from skidpad.core.geometry import Pose
+from skidpad.core.vocabulary import LightState
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.protocol.rpc import CallError
 from skidpad.simulation.carla_server.protocol.streams import StreamHub
+from skidpad.simulation.carla_server.recording import packets
+from skidpad.simulation.carla_server.recording.packets import Packet
 from skidpad.simulation.carla_server.recording.replayer import CarlaRecording
 from skidpad.simulation.carla_server.served import Served
+from skidpad.simulation.carla_server.vehicles.control import Control
 
 TICKS = 20
 NAME = "drive.log"
@@ -39,7 +44,7 @@ def recorded(tmp_path: Path) -> list[dict[str, tuple[float, float]]]:
     gone = episode.spawn(Wanted("vehicle.audi.tt", {}), second)
     episode.spawn(Wanted("walker.pedestrian.0001", {}), third)
     episode.moving.fleet.states.vx[:] = 8.0
-    served.recorder.start(NAME, episode.map.name, served.clock)
+    served.recorder.start(NAME, episode.map.name)
     seen = []
     for k in range(TICKS):
         if k == TICKS // 2:
@@ -101,33 +106,103 @@ def test_living_actors_play_themselves(recorded, tmp_path: Path) -> None:
     replay(served)
     ids = [a.id for a in served.episode.actors]
     source = served.recorder.recording(NAME)
-    renamed = dict(zip(source.kinds, sorted(ids)[-3:], strict=True))
-    again = CarlaRecording(
-        source.map,
-        source.times,
-        [{renamed[id]: p for id, p in tick.items()} for tick in source.poses],
-        {renamed[id]: kind for id, kind in source.kinds.items()},
-    )
-    served.replayer.start(served.episode, again, 0.0, 0.0, 0)
+    own = {a.blueprint.id: a.id for a in served.episode.actors}
+    renamed = {
+        id: own[a.blueprint]
+        for id, a in source.kinds.items()
+        if not a.blueprint.startswith("traffic")
+    }
+    kinds = {renamed[id]: source.kinds[id] for id in renamed}
+    for frame in source.frames:
+        rows = frame.records[Packet.POSITION].copy()
+        rows["id"] = [renamed[id] for id in rows["id"].tolist()]
+        frame.records[Packet.POSITION] = rows
+    served.replayer.start(served.episode, replace(source, kinds=kinds), 0.0, 0.0, 0)
     served.tick()
     assert [a.id for a in served.episode.actors] == ids
 
 
+def test_lights_controls_lamps_and_weather_are_played(tmp_path: Path) -> None:
+    options = ServerOptions(data_dir=tmp_path, map="town")
+    served = Served(options, StreamHub())
+    episode = served.episode
+    car = episode.spawn(Wanted("vehicle.tesla.model3", {}), episode.map.spawn_points[0])
+    vehicle, lights = episode.vehicles.of(car.id), episode.moving.lights
+    ids = [id for id, _ in episode.posts]
+    rain, shown = [0.0, 80.0, *episode.sky.pack()[2:]], []
+    served.recorder.start(NAME, episode.map.name)
+    for k in range(TICKS):
+        if k == TICKS // 2:
+            lights.set_state(episode.posts.light(ids[0]), LightState.OFF)
+            vehicle.control, vehicle.lights = Control(brake=0.5, steer=0.1), 0x9
+            episode.sky.apply(rain)
+        served.tick()
+        shown.append([episode.posts.light(id).state for id in ids])
+    served.recorder.stop()
+    assert shown[0] != shown[-1]
+
+    served = Served(options, StreamHub())
+    episode = served.episode
+    for light in episode.moving.lights.lights:
+        light.show(LightState.UNKNOWN)
+    dry = episode.sky.pack()
+    replay(served)
+    for k in range(1, TICKS):
+        served.tick()
+        now = [post.light.state for _, post in episode.posts]
+        assert now == shown[k], k
+        (vehicle,) = episode.vehicles
+        late = k >= TICKS // 2
+        assert episode.sky.pack() == pytest.approx(rain if late else dry)
+        assert vehicle.lights == (0x9 if late else 0)
+        if k < TICKS - 1:
+            assert vehicle.control.brake == (0.5 if late else 0.0)
+            assert vehicle.control.steer == pytest.approx(0.1 if late else 0.0)
+    assert vehicle.control == Control()  # nobody drives it now
+
+
+@pytest.mark.parametrize("ignore", [True, False])
+def test_the_spectator_goes_its_recorded_way_if_asked(tmp_path: Path, ignore: bool) -> None:
+    served = Served(ServerOptions(data_dir=tmp_path), StreamHub())
+    served.episode.spectator.pose = Pose(1.0, 2.0, 3.0)
+    served.recorder.start(NAME, served.episode.map.name)
+    served.tick()
+    served.tick()
+    served.episode.spectator.pose = Pose(9.0, 9.0, 9.0)
+    served.recorder.stop()
+    served.replayer.ignore_spectator = ignore
+    replay(served)
+    pose = served.episode.spectator.pose
+    assert (pose.x, pose.y, pose.z) == pytest.approx((9.0, 9.0, 9.0) if ignore else (1.0, 2.0, 3.0))
+
+
+def test_a_load_ends_the_recording(tmp_path: Path) -> None:
+    served = Served(ServerOptions(data_dir=tmp_path), StreamHub())
+    served.recorder.start(NAME, served.episode.map.name)
+    served.tick()
+    served.load("", reset_settings=False)
+    served.tick()
+    assert "Frames: 1\n" in served.recorder.summary(NAME)
+
+
 @pytest.mark.parametrize(
-    "lines",
+    ("frames", "words"),
     [
-        ['{"map": "figure8", "format": 1}', "[1, 0.0, [], []]"],
-        ['{"map": "figure8", "format": 2}'],
-        ['{"map": "figure8", "format": 2}', "[1, 0.0, [], [], 7]"],
-        ['{"map": "figure8", "format": 2}', "[1, 0.0, [[1, [0, 0], [0, 0, 0]]], [], []]"],
-        ['{"map": "figure8", "format": 2}', "[1, 0.0, [], [], []]", "[2, 0.0, [], [], []]"],
-        ['{"map": "figure8", "format": 2}', '[1, 0.0, [], [], [[1, "vehicle.audi.tt", [2]]]]'],
-        ['{"map": "figure8", "format": 2}', "[1, 0.0, [[1, [NaN, 0, 0], [0, 0, 0]]], [], []]"],
-        ["[]", "[1, 0.0, [], [], []]"],
+        ([], "no frames"),
+        ([(1, 0.0), (2, 0.0)], "times do not grow"),
+        ([(1, 0.0), (2, float("nan"))], "times do not grow"),
+        ([(1, 0.0), (2, 0.05)], "frame 2 is not finite"),
     ],
 )
-def test_other_files_are_refused(served: Served, tmp_path: Path, lines: list[str]) -> None:
-    assert all(json.loads(line) is not None for line in lines)
-    (tmp_path / NAME).write_text("\n".join(lines), encoding="utf-8")
-    with pytest.raises(CallError, match=r"drive\.log"):
+def test_what_cannot_be_replayed_is_refused(
+    served: Served, tmp_path: Path, frames: list[tuple[int, float]], words: str
+) -> None:
+    data = packets.pack_head("figure8", 0)
+    for number, elapsed in frames:
+        x = float("inf") if number == 2 else 0.0
+        row = (7, (x, 0.0, 0.0), (0.0, 0.0, 0.0))
+        data += packets.pack_start(number, elapsed)
+        data += packets.pack_records(Packet.POSITION, [row]) + packets.pack_end()
+    (tmp_path / NAME).write_bytes(data)
+    with pytest.raises(CallError, match=rf"drive\.log .*{words}"):
         served.recorder.recording(NAME)

@@ -71,7 +71,7 @@ def replays() -> list[bytes]:
     car = world.episode.spawn(Wanted("vehicle.tesla.model3", {}), world.episode.map.spawn_points[0])
     with TemporaryDirectory() as folder:
         recorder = world.recorder = Recorder(Path(folder))
-        recorder.start("a.log", "straight", world.clock)
+        recorder.start("a.log", "straight")
         for _ in range(4):
             world.tick()
         recorder.stop()

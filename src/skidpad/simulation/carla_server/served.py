@@ -66,6 +66,7 @@ class Served:
         episode = Episode(map, self.stock, self.clock, layers)
         self.hub.hold(EPISODE_STREAM)
         self.replayer.release()
+        self.recorder.stop()
         self.episode.end()
         self.episode = episode
         self.clock.renew(reset_settings)
@@ -90,7 +91,7 @@ class Served:
         episode.debug.age(clock.step)
         self._publish_snapshot()
         episode.vehicles.let_go()
-        self.recorder.tick(clock, episode.actors, episode.moving, episode.vehicles)
+        self.recorder.tick(clock, episode)
         if self.before_sensing is not None and episode.sensors.has_listeners(self.hub):
             self.before_sensing()
             self.before_sensing = None

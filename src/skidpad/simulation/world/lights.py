@@ -172,12 +172,7 @@ class Lights:
 
     def set_state(self, light: Light, state: LightState) -> None:
         """Sets one lamp; its group's clock goes on from there. Other lamps stay."""
-        light.show(state)
-        group = self.groups[light.group]
-        for i, phase in enumerate(group.phases):
-            if light in phase and state is not LightState.RED:
-                group.turn = i
-        self._show()
+        self.restore([(light, state, 0.0, self.groups[light.group].frozen)])
 
     def hold(self, held: Iterable[tuple[int, LightState]]) -> None:
         """Sets lights, by signal id, to states that they keep; unknown ids are ignored.
@@ -195,6 +190,20 @@ class Lights:
                 _show_all(list(group.lights()), LightState.RED)
             if light.state is not state:
                 light.show(state)
+        self._show()
+
+    def restore(self, shown: Iterable[tuple[Light, LightState, float, bool]]) -> None:
+        """Sets lights as a recording shows them: state, s in it, whether the group stands still.
+
+        The cycle of a group goes on from the light that is not red.
+        """
+        for light, state, elapsed, frozen in shown:
+            light.show(state, elapsed)
+            group = self.groups[light.group]
+            group.frozen = frozen
+            for i, phase in enumerate(group.phases):
+                if light in phase and state is not LightState.RED:
+                    group.turn = i
         self._show()
 
     def phase_of(self, light: Light) -> list[Light]:

@@ -15,14 +15,14 @@ KIND_LETTERS = ("o", "v", "w", "t", "h", "a")  # other, vehicle, walker, traffic
 
 @TABLE.method("start_recorder")
 def start_recorder(served: Served, name: Any, additional: Any = False) -> str:
-    """Starts a recording and returns CARLA's words for it; CallError without --data-dir.
+    """Starts a recording, ending a replay, and returns its file's name; CallError without --data-dir.
 
-    FileError where the file cannot be written.
+    additional: also velocities, boxes and the machine's time. FileError where the file cannot be written.
     """
-    wire.flag(additional, "additional_data")
-    return served.recorder.start(
-        wire.text(name, "file name"), served.episode.map.name, served.clock
-    )
+    more = wire.flag(additional, "additional_data")
+    file = wire.text(name, "file name")
+    served.replayer.release()
+    return served.recorder.start(file, served.episode.map.name, more)
 
 
 @TABLE.method("stop_recorder", Shape.VOID)
@@ -75,7 +75,7 @@ def replay_file(
     followed = wire.integer(follow, "follow_id")
     source = served.recorder.recording(asked)
     served.recorder.stop()
-    if source.map != served.episode.map.name:
+    if source.map.rsplit("/", 1)[-1] != served.episode.map.name:
         served.load(source.map, reset_settings=False)
     since, until = served.replayer.start(served.episode, source, begin, length, followed)
     return (
@@ -107,5 +107,5 @@ def set_replayer_ignore_hero(served: Served, ignore: Any) -> None:
 
 @TABLE.method("set_replayer_ignore_spectator", Shape.VOID)
 def set_replayer_ignore_spectator(served: Served, ignore: Any) -> None:
-    """Sets whether a replay leaves the spectator where it is."""
+    """Sets whether a replay leaves out the recorded way of the spectator, as it does at first."""
     served.replayer.ignore_spectator = wire.flag(ignore, "ignore_spectator")

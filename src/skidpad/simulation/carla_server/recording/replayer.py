@@ -1,58 +1,82 @@
-"""Replaying a recording: its vehicles and walkers appear again and go where they went.
+"""Replaying a recording: its vehicles, walkers and props appear again and go where they went.
 
 An actor that still lives under the recorded id and blueprint is moved; others are spawned. Traffic
-lights, weather and sensors are not recorded, so they are not replayed.
+lights that stand where recorded ones stood, vehicles' controls and lamps, and the weather follow the
+recording; sensors do not. What CARLA does: public source, CarlaReplayer.cpp and CarlaReplayerHelper.cpp.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Container
+from collections.abc import Container, Iterable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any
+from math import dist
+
+import numpy as np
 
 from skidpad.core.geometry import Pose, wrap_angle
+from skidpad.core.vocabulary import LightState
 from skidpad.simulation.carla_server.actors.catalogue import Family
 from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.episode import Episode, Wanted
 from skidpad.simulation.carla_server.protocol import wire
 from skidpad.simulation.carla_server.protocol.rpc import CallError
 from skidpad.simulation.carla_server.protocol.wire import Vector
+from skidpad.simulation.carla_server.recording.frames import CM, HERO
+from skidpad.simulation.carla_server.recording.packets import (
+    Added,
+    Kind,
+    LogFrame,
+    LogHead,
+    Packet,
+)
+from skidpad.simulation.carla_server.vehicles.control import Control
+from skidpad.simulation.world.lights import Light
 
-FORMAT = 2  # of recordings that can be replayed
-PLAYED = (Family.VEHICLE, Family.WALKER)
-HERO = "hero"  # role that set_replayer_ignore_hero means
+PLAYED = (Family.VEHICLE, Family.WALKER, Family.PROP)
+SAME_PLACE = 1.0  # cm between a recorded traffic light and the one that plays it
 BEHIND, ABOVE = 8.0, 4.0  # m, of the spectator from the actor that it follows
 
 
 @dataclass(frozen=True, slots=True)
 class CarlaRecording:
-    """What a file holds, by recorded ids; times in s from its first tick."""
+    """What a file holds, by recorded ids; times in s from its first frame."""
 
     map: str
     times: list[float]
-    poses: list[dict[int, Pose]]  # one per tick
-    kinds: dict[int, tuple[str, dict[str, str]]]  # blueprint and attributes
+    frames: list[LogFrame]
+    weathers: list[list[float] | None]  # at each frame; None before the first
+    kinds: dict[int, Added]
 
     @property
     def total(self) -> float:
         """Returns the length of the recording in s."""
         return self.times[-1]
 
+    def index(self, t: float) -> int:
+        """Returns the index of the frame that is shown at t in s."""
+        return min(max(bisect_right(self.times, t) - 1, 0), len(self.times) - 1)
+
     def at(self, t: float) -> dict[int, tuple[Pose, Vector]]:
         """Returns poses and velocities in m/s by recorded id, interpolated at t in s."""
-        k = min(max(bisect_right(self.times, t) - 1, 0), len(self.times) - 1)
+        k = self.index(t)
         if k + 1 == len(self.times):  # velocities at the end are those that led there
             k, t = max(k - 1, 0), self.total
-        after = self.poses[min(k + 1, len(self.times) - 1)]
+        before, after = self._poses(k), self._poses(min(k + 1, len(self.times) - 1))
         span = self.times[k + 1] - self.times[k] if len(self.times) > 1 else 1.0
         share = min(max((t - self.times[k]) / span, 0.0), 1.0)
-        there = after if share == 1.0 else self.poses[k]
-        before = self.poses[k]
+        there = after if share == 1.0 else before
         return {
             id: _between(before.get(id, p), after.get(id, p), share, span)
             for id, p in there.items()
+        }
+
+    def _poses(self, k: int) -> dict[int, Pose]:
+        """Returns the poses of frame k by recorded id."""
+        return {
+            id: wire.pose([[v / CM for v in place], [pitch, yaw, roll]], "pose")
+            for id, place, (roll, pitch, yaw) in self.frames[k].rows(Packet.POSITION)
         }
 
 
@@ -69,25 +93,38 @@ def _between(a: Pose, b: Pose, share: float, span: float) -> tuple[Pose, Vector]
     return pose, (dx / span, dy / span, dz / span)
 
 
-def recording(name: str, head: dict[str, Any], ticks: list[list[Any]]) -> CarlaRecording:
-    """Returns what a file's lines say; CallError when it is of another format or its times do not grow.
+def recording(name: str, head: LogHead, frames: Iterable[LogFrame]) -> CarlaRecording:
+    """Returns what can be replayed of a file; CallError when its times do not grow or no place is finite."""
+    read = list(frames)
+    if not read:
+        raise CallError(f"{name} holds no frames that can be replayed")
+    times = [frame.elapsed - read[0].elapsed for frame in read]
+    if not all(b > a for a, b in pairwise(times)):
+        raise CallError(f"{name} cannot be replayed: its times do not grow")
+    for frame in read:
+        for packet in (Packet.POSITION, Packet.WEATHER, Packet.VEHICLE, Packet.TRAFFIC_LIGHT):
+            if not _is_finite(frame, packet):
+                raise CallError(f"{name} cannot be replayed: frame {frame.number} is not finite")
+    kinds = {actor.id: actor for frame in read for actor in frame.added}
+    return CarlaRecording(head.map, times, read, _weathers(read), kinds)
 
-    Other errors, WireError and LookupError among them, for broken lines.
-    """
-    if head.get("format") != FORMAT or not ticks:
-        raise CallError(f"{name} holds no ticks that can be replayed")
-    kinds: dict[int, tuple[str, dict[str, str]]] = {}
-    poses = []
-    for _, _, places, _, born, *_ in ticks:
-        for id, blueprint, attributes in born:
-            given = {wire.text(k, "attribute"): wire.text(v, k) for k, v in attributes.items()}
-            kinds[wire.integer(id, "actor id")] = wire.text(blueprint, "blueprint"), given
-        poses.append({id: wire.pose([xyz, turn], "pose") for id, xyz, turn in places})
-    start = float(ticks[0][1])
-    times = [float(t[1]) - start for t in ticks]
-    if any(b <= a for a, b in pairwise(times)):
-        raise CallError(f"{name}: times do not grow")
-    return CarlaRecording(str(head.get("map")), times, poses, kinds)
+
+def _weathers(frames: list[LogFrame]) -> list[list[float] | None]:
+    """Returns the weather at each frame."""
+    found: list[list[float] | None] = []
+    for frame in frames:
+        rows = frame.rows(Packet.WEATHER)
+        found.append(list(rows[-1][0]) if rows else found[-1] if found else None)
+    return found
+
+
+def _is_finite(frame: LogFrame, packet: Packet) -> bool:
+    """Returns whether all numbers of a packet are finite and of sensible size."""
+    records = frame.records.get(packet)
+    if records is None:
+        return True
+    names = records.dtype.names or ()
+    return all(bool(np.all(np.abs(records[n]) < wire.FLOAT_MAX)) for n in names)
 
 
 class Replayer:
@@ -96,7 +133,7 @@ class Replayer:
     def __init__(self) -> None:
         self.time_factor = 1.0
         self.ignore_hero = False
-        self.ignore_spectator = False
+        self.ignore_spectator = True
         self._run: _Run | None = None
 
     def start(
@@ -110,7 +147,8 @@ class Replayer:
         self.release()
         begin = max(source.total + begin, 0.0) if begin < 0.0 else min(begin, source.total)
         end = min(begin + duration, source.total) if duration > 0.0 else source.total
-        self._run = _Run(episode, source, begin, end, follow)
+        lights = _match_lights(episode, source)
+        self._run = _Run(episode, source, begin, end, follow, lights)
         self._place(self._run)
         return begin, end
 
@@ -141,15 +179,17 @@ class Replayer:
         self._run = None
 
     def _place(self, run: _Run) -> None:
-        """Sets every recorded actor at its pose of the moment, removes the others and moves the spectator."""
+        """Sets everything as recorded at this moment, removes actors that are gone, moves the spectator."""
         places = run.source.at(run.now)
         run.drop(keep=places.keys())
         for recorded, (pose, velocity) in places.items():
             actor = run.actor(recorded, pose, self.ignore_hero)
             if actor is not None:
                 _move(run.episode, actor, pose, velocity)
-        if not self.ignore_spectator:
-            run.watch()
+            elif not self.ignore_spectator and run.is_spectator(recorded):
+                run.episode.spectator.pose = pose
+        run.show()
+        run.watch()
 
 
 @dataclass(slots=True)
@@ -161,8 +201,36 @@ class _Run:
     now: float  # s
     end: float
     follow: int
+    lights: dict[int, Light]  # by recorded ids
     actors: dict[int, int] = field(default_factory=dict)  # actor ids by recorded ids
     refused: set[int] = field(default_factory=set)
+    weather: list[float] | None = None  # as last set
+
+    def is_spectator(self, recorded: int) -> bool:
+        """Returns whether a recorded actor is the free camera."""
+        actor = self.source.kinds.get(recorded)
+        return actor is not None and actor.blueprint == Family.SPECTATOR.value
+
+    def show(self) -> None:
+        """Sets traffic lights, controls, lamps and weather as recorded."""
+        k = self.source.index(self.now)
+        frame, episode = self.source.frames[k], self.episode
+        episode.moving.lights.restore(
+            (self.lights[id], LightState(state), elapsed, frozen)
+            for id, frozen, elapsed, state in frame.rows(Packet.TRAFFIC_LIGHT)
+            if id in self.lights and 0 <= state < len(LightState)
+        )
+        vehicles = episode.vehicles
+        for id, *told in frame.rows(Packet.VEHICLE):
+            if self.actors.get(id, 0) in vehicles:
+                vehicles.of(self.actors[id]).control = _control(*told)
+        for id, flags in frame.rows(Packet.VEHICLE_LIGHT):
+            if self.actors.get(id, 0) in vehicles:
+                vehicles.of(self.actors[id]).lights = flags
+        weather = self.source.weathers[k]
+        if weather is not None and weather is not self.weather:
+            episode.sky.apply(weather)
+            self.weather = weather
 
     def drop(self, keep: Container[int]) -> None:
         """Destroys the replay's actors that are no longer in the recording."""
@@ -172,11 +240,13 @@ class _Run:
                 self.episode.destroy(id)
 
     def free(self) -> None:
-        """Hands the actors of the recording back to physics."""
+        """Hands the actors of the recording back to physics; vehicles are left without a control."""
         for id in self.actors.values():
             actor = self.episode.actors.alive.get(id)
             if actor is not None:
                 self.episode.simulate(actor, True)
+            if id in self.episode.vehicles:
+                self.episode.vehicles.of(id).control = Control()
 
     def watch(self) -> None:
         """Puts the spectator behind the actor that it follows, if that lives."""
@@ -200,7 +270,10 @@ class _Run:
 
     def _cast(self, id: int, pose: Pose, ignore_hero: bool) -> Actor | None:
         """Returns the living actor of that id and blueprint, or a new one; None where neither is possible."""
-        blueprint, attributes = self.source.kinds.get(id, ("", {}))
+        recorded = self.source.kinds.get(id)
+        if recorded is None:
+            return None
+        blueprint, attributes = recorded.blueprint, recorded.attribute_values()
         offered = self.episode.stock.catalogue.get(blueprint)
         if offered is None or offered.family not in PLAYED:
             return None
@@ -222,3 +295,30 @@ def _move(episode: Episode, actor: Actor, pose: Pose, velocity: Vector) -> None:
         episode.vehicles.set_velocity(actor.id, velocity)
     elif actor.body is not None:
         episode.moving.set_velocity(actor.body, velocity[0], velocity[1])
+
+
+def _control(steer: float, throttle: float, brake: float, hand_brake: bool, gear: int) -> Control:
+    """Returns the control of a recorded vehicle, clamped to its ranges."""
+    return Control(
+        throttle=min(max(throttle, 0.0), 1.0),
+        steer=wire.iso_steer(min(max(steer, -1.0), 1.0)),
+        brake=min(max(brake, 0.0), 1.0),
+        hand_brake=hand_brake,
+        reverse=gear < 0,
+        gear=gear,
+    )
+
+
+def _match_lights(episode: Episode, source: CarlaRecording) -> dict[int, Light]:
+    """Returns the episode's traffic lights by the ids of recorded ones that stood at the same place."""
+    places = []
+    for actor, post in episode.posts:
+        place, _ = wire.transform(episode.actors.alive[actor].pose)
+        places.append(([CM * v for v in place], post.light))
+    found = {}
+    for recorded in source.kinds.values():
+        if recorded.kind == Kind.TRAFFIC_LIGHT:
+            near = [light for place, light in places if dist(place, recorded.place) < SAME_PLACE]
+            if near:
+                found[recorded.id] = near[0]
+    return found

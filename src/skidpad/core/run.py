@@ -9,7 +9,7 @@ from __future__ import annotations
 from enum import Enum
 from functools import cache
 from math import inf
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import msgspec
 from msgspec import Meta, Struct
@@ -93,28 +93,19 @@ class AgentDriver(Struct, frozen=True, tag="agent", forbid_unknown_fields=True):
 class CameraDriver(Struct, frozen=True, tag="camera", forbid_unknown_fields=True):
     """A frozen network that sees three images (B-121)."""
 
-    @property
-    def label(self) -> str:
-        """Returns the name of the driver in results: "camera"."""
-        return "camera"
+    label: ClassVar[str] = "camera"  # the name of the driver in results
 
 
 class ReferenceDriver(Struct, frozen=True, tag="reference", forbid_unknown_fields=True):
     """A model of a careful human at the wheel; the seed says which person (docs/reference-driver.md)."""
 
-    @property
-    def label(self) -> str:
-        """Returns the name of the reference driver in results."""
-        return REFERENCE
+    label: ClassVar[str] = REFERENCE
 
 
 class Passenger(Struct, frozen=True, tag="ideal", forbid_unknown_fields=True):
     """No driver: the scenario moves the ego."""
 
-    @property
-    def label(self) -> str:
-        """Returns the name of the driver in results: "ideal"."""
-        return "ideal"
+    label: ClassVar[str] = "ideal"
 
 
 class ChannelCrew(Struct, frozen=True, kw_only=True, tag="channels", forbid_unknown_fields=True):

@@ -14,7 +14,7 @@ Valid: film up to 2 mm, 0 to 130 km/h, road -20 to 40 C.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import exp, sqrt
+from math import exp
 from typing import NamedTuple
 
 import numpy as np
@@ -341,15 +341,6 @@ def water_drag(film: float, width: float, behind: bool) -> float:
     """
     depth = film * CLEARED if behind else film
     return 0.5 * WATER_DRAG * WATER_DENSITY * width * depth
-
-
-@kernel
-def fill_mu(
-    params: GripParams, vx: NDArray[np.float64], vy: NDArray[np.float64], out: NDArray[np.float64]
-) -> None:
-    """Writes mu of all four tyres of n vehicles by their speeds into out (n, 4). vx, vy (n,): m/s."""
-    for i in range(vx.shape[0]):
-        out[i, :] = mu_at(params, sqrt(vx[i] * vx[i] + vy[i] * vy[i]))
 
 
 def friction_ratio(weather: Weather, model: GripModel, v: float = 0.0) -> float:

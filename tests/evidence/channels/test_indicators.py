@@ -31,6 +31,7 @@ from skidpad.evidence.channels.indicators.catalogue import (
 from skidpad.evidence.channels.indicators.layout import IndicatorReadings
 from skidpad.evidence.channels.indicators.panel import IndicatorPanel
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
+from skidpad.evidence.channels.monitor import Monitor
 from support.channel_worlds import frame
 from support.examples import examples
 
@@ -385,10 +386,16 @@ def test_thresholds_are_the_published_ones_and_equality_passes():
     upper = {e.label: e.threshold for e in table.values() if e.bound is Bound.UPPER}
     assert upper == {"MV_ELSS": 0.05}
     assert {e.label for e in table.values() if e.reporting_only} == {"HCS", "OCSS"}
-    elss = table[Indicator.EGO_LOCATION]
-    assert [elss.is_violated(v) for v in (0.5999, 0.6, 0.7)] == [True, False, False]
-    variance = table[Indicator.EGO_LOCATION_VARIANCE]
-    assert [variance.is_violated(v) for v in (0.0501, 0.05)] == [True, False]
+    monitor = Monitor(("a", "b"))
+    for elss, variance in ((0.5999, 0.0501), (0.6, 0.05), (0.7, 0.0)):
+        values = np.full(len(monitor.layout.places), np.nan)
+        values[monitor.layout.span[Indicator.EGO_LOCATION]] = elss
+        values[monitor.layout.span[Indicator.EGO_LOCATION_VARIANCE]] = variance
+        monitor._count_violations(0.0, IndicatorReadings(monitor.layout, values, ()))
+    assert {(place.indicator, n) for place, n in monitor.violation_cycles.items()} == {
+        (Indicator.EGO_LOCATION, 1),
+        (Indicator.EGO_LOCATION_VARIANCE, 1),
+    }
 
 
 @pytest.mark.req("C-030", "C-031", "C-033", "C-035", "C-036")

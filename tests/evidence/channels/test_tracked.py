@@ -13,7 +13,7 @@ from skidpad.core.maths.constants import G
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.choices import Profile
 from skidpad.evidence.channels.hazards import Signal
-from skidpad.evidence.channels.judging.truth.simulator import would_hit
+from skidpad.evidence.channels.judging.truth.simulator import least_gap
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings, drive_events
 from skidpad.evidence.channels.tracked.distance import SafeDistance
 from skidpad.evidence.channels.tracked.grip import OwnGrip, planned_acceleration
@@ -39,9 +39,9 @@ def test_the_safe_distance_is_the_least_that_stopping_step_by_step_needs(
 ):
     need = SafeDistance.on(grip).of(v_follower, v_leader)
     assert need >= 0.0
-    assert not would_hit(need + 0.05, v_leader, grip, v_follower, grip)
+    assert least_gap(need + 0.05, v_leader, grip, v_follower, grip) > 0.0
     if need > 0.3:  # it looks at 200 moments, of which one may be 0.3 m too early on ice
-        assert would_hit(need - 0.3, v_leader, grip, v_follower, grip)
+        assert least_gap(need - 0.3, v_leader, grip, v_follower, grip) <= 0.0
 
 
 def test_without_a_word_the_road_is_dry():

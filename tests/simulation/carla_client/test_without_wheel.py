@@ -57,9 +57,9 @@ def test_weather_hides_what_lies_beyond_its_sight_along_the_ray() -> None:
     inverse = np.full((2, 4), 1.0 / 50.0, dtype=np.float32)
     labels = np.full((2, 4), 14, dtype=np.uint8)
     stretch = np.hypot(np.hypot(1.5 / 2.0, 0.5 / 2.0), 1.0)  # of the corner pixel's ray
-    decode.limit_labels(camera, 50.0 * stretch - 0.01, inverse, labels)
+    decode.limit_sight(camera, 50.0 * stretch - 0.01, inverse, labels)
     assert labels[0].tolist() == [decode.SKY, 14, 14, decode.SKY]
-    decode.limit_depth(camera, 50.0, inverse)
+    decode.limit_sight(camera, 50.0, inverse)
     assert (inverse == 0.0).all()
 
 

@@ -31,7 +31,6 @@ from skidpad.core.objects.checkpoint import (
     Copiers,
     copiers_of,
     may_change,
-    put_array,
     put_cell,
     put_items,
     put_list,
@@ -162,15 +161,14 @@ class _Writer:
 
     def _contents_of(self, found: Any, copier: Copier) -> Plain | None:
         """Returns the contents of an object as a checkpoint keeps them; None where they cannot change."""
-        kind = type(found)
-        if kind is np.ndarray:
+        if isinstance(found, np.ndarray):
             fixed = not (found.flags.writeable or found.dtype.hasobject)
             return None if fixed else _write_array(found)
-        if kind is list:
-            return [self.value(item) for item in found]
-        if kind is dict:
+        if isinstance(found, dict):
             return [[self.value(key), self.value(value)] for key, value in found.items()]
-        if hasattr(kind, "copy_place"):  # its copy would hold its whole history
+        if isinstance(found, (list, set, deque, bytearray)):
+            return [self.value(item) for item in found]
+        if hasattr(type(found), "copy_place"):  # its copy would hold its whole history
             return self._write_copy(found.copy_place())
         if (slots := slots_copied(copier)) is not None:
             held = {name: getattr(found, name) for name in slots if hasattr(found, name)}
@@ -178,12 +176,6 @@ class _Writer:
         put_back, state, _ = copier(found)
         if put_back is None:
             return None
-        if put_back is put_array:
-            return _write_array(found)
-        if put_back is put_list or (put_back is put_items and not isinstance(found, dict)):
-            return [self.value(item) for item in state]
-        if put_back is put_items:
-            return [[self.value(key), self.value(value)] for key, value in state.items()]
         return self.value(state) if put_back is put_cell else self._write_copy(state)
 
     def _attributes(self, found: Any, named: dict[str, Any]) -> Plain:

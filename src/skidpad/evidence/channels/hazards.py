@@ -10,6 +10,7 @@ from enum import Enum
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -89,7 +90,7 @@ _UNSTEADY = {
 }
 _STEADY = tuple(i for i in Indicator if i not in _UNSTEADY)
 
-_OPERATORS: dict[str, Callable[[float, float], bool]] = {
+OPERATORS: dict[str, Callable[[Any, Any], Any]] = {
     ">": operator.gt,
     ">=": operator.ge,
     "<": operator.lt,
@@ -110,19 +111,19 @@ class Clause:
         """Returns the clause in a text such as "gap > 0.3"; raises ConfigError for any other form."""
         try:
             signal, symbol, value = text.split()
-            if symbol not in _OPERATORS:
+            if symbol not in OPERATORS:
                 raise ValueError
             return cls(Signal(signal), symbol, float(value))
         except ValueError:
             raise ConfigError(
                 f"hazard clause {text!r} must read SIGNAL OPERATOR NUMBER with an operator of "
-                f"{' '.join(_OPERATORS)} and a signal of {', '.join(s.value for s in Signal)}"
+                f"{' '.join(OPERATORS)} and a signal of {', '.join(s.value for s in Signal)}"
             ) from None
 
     def holds(self, signals: dict[Signal, float]) -> bool | None:
         """Returns whether the clause holds; None while its signal is not evaluated."""
         value = signals[self.signal]
-        return None if np.isnan(value) else _OPERATORS[self.operator](value, self.value)
+        return None if np.isnan(value) else OPERATORS[self.operator](value, self.value)
 
 
 class Extreme(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

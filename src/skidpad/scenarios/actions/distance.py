@@ -10,7 +10,7 @@ from skidpad.scenarios.actions.base import note_bound
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.movement.measures import Axes, along_road, between, extents_along_road
 from skidpad.scenarios.reading.document import Node
-from skidpad.scenarios.reading.entities import Performance
+from skidpad.scenarios.reading.entities import Performance, read_limits
 from skidpad.scenarios.scene import Actor, Running, Scene
 
 SPRING = 0.4  # 1/m, of the controller that closes a gap (esmini's, so that files play alike)
@@ -27,34 +27,11 @@ class Displacement(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
-    """Limits of a controlled approach; all infinite: the entity simply is where it should be."""
-
-    a_max: float = inf
-    b_max: float = inf
-    v_max: float = inf
-    a_rate: float = inf  # m/s^3, of an acceleration, and of braking
-    b_rate: float = inf
-
-    @property
-    def none(self) -> bool:
-        """Returns whether neither acceleration nor deceleration is limited."""
-        return self.a_max == self.b_max == inf
-
-    def of(self, own: Performance) -> Performance:
-        """Returns the stricter of these limits and of what the entity can do."""
-        return Performance(
-            min(self.v_max, own.v_max),
-            min(self.a_max, own.a_max),
-            min(self.b_max, own.b_max),
-            min(self.a_rate, own.a_rate),
-            min(self.b_rate, own.b_rate),
-        )
-
-
-@dataclass(frozen=True, slots=True)
 class KeepGap:
-    """Keep a distance or a time behind or before another entity, along the road."""
+    """Keep a distance or a time behind or before another entity, along the road.
+
+    limits: of the approach; none of acceleration and braking: it simply is where it should be.
+    """
 
     other: str
     distance: float | None
@@ -63,12 +40,12 @@ class KeepGap:
     continuous: bool
     side: Displacement
     road: bool
-    limits: Limits
+    limits: Performance
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """Returns the running action that keeps the gap from now on."""
         own = actor.entity.performance
-        limits = self.limits.of(own)
+        limits = self.limits.within(own)
         for name, unit, asked, has in (
             ("maxSpeed", "m/s", self.limits.v_max, own.v_max),
             ("maxAcceleration", "m/s^2", self.limits.a_max, own.a_max),
@@ -79,7 +56,7 @@ class KeepGap:
             if has < asked < inf:
                 of = f"{name}, {unit}, that of its <Performance>"
                 note_bound(scene, actor, "LongitudinalDistanceAction", asked, has, of)
-        if self.limits.none and not actor.placed_by_file:
+        if self.limits.is_boundless and not actor.placed_by_file:
             scene.notice(
                 f"<LongitudinalDistanceAction> of {actor.name}: at once asked, at most "
                 f"{limits.a_max:g} m/s^2 faster and {limits.b_max:g} m/s^2 slower applied: "
@@ -153,7 +130,7 @@ class GapKept:
         action, guide = self.action, self.actor.guide
         v_other = scene.actors[action.other].v_told
         excess = action.excess(scene, self.actor, self.side)
-        if action.limits.none and self.actor.placed_by_file:
+        if action.limits.is_boundless and self.actor.placed_by_file:
             guide.v, guide.a = v_other, 0.0
             self.actor.leap(excess)
             return not action.continuous
@@ -174,7 +151,9 @@ class GapKept:
 
         True for every gap with limits.
         """
-        return not self.action.limits.none or abs(self.actor.motion.speed - v_other) < STEADY
+        return (
+            not self.action.limits.is_boundless or abs(self.actor.motion.speed - v_other) < STEADY
+        )
 
     def _limit_jerk(self, now: float, wanted: float, dt: float) -> float:
         """Returns an acceleration that grows no faster than the file allows; it may end at once.
@@ -191,10 +170,6 @@ def compile_gap(node: Node, ctx: Context) -> KeepGap:
     """Compiles a <LongitudinalDistanceAction> with either a distance in m or a time gap in s."""
     if node.has("distance") == node.has("timeGap"):
         raise node.error("needs either distance or timeGap")
-    limits = Limits()
-    found = node.find("DynamicConstraints")
-    if found is not None:
-        limits = Limits(*(found.limit(k, inf) for k in _LIMITS))
     axes = node.choice("coordinateSystem", Axes, Axes.ENTITY)
     return KeepGap(
         ctx.entity(node),
@@ -204,10 +179,5 @@ def compile_gap(node: Node, ctx: Context) -> KeepGap:
         node.flag("continuous", default=False),
         node.choice("displacement", Displacement, Displacement.ANY),
         axes in (Axes.ROAD, Axes.LANE),
-        limits,
+        read_limits(node.find("DynamicConstraints")),
     )
-
-
-_LIMITS = (
-    "maxAcceleration", "maxDeceleration", "maxSpeed", "maxAccelerationRate", "maxDecelerationRate",
-)  # fmt: skip

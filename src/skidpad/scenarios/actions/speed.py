@@ -21,7 +21,7 @@ from skidpad.scenarios.actions.jerk import (
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.movement.motion import SLOW, STEEPEST, Shape, Transition
 from skidpad.scenarios.reading.document import Node
-from skidpad.scenarios.reading.entities import Performance
+from skidpad.scenarios.reading.entities import Performance, read_limits
 from skidpad.scenarios.scene import Actor, Running, Scene
 
 ELEMENT, PROFILE = "SpeedAction", "SpeedProfileAction"
@@ -409,16 +409,8 @@ def compile_profile(node: Node, ctx: Context) -> Profile:
         entries.append((entry.number("speed"), duration))
     if not entries:
         raise node.error("needs a <SpeedProfileEntry>")
-    limits, jerk = Performance(), Jerk()
-    found = node.find("DynamicConstraints")
-    if found is not None:
-        limits = Performance(
-            found.limit("maxSpeed", inf),
-            found.limit("maxAcceleration", inf),
-            found.limit("maxDeceleration", inf),
-        )
-        if following is Following.FOLLOW:
-            rates = (found.limit(k, inf) for k in ("maxAccelerationRate", "maxDecelerationRate"))
-            jerk = Jerk(*(rate if rate > 0.0 else inf for rate in rates))
+    limits, jerk = read_limits(node.find("DynamicConstraints")), Jerk()
+    if following is Following.FOLLOW:
+        jerk = Jerk(*(rate if rate > 0.0 else inf for rate in (limits.a_rate, limits.b_rate)))
     other = ctx.entity(node) if node.has("entityRef") else None
     return Profile(tuple(entries), other, limits, jerk, following)

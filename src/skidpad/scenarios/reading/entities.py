@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import astuple, dataclass, field, replace
 from enum import Enum
 from math import inf
 
@@ -81,6 +81,15 @@ class Performance:
     b_max: float = inf
     a_rate: float = inf  # m/s^3, upwards, and downwards
     b_rate: float = inf
+
+    @property
+    def is_boundless(self) -> bool:
+        """Returns whether neither acceleration nor deceleration is limited."""
+        return self.a_max == self.b_max == inf
+
+    def within(self, other: Performance) -> Performance:
+        """Returns the stricter of these limits and another's, one by one."""
+        return Performance(*map(min, astuple(self), astuple(other)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,11 +314,13 @@ def _box(node: Node, default: Box) -> Box:
 
 def _performance(node: Node) -> Performance:
     """Returns the limits of speed and acceleration; inf where one is missing or not positive."""
-    found = node.find("Performance")
-    if found is None:
-        return Performance()
-    most = (found.limit(name, inf) for name in LIMITS)
+    most = astuple(read_limits(node.find("Performance")))
     return Performance(*(m if m > 0.0 else inf for m in most))
+
+
+def read_limits(found: Node | None) -> Performance:
+    """Returns the limits that an element names; inf where one is missing, and without an element."""
+    return Performance(*(found.limit(name, inf) for name in LIMITS)) if found else Performance()
 
 
 LIMITS = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import inf
+from typing import Any
 
 import cv2
 import numpy as np
@@ -36,42 +37,34 @@ def packed_rgb(bgra: Bytes, out: NDArray[np.uint32]) -> None:
 
 
 @kernel
-def hide_beyond(
-    sight: float, focal: float, cx: float, cy: float, inverse: Floats32, labels: Bytes, sky: int
+def _hide_beyond(
+    sight: float,
+    focal: float,
+    cx: float,
+    cy: float,
+    inverse: Floats32,
+    pixels: NDArray[Any],
+    hidden: int,
 ) -> None:
-    """Changes the class of pixels whose ray is longer than `sight` m to `sky`, in `labels`.
+    """Sets pixels whose ray is longer than `sight` m to `hidden`; they may be `inverse` itself.
 
     inverse: (H, W) inverse depth in 1/m, of the same view.
     """
-    for y in range(labels.shape[0]):
+    for y in range(pixels.shape[0]):
         v = (y + 0.5 - cy) / focal
-        for x in range(labels.shape[1]):
+        for x in range(pixels.shape[1]):
             u = (x + 0.5 - cx) / focal
             near = inverse[y, x] * sight
             if near * near < u * u + v * v + 1.0:
-                labels[y, x] = sky
+                pixels[y, x] = hidden
 
 
-@kernel
-def cut_depth(sight: float, focal: float, cx: float, cy: float, inverse: Floats32) -> None:
-    """Sets inverse depths along rays longer than `sight` m to 0, where nothing is measured."""
-    for y in range(inverse.shape[0]):
-        v = (y + 0.5 - cy) / focal
-        for x in range(inverse.shape[1]):
-            u = (x + 0.5 - cx) / focal
-            near = inverse[y, x] * sight
-            if near * near < u * u + v * v + 1.0:
-                inverse[y, x] = 0.0
-
-
-def limit_labels(camera: CameraSpec, sight: float, inverse: Floats32, labels: Bytes) -> None:
-    """Hides what the weather hides from a camera that classifies, in `labels` (decision M-1)."""
-    hide_beyond(sight, camera.focal, camera.cx, camera.cy, inverse, labels, SKY)
-
-
-def limit_depth(camera: CameraSpec, sight: float, inverse: Floats32) -> None:
-    """Hides what the weather hides from a camera that measures depth, in `inverse`."""
-    cut_depth(sight, camera.focal, camera.cx, camera.cy, inverse)
+def limit_sight(
+    camera: CameraSpec, sight: float, inverse: Floats32, labels: Bytes | None = None
+) -> None:
+    """Hides what the weather hides: classes become SKY in `labels`, else inverse depths 0 (decision M-1)."""
+    pixels, hidden = (inverse, 0) if labels is None else (labels, SKY)
+    _hide_beyond(sight, camera.focal, camera.cx, camera.cy, inverse, pixels, hidden)
 
 
 def radar_points(raw: bytes | memoryview, limit: float = inf) -> RadarPoints:

@@ -9,11 +9,11 @@ from math import hypot
 from typing import Any
 
 from skidpad.core.arrays import Floats
-from skidpad.core.maths.lefthanded import vector_from_carla
 from skidpad.core.states import ActorStates, ContactEvent, LaneInvasion
 from skidpad.roads.lanes import Marking
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.carla.actor_rows import ActorRow
+from skidpad.simulation.carla.axes import from_vector
 
 HOLD = 0.5  # s: bodies that bounce apart and touch again within this are one contact
 CROSSING = 2.0  # s: CARLA tells each corner of the outline; those of one crossing are one invasion
@@ -72,10 +72,10 @@ class EgoEvents:
             key = static or row
             began = at - self._last.get(key, -self._hold - 1) > self._hold
             touched[key] = at
-            push = vector_from_carla(*_components(event.normal_impulse))
+            push = from_vector(event.normal_impulse)
             impulse = hypot(*push)
             if began and (key not in found or impulse > found[key].impulse):
-                x, y, _ = vector_from_carla(*_components(event.transform.location))
+                x, y, _ = from_vector(event.transform.location)
                 v_closing = self._closing(event.frame, row, push)
                 found[key] = ContactEvent(at, row, static, impulse, v_closing, x, y)
         self._last.update(touched)
@@ -123,11 +123,6 @@ def thing(other: Any) -> str:
     """Returns `guardrail` of `static.guardrail`; "static" for None and what has no name."""
     name = "" if other is None else str(other.type_id).rsplit(".", 1)[-1]
     return name or "static"
-
-
-def _components(v: Any) -> tuple[float, float, float]:
-    """Returns the x, y and z of a CARLA vector."""
-    return (v.x, v.y, v.z)
 
 
 def closing(vx: Floats, vy: Floats, row: int, push: tuple[float, float, float]) -> float:

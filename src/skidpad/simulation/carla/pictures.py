@@ -72,7 +72,7 @@ class Pictures:
         if camera.modality is Modality.DEPTH:
             inverse_depth_from_bgra(bgra, out)
             if isfinite(self._depth_sight):
-                decode.limit_depth(camera, self._depth_sight, out)
+                decode.limit_sight(camera, self._depth_sight, out)
             return CameraImage(inverse_depth=out)
         if camera.modality is Modality.SEMANTIC:
             np.copyto(out, bgra[..., 2])
@@ -80,7 +80,7 @@ class Pictures:
             if twin is not None and twin.id in messages and isfinite(self._label_sight):
                 inverse = np.empty((twin.height, twin.width), dtype=np.float32)
                 inverse_depth_from_bgra(_bytes(messages[twin.id], twin), inverse)
-                decode.limit_labels(camera, self._label_sight, inverse, out)
+                decode.limit_sight(camera, self._label_sight, inverse, out)
             return CameraImage(labels=out)
         if camera.modality is Modality.INSTANCE:
             decode.instance_rows(bgra, self.rows, out)

@@ -50,16 +50,17 @@ class ChannelSettings:
 # TransFuser plans four waypoints 0.5 s apart (Chitta et al. 2022). LAV's plan is longer (C-024);
 # 4 s is assumed. LAV predicts others along learned futures, TransFuser does not predict (both
 # assumed as lane following and straight on).
+_LAV = ChannelSettings(
+    plan_horizon=4.0,
+    plan_step=0.25,
+    prediction_horizon=4.0,
+    reads_lights=True,
+    reads_stop_lines=True,
+    lane_prediction=True,
+    confirm=2,
+)
 SETTINGS = {
-    "lav_like": ChannelSettings(
-        plan_horizon=4.0,
-        plan_step=0.25,
-        prediction_horizon=4.0,
-        reads_lights=True,
-        reads_stop_lines=True,
-        lane_prediction=True,
-        confirm=2,
-    ),
+    "lav_like": _LAV,
     "tfuse_like": ChannelSettings(
         plan_horizon=2.0,
         plan_step=0.5,
@@ -68,15 +69,7 @@ SETTINGS = {
         reads_stop_lines=False,
         lane_prediction=False,
     ),
-    "reference_like": ChannelSettings(
-        plan_horizon=4.0,
-        plan_step=0.25,
-        prediction_horizon=4.0,
-        reads_lights=True,
-        reads_stop_lines=True,
-        lane_prediction=True,
-        confirm=2,
-    ),
+    "reference_like": _LAV,
 }
 
 

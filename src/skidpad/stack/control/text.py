@@ -5,21 +5,9 @@ from __future__ import annotations
 from skidpad.core.states import StackReport
 from skidpad.core.vocabulary import Tier
 
-LABELS = {
+LABELS = {tier: tier.name.replace("_", " ") for tier in Tier} | {
     Tier.NONE: "NO ACTION",
-    Tier.HARD_STOP: "HARD STOP",
-    Tier.STOPPED_TOO_CLOSE: "STOPPED TOO CLOSE",
-    Tier.EMERGENCY: "EMERGENCY",
-    Tier.STOPPED_BEHIND_CAR: "STOPPED BEHIND CAR",
-    Tier.APPROACH: "APPROACH",
-    Tier.ACC_HOLD: "ACC HOLD",
-    Tier.ACC_OPEN: "ACC OPEN",
-    Tier.ACC_CLOSE: "ACC CLOSE",
-    Tier.LIGHT_STOP: "LIGHT STOP",
-    Tier.HOLDING_AT_LINE: "HOLDING AT LINE",
     Tier.COAST: "CRUISE (COAST)",
-    Tier.CRUISE: "CRUISE",
-    Tier.BEND: "BEND",
 }
 BY_GAP = frozenset({Tier.EMERGENCY, Tier.ACC_HOLD, Tier.ACC_OPEN, Tier.ACC_CLOSE})
 BY_DISTANCE = frozenset({Tier.HARD_STOP, Tier.STOPPED_TOO_CLOSE, Tier.STOPPED_BEHIND_CAR})

@@ -19,8 +19,8 @@ from skidpad.evidence.channels.judging.truth import simulator
 from skidpad.evidence.channels.judging.truth.simulator import (
     G,
     footprint,
+    least_gap,
     simulator_truth,
-    would_hit,
 )
 from skidpad.evidence.channels.judging.truth.worldmodel import world_model_truth
 from skidpad.evidence.channels.matching import (
@@ -50,16 +50,16 @@ def test_equal_speeds_hit_as_their_stopping_distances_say(v, gap, mu):
     if a_follow > a_lead + 1e-6 and v / a_follow + 1.0 < v / a_lead:
         return  # the follower may stop first: the nearest moment is then not the end
     if abs(distance - gap) > 0.05:
-        assert would_hit(gap, v, mu, v, mu) == (distance > gap)
+        assert (least_gap(gap, v, mu, v, mu) <= 0.0) == (distance > gap)
 
 
 @given(st.floats(0, 60), st.floats(0, 40), st.floats(0, 40), st.floats(0.1, 1.0))
 @settings(max_examples=examples(60))
 def test_a_hit_stays_a_hit_when_nearer_faster_or_slicker(gap, v_lead, v_follow, mu):
-    if would_hit(gap, v_lead, 0.9, v_follow, mu):
-        assert would_hit(gap * 0.9, v_lead, 0.9, v_follow, mu)
-        assert would_hit(gap, v_lead, 0.9, v_follow * 1.1, mu)
-        assert would_hit(gap, v_lead, 0.9, v_follow, mu * 0.9)
+    if least_gap(gap, v_lead, 0.9, v_follow, mu) <= 0.0:
+        assert least_gap(gap * 0.9, v_lead, 0.9, v_follow, mu) <= 0.0
+        assert least_gap(gap, v_lead, 0.9, v_follow * 1.1, mu) <= 0.0
+        assert least_gap(gap, v_lead, 0.9, v_follow, mu * 0.9) <= 0.0
 
 
 def scene(objects, ego=(0.0, 0.0, 0.0, 15.0, 0.0), duration=8.0, eyes=None):

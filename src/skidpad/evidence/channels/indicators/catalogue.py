@@ -103,12 +103,6 @@ class Threshold(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         if (self.threshold is None) != (self.bound is Bound.NONE):
             raise ValueError("a threshold goes with the bound lower or upper, and with no other")
 
-    def is_violated(self, value: float) -> bool:
-        """Returns whether an evaluated `value` raises an alarm; equality passes (C-101), as does no bound."""
-        if self.threshold is None:
-            return False
-        return value < self.threshold if self.bound is Bound.LOWER else value > self.threshold
-
 
 def built_in_thresholds() -> dict[Indicator, Threshold]:
     """Returns the bounds of Skidpad's own indicators, in the order of their table."""

@@ -6,10 +6,9 @@ deviations by which a gap must be short; of a learned identifier the limit of it
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from skidpad.core.channels import ChannelFrame, Cycle
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.choices import Profile
 from skidpad.evidence.channels.frames import usable
-from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Rule, Signal, load_rules
+from skidpad.evidence.channels.hazards import OPERATORS, SCORED_HAZARDS, Rule, Signal, load_rules
 from skidpad.evidence.channels.identifier.model import Detector, events_of, probability_of
 from skidpad.evidence.channels.matching import Span, tally
 from skidpad.evidence.channels.tracked.distance import SafeDistance
@@ -44,9 +43,6 @@ SIDES = {
     HazardType.EGO_TAILGATING: Signal.FRONT_DEFICIT,
     HazardType.EGO_TAILGATED: Signal.REAR_DEFICIT,
 }
-_OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
-    ">": operator.gt, ">=": operator.ge, "<": operator.lt, "<=": operator.le,
-}  # fmt: skip
 
 
 class Point(NamedTuple):
@@ -96,7 +92,7 @@ def found_by(rule: Rule, t: Floats, table: Table, begin: float) -> tuple[Span, .
     for clauses in rule.alternatives:
         held = np.ones(t.size, dtype=bool)
         for c in clauses:
-            held &= _OPERATORS[c.operator](table[c.signal], c.value)  # never with NaN
+            held &= OPERATORS[c.operator](table[c.signal], c.value)  # never with NaN
         present[held] = 1.0
     return spans(rule.hazard, t, present, 0.5, 1, begin)
 

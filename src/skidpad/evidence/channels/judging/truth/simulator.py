@@ -153,22 +153,12 @@ def _size(polygons: Floats) -> Floats:
     return np.asarray(away.max(axis=-1, initial=0.0), dtype=np.float64)
 
 
-def would_hit(
-    gap: float, v_leader: float, mu_leader: float, v_follower: float, mu_follower: float
-) -> bool:
-    """Returns whether the follower hits a leader that brakes at 6 m/s^2, reacting after 1 s (C-3).
-
-    gap: m, bumper to bumper; speeds in m/s; mu: grip of each.
-    """
-    return least_gap(gap, v_leader, mu_leader, v_follower, mu_follower) <= 0.0
-
-
 def least_gap(
     gap: float, v_leader: float, mu_leader: float, v_follower: float, mu_follower: float
 ) -> float:
     """Returns the least m between both when the leader brakes at 6 m/s^2; negative: they would overlap.
 
-    The follower brakes at all its grip after REACTION_TIME; the leader at no more than its own.
+    The follower brakes at all its grip after REACTION_TIME; the leader at no more than its own (C-3).
     gap: m, bumper to bumper; speeds in m/s; mu: grip of each.
     """
     a_leader = min(BRAKE_LEADER, mu_leader * G)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from math import cos, hypot, sin
+from math import hypot
 from typing import Any, Protocol
 
 from skidpad.core.geometry import Pose
@@ -15,7 +15,7 @@ from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import LightState
 from skidpad.recording.run.lamps import LampChange
 from skidpad.recording.run.tilts import Tilted
-from skidpad.scenarios.movement.measures import Point, corners, overlap
+from skidpad.scenarios.movement.measures import Point, between, corners, overlap
 from skidpad.scenarios.movement.motion import Guide
 from skidpad.scenarios.movement.network import Network, Place
 from skidpad.scenarios.movement.steering import LaneSteering
@@ -389,10 +389,8 @@ class Scene:
 
     def between(self, a: str, b: str) -> Point:
         """Returns where b lies as seen from a: m forward, m left."""
-        from_, to = self.actors[a].pose, self.actors[b].pose
-        dx, dy = to.x - from_.x, to.y - from_.y
-        c, s = cos(from_.yaw), sin(from_.yaw)
-        return dx * c + dy * s, dy * c - dx * s
+        to = self.actors[b].pose
+        return between(self.actors[a].pose, to.x, to.y)
 
     def touch(self, a: str, b: str) -> bool:
         """Returns whether two entities are in contact now; never one that is absent or a ghost."""

@@ -125,7 +125,7 @@ def _handed_over(wishes: Mapping[str, _Wish]) -> Iterator[tuple[str, bool]]:
 def is_step_of_place(action: PrivateAction) -> bool:
     """Returns whether an action puts its entity somewhere else without taking time."""
     if isinstance(action, KeepGap):
-        return action.limits.none
+        return action.limits.is_boundless
     if isinstance(action, LaneChange):
         return action.at_once
     return isinstance(action, LaneOffset) and action.shape is Shape.STEP
@@ -207,7 +207,7 @@ class _Starting:
     def _speed(self) -> float:
         """Returns the initial speed in m/s: the leader's for a gap action, else as asked, limited, or 0."""
         gap = next((a for a in self.wish.actions if isinstance(a, KeepGap)), None)
-        if gap is not None and gap.limits.none:
+        if gap is not None and gap.limits.is_boundless:
             return self.scene.actors[gap.other].v_told
         if self.wish.speed is None:
             return 0.0

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
-from typing import NamedTuple
 
 from skidpad.scenarios.actions.base import GlobalAction, PrivateAction
 from skidpad.scenarios.actions.private import private_action
@@ -106,21 +105,12 @@ class Storyboard:
         return tuple(e for a in acts for g in a.groups for m in g.manoeuvres for e in m.events)
 
 
-class Level(NamedTuple):
-    """One level of the storyboard: its element, its type as conditions name it, what is inside."""
-
-    tag: str
-    type: str
-    inside: str
-
-
-LEVELS: Mapping[str, Level] = {
-    "Story": Level("Story", "story", "Act"),
-    "Act": Level("Act", "act", "ManeuverGroup"),
-    "ManeuverGroup": Level("ManeuverGroup", "maneuverGroup", "Maneuver"),
-    "Maneuver": Level("Maneuver", "maneuver", "Event"),
-    "Event": Level("Event", "event", "Action"),
-    "Action": Level("Action", "action", ""),
+INSIDE: Mapping[str, tuple[str, ...]] = {  # the elements in an element of the storyboard
+    "Story": ("Act",),
+    "Act": ("ManeuverGroup",),
+    "ManeuverGroup": ("Maneuver", "CatalogReference"),
+    "Maneuver": ("Event",),
+    "Event": ("Action",),
 }
 
 
@@ -134,14 +124,11 @@ def element_paths(board: Node, ctx: Context) -> list[tuple[str, Path]]:
                 node = ctx.catalogs.resolve(node, "Maneuver")
             except Fault:
                 return  # reported where the manoeuvre is compiled
-        level = LEVELS[node.tag]
+        tag = node.tag
         node = ctx.attempt(partial(inner, node)) or node
         path = (*above, node.label())
-        found.append((level.type, path))
-        inside = (
-            (level.inside, "CatalogReference") if level.inside == "Maneuver" else (level.inside,)
-        )
-        for child in node.children(*inside) if level.inside else ():
+        found.append((tag[0].lower() + tag[1:], path))  # as conditions name it
+        for child in node.children(*INSIDE[tag]) if tag in INSIDE else ():
             look(child, path)
 
     for story in board.children("Story"):

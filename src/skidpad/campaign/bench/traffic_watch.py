@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 
 from skidpad.campaign.bench.headways import field_sources, headways_of, judge
 from skidpad.core.arrays import Flags, Floats, Ints32
+from skidpad.core.geometry import footprint
+from skidpad.scenarios.movement.measures import overlap
 from skidpad.simulation.world.traffic.manager import CHECK_PERIOD
 from skidpad.simulation.world.traffic.state import Held
 from skidpad.simulation.world.world import World
@@ -255,27 +257,13 @@ def overlaps(world: World) -> set[tuple[int, int]]:
     found = set()
     for a, b in zip(*np.nonzero(np.triu(near, 1)), strict=True):
         i, j = int(there[a]), int(there[b])
-        boxes = [(float(s.x[k]), float(s.y[k]), float(s.yaw[k])) for k in (i, j)]
-        sizes = [(table.length[k] / 2.0, table.width[k] / 2.0) for k in (i, j)]
-        if not _apart(boxes, sizes):
+        one, other = (
+            footprint(s.x[k], s.y[k], s.yaw[k], table.length[k], table.width[k]).tolist()
+            for k in (i, j)
+        )
+        if overlap(one, other) <= 0.0:
             found.add((i, j))
     return found
-
-
-def _apart(boxes: list[tuple[float, float, float]], sizes: list[tuple[float, float]]) -> bool:
-    """Returns True when two boxes (x, y, yaw with half sizes, m) do not touch: a separating axis."""
-    (x0, y0, _), (x1, y1, _) = boxes
-    axes = [
-        (np.cos(yaw + turn), np.sin(yaw + turn)) for _, _, yaw in boxes for turn in (0, np.pi / 2)
-    ]
-    for ux, uy in axes:
-        reach = 0.0
-        for (_, _, yaw), (half_l, half_w) in zip(boxes, sizes, strict=True):
-            c, sn = np.cos(yaw), np.sin(yaw)
-            reach += half_l * abs(c * ux + sn * uy) + half_w * abs(-sn * ux + c * uy)
-        if abs((x1 - x0) * ux + (y1 - y0) * uy) > reach:
-            return True
-    return False
 
 
 def times_to_neighbours(world: World) -> Floats:

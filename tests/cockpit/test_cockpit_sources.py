@@ -30,7 +30,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Crowd, Pedals, Timed, Wheel
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import ActorKind, HazardType, SemanticClass, class_of
-from skidpad.evidence.pairs import Body
+from skidpad.evidence.bodies import Body
 from skidpad.recording.channels.cycles import cycles
 from skidpad.recording.channels.mcap_files import ChannelWriter
 from skidpad.recording.hazards.records import HazardRecord, HazardWriter

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis.strategies import floats
 
+from skidpad.evidence.bodies import Body
 from skidpad.evidence.encounters import box_distance, encounter, time_to_meet
-from skidpad.evidence.pairs import Body
 from support.examples import examples
 from support.makelog import drive
 

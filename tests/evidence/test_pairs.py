@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis.strategies import floats
 
 from skidpad.core.errors import ConfigError
+from skidpad.evidence.bodies import Body
 from skidpad.evidence.expectations import parse_expectation
 from skidpad.evidence.pairs import (
-    Body,
     Pair,
     following,
     pair_of,

@@ -45,7 +45,7 @@ from skidpad.core.vocabulary import (
     class_of,
 )
 from skidpad.core.weather import Weather
-from skidpad.evidence.pairs import Body
+from skidpad.evidence.bodies import Body
 from skidpad.live.links import MONITORED
 from skidpad.recording.channels.indicators import FILE, read_indicators
 from skidpad.recording.channels.mcap_files import McapRecording

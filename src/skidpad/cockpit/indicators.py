@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
+from skidpad.evidence.bodies import Body
 from skidpad.evidence.drive.conflict import time_to_collision
-from skidpad.evidence.pairs import Body, following
+from skidpad.evidence.pairs import following
 
 NEAR = 10.0  # s, our choice: a longer time to collision is not shown
 CURVE = 1000  # about so many moments of a curve are shown

@@ -39,7 +39,8 @@ from skidpad.core.states import (
     WorldTruth,
 )
 from skidpad.core.vocabulary import DetectionStatus, LightSource, LightState, Supervision, Tier
-from skidpad.evidence.pairs import body, together
+from skidpad.evidence.bodies import body
+from skidpad.evidence.pairs import together
 from skidpad.physics.types import vehicle_types
 from skidpad.recording.run.events import LightChange, Notice, Relocation
 from skidpad.recording.run.inputs import read_inputs

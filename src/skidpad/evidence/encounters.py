@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Flags, Floats
-from skidpad.evidence.pairs import Body, body, following, together
+from skidpad.evidence.bodies import Body, body, corner_distance
+from skidpad.evidence.pairs import following, together
 from skidpad.recording.run.log import RunLog
 
 TIME, DISTANCE = 3.0, 20.0  # s, m: farther apart is no interaction
@@ -48,11 +49,11 @@ def encounter(log: RunLog, ego: int, other: int, since: float = 0.0) -> Encounte
     both = together(log, ego, other)
     if not both.any():
         return None
-    one, two = _select_rows(body(log, ego), both), _select_rows(body(log, other), both)
+    one, two = body(log, ego).select(both), body(log, other).select(both)
     crossed = crossing(one, two, log.t[both])
     later = log.t[both] >= since - 1e-9
     met = (crossed is not None and abs(crossed) <= LEFT) or _in_play(
-        _select_rows(one, later), _select_rows(two, later), crossed is None
+        one.select(later), two.select(later), crossed is None
     )
     return Encounter(met, float(box_distance(one, two).min()), crossed)
 
@@ -63,12 +64,6 @@ def _in_play(one: Body, two: Body, ways_apart: bool) -> bool:
         return True
     near = _alongside(one, two) & (box_distance(one, two) <= DISTANCE)
     return ways_apart and bool(near.any())
-
-
-def _select_rows(one: Body, rows: Flags | NDArray[np.int64]) -> Body:
-    """Return a body with these rows alone."""
-    x, y, yaw, vx, vy, ax, ay = (column[rows] for column in one[:7])
-    return Body(x, y, yaw, vx, vy, ax, ay, one.length, one.width)
 
 
 def _axes(one: Body) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
@@ -128,39 +123,10 @@ def _alongside(one: Body, other: Body) -> Flags:
     return mask
 
 
-def _corners(one: Body) -> Floats:
-    """Returns the corners of a box, (4, T, 2) m."""
-    (cx, cy), (sx, sy) = _axes(one)
-    signs = ((1, 1), (1, -1), (-1, -1), (-1, 1))
-    half = 0.5 * one.length, 0.5 * one.width
-    return np.stack(
-        [
-            np.stack(
-                [
-                    one.x + i * half[0] * cx + j * half[1] * sx,
-                    one.y + i * half[0] * cy + j * half[1] * sy,
-                ],
-                axis=-1,
-            )
-            for i, j in signs
-        ]
-    )
-
-
-def _outside(points: Floats, box: Body) -> Floats:
-    """Returns (4, T) m of points (4, T, 2) from a box, 0 inside."""
-    (cx, cy), (sx, sy) = _axes(box)
-    dx, dy = points[..., 0] - box.x, points[..., 1] - box.y
-    forward = np.maximum(np.abs(dx * cx + dy * cy) - 0.5 * box.length, 0.0)
-    left = np.maximum(np.abs(dx * sx + dy * sy) - 0.5 * box.width, 0.0)
-    distance: Floats = np.hypot(forward, left)
-    return distance
-
-
 def box_distance(one: Body, other: Body) -> Floats:
     """Returns the distance between two boxes, (T,) m; 0 while they overlap."""
-    corners = np.concatenate([_outside(_corners(one), other), _outside(_corners(other), one)])
-    distance: Floats = np.where(time_to_meet(one, other) <= 0.0, 0.0, corners.min(axis=0))
+    apart = corner_distance(one, other)
+    distance: Floats = np.where(time_to_meet(one, other) <= 0.0, 0.0, apart)
     return distance
 
 
@@ -170,7 +136,7 @@ def crossing(one: Body, other: Body, t: Floats) -> float | None:
     t: (T,) s.
     """
     a, b = _places(one), _places(other)
-    first, second = _select_rows(one, a), _select_rows(other, b)
+    first, second = one.select(a), other.select(b)
     x, y, yaw = first.x[:, None], first.y[:, None], first.yaw[:, None]
     shared = overlap_along(x, y, yaw, second.x, second.y, second.yaw, one, other)
     shared &= overlap_along(second.x, second.y, second.yaw, x, y, yaw, other, one)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
+from skidpad.evidence.bodies import Body, body
 from skidpad.evidence.channels.boxes import STEP
 from skidpad.evidence.channels.conflicts import encroachment
 from skidpad.evidence.drive.conflict import (
@@ -38,20 +39,6 @@ class Pair(NamedTuple):
         float | None
     )  # m/s^2, largest required deceleration, with the lead's acceleration
     min_pet_s: float | None  # s, least post-encroachment time, up to 2 s
-
-
-class Body(NamedTuple):
-    """One actor over time, arrays (T,): m, rad, m/s, m/s^2 in its own axes."""
-
-    x: Floats
-    y: Floats
-    yaw: Floats
-    vx: Floats  # world
-    vy: Floats
-    ax: Floats  # body
-    ay: Floats
-    length: float
-    width: float
 
 
 class Following(NamedTuple):
@@ -98,16 +85,6 @@ def together(log: RunLog, i: int, j: int) -> NDArray[np.bool_]:
     return log.present[:, i] & log.present[:, j] & one_road
 
 
-def body(log: RunLog, i: int) -> Body:
-    """Returns the columns of actor i of the log."""
-    a = log.actors
-    x, y, yaw, vx, vy, ax, ay = (
-        v[:, i].astype(np.float64) for v in (a.x, a.y, a.yaw, a.vx, a.vy, a.ax, a.ay)
-    )
-    length, width = float(log.table.length[i]), float(log.table.width[i])
-    return Body(x, y, yaw, vx, vy, ax, ay, length, width)
-
-
 def pair_of(
     names: tuple[str, str], one: Body, other: Body, both: NDArray[np.bool_], dt: float
 ) -> Pair:
@@ -136,8 +113,7 @@ def pair_of(
 def following(behind: Body, ahead: Body) -> Following:
     """Returns what the one behind has in its way, as boxes; both keep their directions."""
     c, s = np.cos(behind.yaw), np.sin(behind.yaw)
-    dx, dy = ahead.x - behind.x, ahead.y - behind.y
-    forward, left = dx * c + dy * s, dy * c - dx * s
+    forward, left = behind.project(ahead.x, ahead.y)
     turn = ahead.yaw - behind.yaw
     tc, ts = np.abs(np.cos(turn)), np.abs(np.sin(turn))
     long = 0.5 * (behind.length + ahead.length * tc + ahead.width * ts)

@@ -18,10 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from skidpad.core.arrays import Floats
+from skidpad.evidence.bodies import body
 from skidpad.evidence.drive.conflict import deceleration_to_avoid_crash, time_to_collision
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.evidence.drive.severity import LIGHT_BELOW, Contact, graded_contacts
-from skidpad.evidence.pairs import EGO, Pair, body, following, pairs, together
+from skidpad.evidence.pairs import EGO, Pair, following, pairs, together
 from skidpad.recording.run.log import RunLog
 from skidpad.roads.queries import RoadMap
 

@@ -6,16 +6,16 @@ it was in the ego's way; before that beside the gap to the lead in truth.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
-from itertools import pairwise, product
-from typing import NamedTuple
+from itertools import pairwise
 
 import numpy as np
 
 from skidpad.core.arrays import Flags, Floats
 from skidpad.core.vocabulary import DetectionStatus, Tier
+from skidpad.evidence.bodies import body, corner_distance
 from skidpad.evidence.drive.collisions import (
     CHAIN_TIME,
     JUST_BEFORE,
@@ -199,57 +199,17 @@ class _Way:
         )
 
 
-class _Box(NamedTuple):
-    """The box of an actor over time, arrays (T,); half sizes in m."""
-
-    x: Floats
-    y: Floats
-    yaw: Floats
-    half_length: float
-    half_width: float
-
-    def project(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
-        """Returns points of the world in the axes of the box, forward and left."""
-        dx, dy, c, s = x - self.x, y - self.y, np.cos(self.yaw), np.sin(self.yaw)
-        return dx * c + dy * s, dy * c - dx * s
-
-    def corners(self) -> Iterator[tuple[Floats, Floats]]:
-        """Yields the four corners of the box in the world."""
-        c, s = np.cos(self.yaw), np.sin(self.yaw)
-        for side, end in product((-1.0, 1.0), repeat=2):
-            along, across = end * self.half_length, side * self.half_width
-            yield self.x + along * c - across * s, self.y + along * s + across * c
-
-    def gap(self, x: Floats, y: Floats) -> Floats:
-        """Returns the m from points to it, 0 inside."""
-        forward, left = self.project(x, y)
-        along = np.maximum(np.abs(forward) - self.half_length, 0.0)
-        return np.hypot(along, np.maximum(np.abs(left) - self.half_width, 0.0))
-
-
-def _box_of(log: RunLog, at: int, actor: int) -> _Box:
-    """Returns an actor's poses up to row `at` and half its length and width in m."""
-    rows = slice(0, at + 1)
-    x, y, yaw = (
-        np.asarray(values[rows, actor], np.float64)
-        for values in (log.actors.x, log.actors.y, log.actors.yaw)
-    )
-    length, width = float(log.table.length[actor]), float(log.table.width[actor])
-    return _Box(x, y, yaw, length / 2.0, width / 2.0)
-
-
 def _box_gap(log: RunLog, at: int, actor: int) -> tuple[Floats, Flags]:
     """Returns m between the boxes of the ego and an actor, and whether it is straight ahead and near.
 
     Both (at + 1,); nan where the actor is absent. Near is within STRAIGHT_WITHIN.
     """
-    ego, other = (_box_of(log, at, i) for i in (EGO, actor))
-    gaps = [a.gap(x, y) for a, b in ((ego, other), (other, ego)) for x, y in b.corners()]
+    ego, other = (body(log, i).select(slice(0, at + 1)) for i in (EGO, actor))
     forward, left = ego.project(other.x, other.y)
-    in_way = np.abs(left) < ego.half_width + other.half_width
+    in_way = np.abs(left) < ego.width / 2.0 + other.width / 2.0
     there = log.present[: at + 1, actor]
     straight = (forward > 0.0) & (forward < STRAIGHT_WITHIN) & in_way & there
-    return np.where(there, np.min(gaps, axis=0), np.nan), straight
+    return np.where(there, corner_distance(ego, other), np.nan), straight
 
 
 def _classify_arrival(drive: Drive, begin: int, way: _Way) -> Arrival:

@@ -10,8 +10,9 @@ import numpy as np
 
 from skidpad.core.arrays import Floats
 from skidpad.core.geometry import kmh_from_mps
+from skidpad.evidence.bodies import body
 from skidpad.evidence.drive.conflict import time_to_collision
-from skidpad.evidence.pairs import EGO, body, following, together
+from skidpad.evidence.pairs import EGO, following, together
 from skidpad.evidence.play_verdicts import Counterpart
 from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.log_files import read_log

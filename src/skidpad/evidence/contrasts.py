@@ -15,6 +15,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import ArrayLike
 
+from skidpad.core.text.wording import list_text
 from skidpad.core.vocabulary import Outcome
 from skidpad.evidence.statistics import (
     Interval,
@@ -116,7 +117,7 @@ class Paired:
     @property
     def test(self) -> tuple[str, ...]:
         """Returns the phrases for sign changes of paired differences."""
-        return (f"paired by {_join_words(self.by)}", SIGNS)
+        return (f"paired by {list_text(self.by)}", SIGNS)
 
     @property
     def amounts(self) -> tuple[Amount, ...]:
@@ -168,7 +169,7 @@ class Outweighs:
     @property
     def test(self) -> tuple[str, ...]:
         """Returns the phrases for sign changes of paired differences."""
-        return (f"paired by {_join_words(self.by)}", SIGNS)
+        return (f"paired by {list_text(self.by)}", SIGNS)
 
     @property
     def amounts(self) -> tuple[Amount, ...]:
@@ -359,8 +360,3 @@ def contrast_pairs(
 def has_columns(table: pl.DataFrame, *needed: pl.Expr) -> bool:
     """Returns whether all columns that expressions read are in the table."""
     return {name for e in needed for name in e.meta.root_names()} <= set(table.columns)
-
-
-def _join_words(words: Sequence[str]) -> str:
-    """Returns the words joined by commas and "and"."""
-    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

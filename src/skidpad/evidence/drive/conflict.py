@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from skidpad.core.arrays import Flags, Floats
 from skidpad.evidence.drive.prepared import Drive
+from skidpad.recording.campaign.matrix import Metrics
 
 V_EGO_MIN = 1.0  # m/s, below there is no time to collision (A-232)
 V_CLOSING_MIN = 0.5  # m/s (A-232)
@@ -15,23 +14,6 @@ TTC_MAX = 30.0  # s (A-232)
 TTC_CRITICAL = 1.5  # s (A-234)
 V_GATE = 10.0 / 3.6  # m/s, for the gated minimum (A-254)
 GAP_MIN = 0.1  # m, nearer the needed deceleration says nothing more
-
-
-class Conflicts(NamedTuple):
-    """Summary over some ticks; None where no tick had a time to collision (A-235)."""
-
-    min_ttc: float | None  # s
-    min_ttc_gated: float | None  # s, at more than 10 km/h
-    critical_ticks: int
-    critical_time: float  # s
-
-
-class TrueConflicts(NamedTuple):
-    """True conflicts from the boxes of ego and lead, along the lane (decision M-8)."""
-
-    min_ttc: float | None  # s
-    max_drac: float | None  # m/s^2
-    min_gap: float | None  # m
 
 
 def time_to_collision(gap: Floats, v_closing: Floats) -> Floats:
@@ -68,28 +50,28 @@ def reported_ttc(drive: Drive) -> Floats:
     return inside
 
 
-def conflicts(drive: Drive, where: Flags) -> Conflicts:
+def conflicts(drive: Drive, where: Flags) -> Metrics:
     """Returns the least time to collision and the time below TTC_CRITICAL, over samples in `where`."""
     ttc = np.where(where & drive.sample, reported_ttc(drive), np.inf)
     critical = int(np.count_nonzero(ttc < TTC_CRITICAL))
-    return Conflicts(
-        min_ttc=least(ttc),
-        min_ttc_gated=least(ttc[drive.v > V_GATE]),
-        critical_ticks=critical,
-        critical_time=critical * drive.log.header.dt,
+    return Metrics(
+        min_ttc_s=least(ttc),
+        min_ttc_above_10_kmh_s=least(ttc[drive.v > V_GATE]),
+        ttc_critical_count=critical,
+        ttc_below_1_5_s=critical * drive.log.header.dt,
     )
 
 
-def true_conflicts(drive: Drive, where: Flags) -> TrueConflicts:
-    """Returns surrogates from truth while the ego drives, for leads whose box is in the ego's way."""
+def true_conflicts(drive: Drive, where: Flags) -> Metrics:
+    """Returns surrogates from truth along the lane, for leads whose box is in the driving ego's way (M-8)."""
     lead = drive.lead
     use = where & drive.free & (drive.v > V_EGO_MIN) & lead.overlap & ~np.isnan(lead.gap)
     gap, closing = lead.gap[use], lead.v_closing[use]
     drac = deceleration_to_avoid_crash(gap, closing)
-    return TrueConflicts(
-        min_ttc=least(time_to_collision(gap, closing)),
-        max_drac=float(drac.max()) if drac.size else None,
-        min_gap=least(gap),
+    return Metrics(
+        min_ttc_true_s=least(time_to_collision(gap, closing)),
+        max_drac_true=float(drac.max()) if drac.size else None,
+        min_gap_true_m=least(gap),
     )
 
 

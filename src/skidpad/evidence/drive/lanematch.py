@@ -29,13 +29,7 @@ class LaneMatch(NamedTuple):
 
     def at(self, rows: Ints | NDArray[np.bool_]) -> LaneMatch:
         """Returns the match of the points of these rows only."""
-        return LaneMatch(
-            self.lane[rows],
-            self.s[rows],
-            self.offset[rows],
-            self.heading[rows],
-            self.curvature[rows],
-        )
+        return LaneMatch(*(column[rows] for column in self))
 
 
 class LaneIndex:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
-from typing import NamedTuple
 
 import numpy as np
 
@@ -82,9 +81,12 @@ def summarise(
         _collisions(drive, here, where),
         _severity(drive, here, where),
         _lanes(drive, highway, where),
-        _conflicts(drive, where),
+        lateral_offset(drive, where),
+        conflicts(drive, where),
+        true_conflicts(drive, where),
         _radar(drive, where),
-        _distances(drive, where),
+        distance_errors(drive, where),
+        _dropouts(drive, where),
         _driving(drive, here, where),
         background(drive, where),
         _ticks(drive, where),
@@ -167,34 +169,10 @@ def _first_fatal(drive: Drive, here: Sequence[Crash], where: Flags) -> float | N
 
 
 def _lanes(drive: Drive, highway: frozenset[int], where: Flags) -> Metrics:
-    """Returns the metrics of lane markings crossed and of the lateral offset in `where`."""
+    """Returns the metrics of lane markings that the ego's outline crossed in `where` (A-030 to A-032)."""
     counted = where & drive.free
     crossed = [i for i in drive.log.invasions if counted[drive.row(i.tick)]]
-    found = count_invasions(crossed, highway, drive.log.header.dt)
-    offsets = lateral_offset(drive, where)
-    return Metrics(
-        lane_invasions=found.solid,
-        lane_invasions_all=found.any,
-        lane_invasions_highway=found.solid_on_highway,
-        lane_changes=found.lane_changes,
-        lateral_mean_m=offsets.mean,
-        lateral_max_m=offsets.max,
-        lateral_std_m=offsets.std,
-    )
-
-
-def _conflicts(drive: Drive, where: Flags) -> Metrics:
-    """Returns the metrics of time to collision, deceleration and gap in `where`."""
-    seen, true = conflicts(drive, where), true_conflicts(drive, where)
-    return Metrics(
-        min_ttc_s=seen.min_ttc,
-        min_ttc_above_10_kmh_s=seen.min_ttc_gated,
-        ttc_below_1_5_s=seen.critical_time,
-        ttc_critical_count=seen.critical_ticks,
-        min_ttc_true_s=true.min_ttc,
-        max_drac_true=true.max_drac,
-        min_gap_true_m=true.min_gap,
-    )
+    return count_invasions(crossed, highway, drive.log.header.dt)
 
 
 def _radar(drive: Drive, where: Flags) -> Metrics:
@@ -214,15 +192,10 @@ def _radar(drive: Drive, where: Flags) -> Metrics:
     )
 
 
-def _distances(drive: Drive, where: Flags) -> Metrics:
-    """Returns the metrics of the measured distance and its dropouts in `where`."""
-    errors = distance_errors(drive, where)
+def _dropouts(drive: Drive, where: Flags) -> Metrics:
+    """Returns the metrics of the true gap and of dropouts of the measured distance in `where`."""
     dropout, dropout_present = dropout_pct(drive, where)
     return Metrics(
-        mean_error_m=errors.mean,
-        max_error_m=errors.max,
-        max_error_at_s=errors.max_at,
-        headway_variance_m2=errors.variance,
         gap_variance_m2=gap_variance(drive, where),
         dropout_pct=dropout,
         dropout_present_pct=dropout_present,
@@ -310,37 +283,24 @@ def _is_intervention(drive: Drive, begin: int) -> bool:
 # Lane keeping: distance from the lane centre, markings crossed, lane changes.
 
 
-class Offsets(NamedTuple):
-    """Distance from the lane centre in m; None when the ego never drove."""
-
-    mean: float | None
-    max: float | None
-    std: float | None
-
-
-class Invasions(NamedTuple):
-    """Markings that the ego's outline crossed (A-030 to A-032, A-248)."""
-
-    solid: int  # infractions
-    any: int
-    solid_on_highway: int
-    lane_changes: int
-
-
-def lateral_offset(drive: Drive, where: Flags) -> Offsets:
+def lateral_offset(drive: Drive, where: Flags) -> Metrics:
     """Returns statistics of |offset| above V_MIN in `where`, outside recovery and warm-up (A-245)."""
     offset = np.abs(drive.place.offset)
     use = where & drive.free & (drive.v > V_MIN) & ~np.isnan(offset)
     values = offset[use]
     if not values.size:
-        return Offsets(None, None, None)
-    return Offsets(float(values.mean()), float(values.max()), float(values.std()))
+        return Metrics()
+    return Metrics(
+        lateral_mean_m=float(values.mean()),
+        lateral_max_m=float(values.max()),
+        lateral_std_m=float(values.std()),
+    )
 
 
 def count_invasions(
     invasions: Iterable[LaneInvasion], highway: frozenset[int], dt: float
-) -> Invasions:
-    """Counts solid markings as infractions and broken ones as lane changes, at most one per 12 s.
+) -> Metrics:
+    """Counts solid markings as infractions and broken ones as lane changes, at most one per 12 s (A-248).
 
     highway: ids of roads; dt: s per tick.
     """
@@ -357,4 +317,9 @@ def count_invasions(
         ):
             changes += 1
             last_change = invasion.tick
-    return Invasions(solid, total, on_highway, changes)
+    return Metrics(
+        lane_invasions=solid,
+        lane_invasions_all=total,
+        lane_invasions_highway=on_highway,
+        lane_changes=changes,
+    )

@@ -9,6 +9,7 @@ import numpy as np
 from skidpad.core.arrays import Flags, Floats
 from skidpad.core.vocabulary import DetectionStatus, Tier
 from skidpad.evidence.drive.prepared import LEAD_RANGE, Drive
+from skidpad.recording.campaign.matrix import Metrics
 
 PRESENT = (2.0, LEAD_RANGE)  # m, exclusive (A-237)
 MEASURED = (0.1, 99.0)  # m, exclusive (A-240)
@@ -33,15 +34,6 @@ class Confusion(NamedTuple):
     def fnr_pct(self) -> float | None:
         """Returns 100 FN / (FN + TP), eq. 21; None when no vehicle was ever there."""
         return percent(self.fn, self.fn + self.tp)
-
-
-class Errors(NamedTuple):
-    """Errors of the measured distance against truth (A-240, A-241, A-254)."""
-
-    mean: float | None  # m
-    max: float | None  # m
-    max_at: float | None  # s
-    variance: float | None  # m^2, population
 
 
 def percent(part: int, whole: int) -> float | None:
@@ -71,7 +63,7 @@ def radar_levels(drive: Drive, where: Flags) -> tuple[Confusion, Confusion, Conf
     return pre, lane, final
 
 
-def distance_errors(drive: Drive, where: Flags) -> Errors:
+def distance_errors(drive: Drive, where: Flags) -> Metrics:
     """Returns errors |truth - measured| where both lie strictly between 0.1 and 99 m (A-240).
 
     All None without such a sample.
@@ -80,12 +72,12 @@ def distance_errors(drive: Drive, where: Flags) -> Errors:
     use = where & drive.sample & _inside(truth) & _inside(measured)
     error = np.abs(truth - measured)[use]
     if not error.size:
-        return Errors(None, None, None, None)
-    return Errors(
-        mean=float(error.mean()),
-        max=float(error.max()),
-        max_at=float(drive.log.t[use][np.argmax(error)]),
-        variance=float(error.var()) if error.size > 1 else None,
+        return Metrics()
+    return Metrics(
+        mean_error_m=float(error.mean()),
+        max_error_m=float(error.max()),
+        max_error_at_s=float(drive.log.t[use][np.argmax(error)]),
+        headway_variance_m2=float(error.var()) if error.size > 1 else None,
     )
 
 

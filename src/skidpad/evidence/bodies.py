@@ -26,7 +26,7 @@ class Body(NamedTuple):
 
     def select(self, rows: Any) -> Body:
         """Returns the body at these rows alone."""
-        return Body(*(column[rows] for column in self[:7]), self.length, self.width)
+        return Body._make((*(column[rows] for column in self[:7]), *self[7:]))
 
     def project(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
         """Returns points of the world, (..., T), in the axes of the body: m forward and m left."""

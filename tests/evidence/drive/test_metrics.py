@@ -314,11 +314,10 @@ def test_lateral_offset_pauses_in_recovery_and_when_slow() -> None:
 def test_solid_markings_are_infractions_and_broken_ones_lane_changes() -> None:
     crossed = [(0, "broken", 1), (200, "broken", 1), (240, "broken", 1), (300, "solid", 1)]
     crossed += [(310, "solid_broken", 9), (320, "none", 1)]
-    found = count_invasions((LaneInvasion(*c) for c in crossed), frozenset({1}), DT)
-    assert (found.solid, found.any, found.solid_on_highway, found.lane_changes) == (2, 6, 1, 2)
-    m = metrics(follow(n=400, invasions=[LaneInvasion(*c) for c in crossed]))
-    assert (m.lane_invasions, m.lane_invasions_all, m.lane_changes) == (2, 6, 2)
-    assert m.lane_invasions_highway == 1
+    marks = [LaneInvasion(*c) for c in crossed]
+    for m in (count_invasions(marks, frozenset({1}), DT), metrics(follow(n=400, invasions=marks))):
+        assert (m.lane_invasions, m.lane_invasions_all, m.lane_changes) == (2, 6, 2)
+        assert m.lane_invasions_highway == 1
 
 
 def crash(

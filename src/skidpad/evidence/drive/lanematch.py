@@ -29,7 +29,7 @@ class LaneMatch(NamedTuple):
 
     def at(self, rows: Ints | NDArray[np.bool_]) -> LaneMatch:
         """Returns the match of the points of these rows only."""
-        return LaneMatch(*(column[rows] for column in self))
+        return LaneMatch._make(column[rows] for column in self)
 
 
 class LaneIndex:

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from msgspec import structs
 
+from skidpad.campaign.cells.grip import Cross, cross, template
 from skidpad.campaign.driving.loop import Moment, Sink
 from skidpad.campaign.runs.run import OpenRun, Run
 from skidpad.core.run import Roads, RunSpec
 from skidpad.core.vocabulary import Govern, Outcome, SensorLevel, TrafficStart
-from skidpad.physics.presets import all_presets
+from skidpad.physics.presets import all_presets, find_weather
 from skidpad.recording.run.log import RunLog
+from skidpad.scenarios.shipped import NAMES
 from support.runs import adas_run, scenario_run
+from support.scenarios.files import at, event, private, story, time, write
 
 MAPS = ("figure8", "town", "motorway")
 PROFILES = ("recommended", "thesis_text", "thesis_listing", "preliminary")
@@ -111,6 +115,42 @@ def test_both_ways_give_the_same_bits_in_many_runs() -> None:
     compare(range(8, 68))
 
 
+@pytest.mark.parametrize("scenario", NAMES)
+@pytest.mark.parametrize("weather", ["icy_30", "rain-night"])
+def test_scripted_runs_give_the_same_bits(scenario: str, weather: str) -> None:
+    (cell,) = cross(
+        template(), Cross(scenarios=(scenario,), weather=(find_weather(weather),)), range(1)
+    )[:1]
+    one, (other, opened) = drive_stepwise(cell), drive_quickly(cell)
+    assert not first_difference(one.log, other.log)
+    assert one.outcome == other.outcome
+    assert one.played == other.played
+    assert opened.quick is not None
+    assert opened.quick.ticks > SHARE * len(one.log)
+
+
+def test_a_script_that_changes_what_is_seen_and_felt_gives_the_same_bits(tmp_path: Path) -> None:
+    hidden = private('<VisibilityAction graphics="true" sensors="{}" traffic="true"/>')
+    rain = """<GlobalAction><EnvironmentAction><Environment name="theirs"><Weather>
+<Precipitation precipitationType="rain" precipitationIntensity="30"/></Weather>
+<RoadCondition frictionScaleFactor="0.4"/></Environment></EnvironmentAction></GlobalAction>"""
+    events = (
+        event("hide", hidden.format("false"), time(1.0)),
+        event("show", hidden.format("true"), time(2.0)),
+        event("rain", rain, time(3.0)),
+    )
+    file = write(
+        tmp_path, stories=story(*events, actor="other"), end=6.0, minor=3,
+        init=at("ego", -1, 100, 15) + at("other", -1, 160, 12),
+    )  # fmt: skip
+    spec = scenario_run(file)
+    one, (other, opened) = drive_stepwise(spec), drive_quickly(spec)
+    assert not first_difference(one.log, other.log)
+    assert one.log.weathers == other.log.weathers
+    assert opened.quick is not None
+    assert 0.2 * len(one.log) < opened.quick.ticks < 0.8 * len(one.log)
+
+
 def test_a_run_may_be_cut_anywhere() -> None:
     spec = adas_run(4, duration=12.0)
     whole, opened = drive_quickly(spec)
@@ -142,7 +182,7 @@ class Looker(Sink):
         (adas_run(2, govern=Govern.ENVELOPE), "envelope"),
         (adas_run(2, settings={"wind": True, "wind_speed": 9.0}), "wind"),
         (adas_run(2, course=Roads(route_km=1.0)), "route"),
-        (scenario_run("front_accident"), "outside"),
+        (scenario_run("front_accident", sensors=SensorLevel.PIXELS), "pixels"),
     ],
 )
 def test_a_run_that_has_no_quick_way_says_why(spec: RunSpec, reason: str) -> None:

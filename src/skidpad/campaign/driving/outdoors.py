@@ -26,6 +26,7 @@ from skidpad.scenarios.playing.player import Player
 from skidpad.scenarios.reading.environment import Environment, Fall, Wetness
 from skidpad.scenarios.signals import held_lights
 from skidpad.simulation.backend import Backend
+from skidpad.simulation.embedded.engine import EmbeddedBackend
 
 NAME = "file"  # of the weather that a file describes
 CLOCK = re.compile(r"\dT([01]\d|2[0-4]):([0-5]\d)")  # hour and minute of an ISO 8601 date and time
@@ -59,10 +60,25 @@ class ChangedBackend:
 
     def step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand] = ()) -> Frame:
         """Changes the surroundings if there is news, then steps by the commands; returns the frame."""
+        self._change()
+        return self.inner.step(self.hands(command), actor_commands)
+
+    def _change(self) -> bool:
+        """Changes the surroundings if there is news; returns whether there was."""
         outside = self.news()
         if outside is not None:
             self.inner.change(outside)
-        return self.inner.step(self.hands(command), actor_commands)
+        return outside is not None
+
+    def make_step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand]) -> bool:
+        """Steps as `step` does, but reads no sensors; returns whether the surroundings have changed.
+
+        The wrapped backend must be the embedded one.
+        """
+        assert isinstance(self.inner, EmbeddedBackend)
+        has_changed = self._change()
+        self.inner.make_step(self.hands(command), actor_commands)
+        return has_changed
 
     def truth(self) -> WorldTruth:
         """Returns the ground truth of the moment."""
@@ -148,6 +164,11 @@ class FileChanges:
                 now = replace(now, wind=environment.wind)
         self.outside = now
         return None if now == before else now
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether the file has changed nothing so far that a log tells, and has nothing new to say."""
+        return not self.done and len(self.player.scene.notices) == self.noticed
 
     def new_notices(self) -> list[str]:
         """Returns what the scenario could not do since the last call, empty mostly."""

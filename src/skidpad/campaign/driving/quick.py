@@ -7,9 +7,11 @@ elsewhere end the call; the stepper then drives that tick. `why_not_quick` says 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from skidpad.campaign.driving.loop import Stepper, Timer, Unsupervised
+from skidpad.campaign.driving.outdoors import ChangedBackend, FileChanges
 from skidpad.campaign.driving.quick_kernel import (
     DONE,
     MOVED,
@@ -17,6 +19,7 @@ from skidpad.campaign.driving.quick_kernel import (
     STEPPED,
     UNUSUAL,
     Addresses,
+    Joined,
     Request,
     Rules,
     Stop,
@@ -26,7 +29,7 @@ from skidpad.campaign.driving.quick_kernel import (
 from skidpad.campaign.driving.run_setup import StackAtWheel
 from skidpad.core.errors import StackError
 from skidpad.core.kernels.calls import find_address
-from skidpad.core.kernels.jit import hold
+from skidpad.core.kernels.jit import Held, hold
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import LightState, Supervision
 from skidpad.recording.run.ticks import TickArrays, TickLog, copy_actors
@@ -52,7 +55,11 @@ from skidpad.stack.think import think
 
 
 class QuickParts(NamedTuple):
-    """What of a run takes part in its quick way."""
+    """What of a run takes part in its quick way.
+
+    timer: counts the ticks of a run without a script. changed: the backend of one with a script, which is
+    asked in each tick, and the file's changes.
+    """
 
     backend: EmbeddedBackend
     world: World
@@ -60,12 +67,21 @@ class QuickParts(NamedTuple):
     guard: GuardedStack
     stack: AdasStack
     supervisor: Supervisor | None
-    timer: Timer
+    timer: Timer | None
+    changed: tuple[ChangedBackend, FileChanges] | None
 
 
-def find_parts(stepper: Stepper) -> QuickParts | str:
-    """Returns the parts of a run that has begun; else the first reason for which it has no quick way."""
-    driver, backend, script = stepper.driver, stepper.backend, stepper.script
+def find_parts(stepper: Stepper, changes: FileChanges | None = None) -> QuickParts | str:
+    """Returns the parts of a run that has begun; else the first reason for which it has no quick way.
+
+    changes: of a file that is played.
+    """
+    driver, script = stepper.driver, stepper.script
+    backend: object = stepper.backend
+    changed: tuple[ChangedBackend, FileChanges] | None = None
+    if isinstance(backend, ChangedBackend) and changes is not None and script is changes.player:
+        changed = backend, changes
+        backend = backend.inner
     if type(backend) is not EmbeddedBackend:
         return "another simulator drives, or the world is changed from outside"
     sensing, supervisor = backend.sensing, stepper.supervisor
@@ -75,21 +91,27 @@ def find_parts(stepper: Stepper) -> QuickParts | str:
         return "another stack drives, or an envelope governs ours"
     if driver.lens is not None:
         return "drops lie on the lens"
-    stack, suite = driver.stack.stack, sensing.suite
-    reason = stack.why_not_quick() or backend.why_not_quick()
-    if reason:
+    stack, suite, timer = driver.stack.stack, sensing.suite, None
+    if reason := stack.why_not_quick():
         return reason
-    if suite.hold_common(backend.world.states) is None:
-        return "it has other sensors than the common ones"
+    if not backend.has_common_frames or suite.hold_common(backend.world.states) is None:
+        return "it has other sensors than the common ones, or its localisation is noisy"
     if not isinstance(supervisor, (Supervisor, Unsupervised)):
         return "somebody is at the controls"
-    if type(script) is not Timer or script.script is not None:
-        return "a script or the end of a route is followed in each tick"
+    supervising = supervisor if isinstance(supervisor, Supervisor) else None
+    if changed is None:
+        if reason := backend.why_not_quick():
+            return reason
+        if type(script) is not Timer or script.script is not None:
+            return "a script or the end of a route is followed in each tick"
+        timer = script
+    elif supervising is not None:
+        return "a script is played, and a supervisor looks on"
     for sink in stepper.sinks:
         if sink.sees_all:
             return f"{type(sink).__name__} is shown each tick"
-    supervising = supervisor if isinstance(supervisor, Supervisor) else None
-    return QuickParts(backend, backend.world, suite, driver.stack, stack, supervising, script)
+    world = backend.world
+    return QuickParts(backend, world, suite, driver.stack, stack, supervising, timer, changed)
 
 
 class QuickDrive:
@@ -106,24 +128,59 @@ class QuickDrive:
         self._shown: dict[int, LightState] = {}  # of the next two
         self._lines = parts.stack.road.scan.show(self._shown)
         self._lit = self._stops.show(self._shown)
-        self._known: tuple[object, ...] = ()  # what `_held` was made of
-        self._held: tuple[Any, ...] = ()
+        self._joined: Held[Joined] | None = None
+        self._joined_by: Rules | None = None
+        self._joined_of: tuple[object, ...] = ()
 
     def drive(self, most: int) -> int:
         """Drives up to `most` ticks and returns how many; the stepper drives the one after them.
 
         0 where the next tick is the stepper's.
         """
+        timer, changed, last = self.parts.timer, self.parts.changed, self._last_request()
+        driven = 0
+        if last is not None and changed is not None:
+            driven = self._follow_script(most, last, *changed)
+        elif last is not None and timer is not None and timer.left > 0:
+            driven = self._drive_alone(min(most, timer.left), last)
+        self.ticks += driven
+        return driven
+
+    def _follow_script(
+        self, most: int, last: Request, backend: ChangedBackend, changes: FileChanges
+    ) -> int:
+        """Drives ticks of a script: it and the world step, then sensors, stack and log are one call."""
+        stepper, world, script = self.stepper, self.parts.world, self.stepper.script
+        arrays, driven, inner = self.log.reserve(1), 0, self.parts.backend
+        joined, shown = self._join(arrays), world.lights.by_id
+        while driven < min(most, arrays.left) and not script.ended:
+            assert stepper.action is not None
+            changed = backend.make_step(stepper.action.command, stepper.words)
+            if changed or not (
+                changes.is_silent and world.is_quiet and world.lights.by_id is shown
+            ):
+                stepper.next_frame = inner.read_frame()
+                break
+            stop = self._call(joined, arrays.at + driven, last, True, 1)
+            last = stop.request
+            if stop.why == REFUSED:
+                self._refuse(last)
+                break
+            driven += 1
+            stepper.action = Action(VehicleCommand(*last))
+            for sink in stepper.sinks:
+                sink.pass_ticks(1)
+            stepper.words = script.step(inner.truth())
+        return driven
+
+    def _drive_alone(self, n: int, last: Request) -> int:
+        """Drives up to n ticks of a run without a script; the world steps in the kernel, too."""
         stepper, world = self.stepper, self.parts.world
-        last = self._last_request()
-        n = min(most, self.parts.timer.left)
-        if n <= 0 or last is None:
-            return 0
-        room, lights = self.log.reserve(n), world.lights
-        rules, driven, begun = self._rules(room), 0, False
+        arrays, lights, driven, begun = self.log.reserve(n), world.lights, 0, False
         while driven < n:
             shown = lights.by_id
-            stop = self._call(rules, room, last, begun, driven, n - driven)
+            joined = self._join(arrays)
+            stop = self._call(joined, arrays.at + driven, last, begun, n - driven)
             last, driven = stop.request, driven + stop.ticks
             if stop.why in (MOVED, STEPPED):
                 world.finish_step(stop.touches, stop.crossed, settled=stop.why == STEPPED)
@@ -139,7 +196,6 @@ class QuickDrive:
             stepper.action, stepper.words = Action(VehicleCommand(*last)), ()
             for sink in stepper.sinks:
                 sink.pass_ticks(driven)
-        self.ticks += driven
         return driven
 
     def _last_request(self) -> Request | None:
@@ -150,6 +206,8 @@ class QuickDrive:
             return None
         if stepper.failure is not None or stepper.next_frame is not None:
             return None
+        if not self.parts.backend.has_common_frames:
+            return None
         if stack.supervision is not Supervision.NONE or not stack.road.is_traced:
             return None
         if supervisor is not None and (supervisor.phase is not Supervision.NONE or supervisor.over):
@@ -157,25 +215,24 @@ class QuickDrive:
         c = action.command
         return Request(c.throttle, c.brake, c.steer, c.handbrake)
 
-    def _call(
-        self, rules: Rules, room: TickArrays, last: Request, begun: bool, driven: int, n: int
-    ) -> Stop:
-        """Drives up to n ticks, of which `driven` went before, and notes those that are whole.
+    def _call(self, joined: Held[Joined], at: int, last: Request, begun: bool, n: int) -> Stop:
+        """Drives up to n ticks and notes those that are whole.
 
-        begun: the world has made the step of the first one already.
+        at: their first row in the log. begun: the world has made the step of the first one already.
         """
         world, supervisor = self.parts.world, self.parts.supervisor
-        held, grace = self._hold(room), 0 if supervisor is None else supervisor.grace
-        told: Any = drive_ticks(*held, rules, last, begun, world.tick, n, room.at + driven, grace)  # type: ignore[call-arg]
-        ticks, why, touches, crossed, throttle, brake, steer, handbrake, *place = told
+        grace = 0 if supervisor is None else supervisor.grace
+        told = drive_ticks(joined, begun, world.tick, n, at, grace, *last)
+        ticks, why, touches, crossed, throttle, brake, steer, handbrake, lane, s, offset = told
         steps = ticks + (why in (UNUSUAL, REFUSED)) - begun
         if steps:
             world.pass_ticks(steps)
             world.lights.set_clocks(self._clocks.elapsed)
         if ticks:
-            self.parts.timer.left -= ticks
+            if self.parts.timer is not None:
+                self.parts.timer.left -= ticks
             if supervisor is not None:
-                supervisor.pass_ticks(ticks, (place[0], place[1], place[2]))
+                supervisor.pass_ticks(ticks, (lane, s, offset))
         return Stop(ticks, why, touches, crossed, Request(throttle, brake, steer, handbrake))
 
     def _refuse(self, request: Request) -> None:
@@ -185,13 +242,13 @@ class QuickDrive:
         except StackError as failure:
             self.stepper.failure = failure
 
-    def _rules(self, room: TickArrays) -> Rules:
+    def _rules(self, arrays: TickArrays) -> Rules:
         """Returns what holds in all ticks of a call."""
         world, stack, supervisor = self.parts.world, self.parts.stack, self.parts.supervisor
         return Rules(
             dt=world.dt,
             substeps=world.fleet.steps,
-            weather=room.weather,
+            weather=arrays.weather,
             bumper_first=self.parts.suite.camera_ids[0] == stack.cameras.bumper.depth_id,
             supervised=supervisor is not None,
             stuck_speed=0.0 if supervisor is None else supervisor.settings.stuck_speed,
@@ -201,37 +258,37 @@ class QuickDrive:
             hsv_required=stack.lock.hsv_required,
         )
 
-    def _hold(self, room: TickArrays) -> tuple[Any, ...]:
-        """Returns the first arguments of the kernel: addresses, and what is behind pointers."""
+    def _join(self, arrays: TickArrays) -> Held[Joined]:
+        """Returns what the kernel is given; it is held anew when a part of it is another object."""
         world, suite, stack = self.parts.world, self.parts.suite, self.parts.stack
-        road, lights = stack.road, world.lights
+        road, lights, rules = stack.road, world.lights, self._rules(arrays)
         common = suite.hold_common(world.states)
+        assert common is not None, "find_parts has asked for it"
         parts = stack.parts(suite.most_runs, suite.most_points)
-        for kept, new in zip(self._clocks, lights.clocks(), strict=True):
-            kept[:] = new
+        if self.parts.timer is not None:  # else the world makes its own steps
+            for kept, new in zip(self._clocks, lights.clocks(), strict=True):
+                kept[:] = new
         if lights.by_id is not self._shown:
             self._shown = lights.by_id
-            self._lines[:], self._lit[:] = (
-                road.scan.show(self._shown),
-                self._stops.show(self._shown),
-            )
+            self._lines[:] = road.scan.show(self._shown)
+            self._lit[:] = self._stops.show(self._shown)
         known = (
             world.arena, world.states, common, road.parts, parts.held, parts.kept, parts.room,
-            road.on_highway, room.rows, room.columns,
+            road.on_highway, arrays.rows, arrays.columns,
         )  # fmt: skip
-        if not self._known or any(a is not b for a, b in zip(known, self._known, strict=True)):
+        joined = self._joined
+        if joined is None or rules != self._joined_by or not is_same(known, self._joined_of):
             tables = Tables(
                 stack.memory, parts.samples, parts.history, parts.kept, road.ways, parts.room,
-                road.on_highway, self._lines, room.ticks, room.rows, *self._clocks,
+                road.on_highway, self._lines, arrays.ticks, arrays.rows, *self._clocks,
                 self._stops.lane, self._stops.s, self._lit,
             )  # fmt: skip
             states, map = hold(world.states), world.map.held
-            held = (
-                world.arena, states, map, common, road.parts, parts.held, room.columns,
-                road.scan.held, hold(tables),
-            )  # fmt: skip
-            self._known, self._held = known, (self._find_addresses(tables, *held[1:7]), *held)
-        return self._held
+            held = states, map, common, road.parts, parts.held, arrays.columns
+            at = self._find_addresses(tables, *held)
+            joined = hold(Joined(at, rules, tables, world.arena, *held, road.scan.held))
+            self._joined, self._joined_by, self._joined_of = joined, rules, known
+        return joined
 
     def _find_addresses(
         self, t: Tables, states: Any, map: Any, common: Any, road: Any, stack: Any, columns: Any
@@ -254,3 +311,8 @@ class QuickDrive:
             heed_light=find_address(heed_light, t.memory, lines, t.lines, way, False, 0.0, 0.0),
             copy_actors=find_address(copy_actors, states, world.mu, columns, 0),
         )  # fmt: skip
+
+
+def is_same(some: Sequence[object], others: Sequence[object]) -> bool:
+    """Returns whether these are the very objects."""
+    return all(a is b for a, b in zip(some, others, strict=True))

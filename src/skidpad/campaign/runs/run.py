@@ -475,7 +475,7 @@ class OpenRun:
         self.driver = driver
         wheel = driver if self._at_wheel is None else self._at_wheel(driver)
         stepper = Stepper(backend, frame, wheel, stage.supervisor, stage.script, sinks)
-        parts = find_parts(stepper)
+        parts = find_parts(stepper, self.log.changes)
         if isinstance(parts, str):
             self.why_not_quick = parts
         else:

@@ -57,6 +57,7 @@ class TickArrays(NamedTuple):
     """Where a kernel may write ticks."""
 
     at: int  # row
+    left: int  # how many there are from there on
     weather: int  # number of it
     ticks: NDArray[np.int64]
     rows: NDArray[np.float64]
@@ -160,7 +161,9 @@ class TickLog:
         """Returns the arrays, with room for so many more ticks, and the row at which they begin."""
         while self._n + ticks > len(self._tick):
             self._grow()
-        return TickArrays(self._n, self._weather, self._tick, self._row, self._columns)
+        return TickArrays(
+            self._n, len(self._tick) - self._n, self._weather, self._tick, self._row, self._columns
+        )
 
     def add(self, ticks: int) -> None:
         """Takes in that so many rows were written there."""

@@ -67,19 +67,26 @@ class EmbeddedBackend:
 
     def step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand] = ()) -> Frame:
         """Applies the commands for one step and returns its frame."""
+        self.make_step(command, actor_commands)
+        return self._frame()
+
+    def make_step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand]) -> None:
+        """Applies the commands for one step and reads no sensors."""
         self.world.command(EGO, command)
         self.world.step(actor_commands)
-        return self._frame()
 
     def read_frame(self) -> SensorFrame:
         """Returns the frame of the present tick, to which a kernel may have stepped the world."""
         return self._frame()
 
+    @property
+    def has_common_frames(self) -> bool:
+        """Whether frames hold the common sensors of all actors and the exact pose, nothing else."""
+        return self._noise == 0.0 and self._unseen is None and self._asked is None
+
     def why_not_quick(self) -> str:
         """Returns the first reason why a kernel cannot make steps of this world alone; "": it can."""
         w = self.world
-        if self._noise > 0.0 or self._unseen is not None or self._asked is not None:
-            return "localisation is noisy, or further sensors are read"
         if w.patches is not None or w.zones or w.gusts is not None or w.conditions.roll_over:
             return "patches, wind or roll-over are looked at in each tick"
         return "the world has no traffic" if w.traffic is None else ""

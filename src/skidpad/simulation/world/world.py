@@ -451,6 +451,7 @@ class World:
             or self.invasions
             or self.put_back
             or self.moved_on
+            or self.rolled
             or self.notices
         )
 

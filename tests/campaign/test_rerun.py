@@ -103,6 +103,9 @@ def test_wall_times_stand_apart_from_results(campaign):
     timing = pl.read_parquet(campaign / "timing.parquet")
     assert (timing["rtf"] > 0.0).all()
     assert timing["rtf_below_0_9_pct"].is_between(0.0, 100.0).all()
+    reasons = timing["why_not_quick"].to_list()
+    quick = timing["quick_pct"].to_list()
+    assert all((share > 0.0) == (why is None) for share, why in zip(quick, reasons, strict=True))
     assert not {"rtf", "wall_s"} & set(read_results(campaign).columns)
 
 

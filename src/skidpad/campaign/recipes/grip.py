@@ -104,7 +104,7 @@ def drive_and_judge(
         write_run(folder, driven)
         write_played(folder, driven)
         keep_road(out, driven.road)
-    return GripDrive(driven, metrics, log_hash(driven.log), watch.timing())
+    return GripDrive(driven, metrics, log_hash(driven.log), watch.timing_of(driven))
 
 
 def drive_one(

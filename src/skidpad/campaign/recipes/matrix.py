@@ -78,7 +78,7 @@ def drive_one(
     backend = make_backend(cell.backend, WATCHDOG)
     here = with_kept_map(cell, out)
     driven = run(here, backend=backend, folder=folder, sinks=(pace,), checkpoints_s=checkpoints_s)
-    timing = watch.timing(len(driven.log) * DT, pace.slow_pct)
+    timing = watch.timing_of(driven, pace.slow_pct)
     digest = write_run(folder, driven)
     metrics = Metrics()
     added: tuple[AddedMetric, ...] = ()

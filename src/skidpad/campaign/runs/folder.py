@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +31,15 @@ class Stopwatch:
 
     def __init__(self) -> None:
         self.wall, self.cpu = time.perf_counter(), time.process_time()
+
+    def timing_of(self, driven: Run, slow_pct: float | None = None) -> Timing:
+        """Returns the times so far with the real-time factor of a run, and how it was driven."""
+        log, dt = driven.log, driven.log.header.dt
+        return replace(
+            self.timing(len(log) * dt, slow_pct),
+            quick_pct=100.0 * driven.quick_ticks / max(len(log), 1),
+            why_not_quick=driven.why_not_quick or None,
+        )
 
     def timing(self, simulated_s: float | None = None, slow_pct: float | None = None) -> Timing:
         """Returns the times so far and, with `simulated_s`, the real-time factor."""

@@ -44,6 +44,8 @@ class Timing:
     cpu_s: float = 0.0  # s, of the processor; 0: unknown, the run ended its process
     rtf: float | None = None  # simulated per wall time
     rtf_below_0_9_pct: float | None = None  # ticks slower than that
+    quick_pct: float | None = None  # ticks that were driven in compiled blocks
+    why_not_quick: str | None = None  # the first reason where none could be
 
 
 @dataclass(frozen=True, slots=True)

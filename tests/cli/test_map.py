@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import tarfile
+from io import BytesIO
 from pathlib import Path
+from zipfile import ZipFile
 
 import pytest
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app, main
 from skidpad.roads.bundled import FOLDER, load_map
+from skidpad.simulation.carla_server.maps.maps import MapStore
 
 RUNNER = CliRunner()
 
@@ -68,3 +72,102 @@ def test_a_file_that_is_no_map_ends_with_one_sentence_and_code_2(
         main()
     assert caught.value.code == 2
     assert "not OpenDRIVE" in capsys.readouterr().err
+
+
+# --- import-carla: imitations of what CARLA's folder, package and image look like
+
+LAYOUT = "CarlaUE4/Content/Carla/Maps"
+ROADS = (FOLDER / "straight.xodr").read_bytes()
+FILES = {
+    f"{LAYOUT}/OpenDrive/Town03.xodr": ROADS,
+    f"{LAYOUT}/Town12/OpenDrive/Town12.xodr": ROADS,
+    f"{LAYOUT}/Town12/TM/Town12.bin": b"no roads",
+    "CarlaUE4/Content/Old/Town03.xodr": b"an older one, not in a folder OpenDrive",
+    f"{LAYOUT}/OpenDrive/Broken.xodr": b"<OpenDRIVE",
+}
+
+
+def add(archive: tarfile.TarFile, name: str, content: bytes) -> None:
+    member = tarfile.TarInfo(name)
+    member.size = len(content)
+    archive.addfile(member, BytesIO(content))
+
+
+def tarred(files: dict[str, bytes], mode: str) -> bytes:
+    buffer = BytesIO()
+    with tarfile.open(fileobj=buffer, mode=mode) as archive:
+        for name, content in files.items():
+            add(archive, name, content)
+    return buffer.getvalue()
+
+
+def folder(at: Path) -> Path:
+    for name, content in FILES.items():
+        (at / "carla" / name).parent.mkdir(parents=True, exist_ok=True)
+        (at / "carla" / name).write_bytes(content)
+    return at / "carla"
+
+
+def package(at: Path) -> Path:
+    (at / "CARLA_0.9.16.tar.gz").write_bytes(tarred(FILES, "w:gz"))
+    return at / "CARLA_0.9.16.tar.gz"
+
+
+def windows_package(at: Path) -> Path:
+    with ZipFile(at / "CARLA_0.9.16.zip", "w") as archive:
+        for name, content in FILES.items():
+            archive.writestr(name, content)
+    return at / "CARLA_0.9.16.zip"
+
+
+def image(at: Path) -> Path:
+    """Layers of a container image: plain and compressed blobs beside its description."""
+    names = list(FILES)
+    layers = {
+        "blobs/sha256/aa": b'{"no": "layer"}',
+        "blobs/sha256/bb": tarred({n: FILES[n] for n in names[:1]}, "w"),
+        "cc/layer.tar": tarred({n: FILES[n] for n in names[1:]}, "w:gz"),
+        "manifest.json": b"[]",
+    }
+    (at / "carla.tar").write_bytes(tarred(layers, "w"))
+    return at / "carla.tar"
+
+
+@pytest.mark.parametrize("layout", [folder, package, windows_package, image])
+def test_road_files_are_taken_out_of_a_carla(tmp_path: Path, layout) -> None:
+    out = tmp_path / "maps"
+    result = RUNNER.invoke(app, ["map", "import-carla", str(layout(tmp_path)), "--out", str(out)])
+    assert result.exit_code == 0, result.output
+    assert sorted(p.name for p in out.iterdir()) == ["Town03.xodr", "Town12.xodr"]
+    assert load_map(out / "Town03.xodr").content_hash == load_map("straight").content_hash
+    assert "Broken: not taken: " in result.output
+    assert f"skidpad carla-server --maps {out} --map Town03" in result.output
+    assert {"Town03", "Town12", "Town12_Opt"} <= set(MapStore(out).names())
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (tarred({"a/readme.txt": b"x"}, "w:gz"), "holds no .xodr file"),
+        (tarred(FILES, "w:gz")[:700], "cannot be read as a CARLA folder or archive"),
+        (b"no archive", "cannot be read as a CARLA folder or archive"),
+        (tarred({"a/Broken.xodr": b"<OpenDRIVE"}, "w"), "none of its maps can be read"),
+    ],
+)
+def test_what_holds_no_roads_is_one_sentence(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    content: bytes,
+    words: str,
+) -> None:
+    source = tmp_path / "some.tar"
+    source.write_bytes(content)
+    arguments = ["map", "import-carla", str(source), "--out", str(tmp_path / "maps")]
+    monkeypatch.setattr("sys.argv", ["skidpad", *arguments])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert str(source) in said

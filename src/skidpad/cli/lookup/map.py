@@ -84,6 +84,40 @@ def bake(
     typer.echo(f"{target}: {len(baked.samples.x)} samples, content hash {baked.content_hash()}")
 
 
+@maps.command("import-carla")
+def import_carla(
+    source: Annotated[
+        Path,
+        typer.Argument(
+            help="A CARLA folder, its .tar.gz or .zip, or an image saved by `docker save`."
+        ),
+    ],
+    out: Annotated[Path, typer.Option(help="The folder to write to.")] = Path("carla-maps"),
+) -> None:
+    """Take the road files out of your own CARLA, for `skidpad carla-server --maps`."""
+    from skidpad.core.errors import FileError, SkidpadError
+    from skidpad.recording.files import write_bytes
+    from skidpad.roads.bundled import load_map
+    from skidpad.roads.carla_import import find_road_files
+
+    taken = []
+    for name, content in find_road_files(source).items():
+        file = out / f"{name}.xodr"
+        write_bytes(file, content)
+        try:
+            roads = load_map(file)
+        except SkidpadError as error:
+            file.unlink()
+            typer.echo(f"{name}: not taken: {error}")
+            continue
+        length = roads.lanes.length[roads.arrays.drivable == 1].sum() / 1000.0
+        typer.echo(f"{file}: {length:.1f} km of driving lanes")
+        taken.append(name)
+    if not taken:
+        raise FileError(f"{source}: none of its maps can be read")
+    typer.echo(f"serve them: skidpad carla-server --maps {out} --map {taken[0]}")
+
+
 def _road_labels(map: str) -> dict[int, str]:
     """Returns the ids of the roads as the file writes them, by our numbers; none of a baked map."""
     from skidpad.roads.bundled import map_file

@@ -60,6 +60,7 @@ SUBCOMMANDS = (  # an example of each
     "map list",
     "map info figure8",
     "map bake road.xodr",
+    "map import-carla ~/CARLA_0.9.16",
     "channels info drive.mcap",
     "channels compare out/monitored out/again",
     "channels drive --route route-1 --hours 0.2 --out out/channels",

@@ -115,13 +115,29 @@ def draw_sheet(names: Sequence[str], path: Path) -> None:
     Image.fromarray(np.ascontiguousarray(np.vstack(rows))).save(path, quality=80, method=6)
 
 
+def print_shares(names: Sequence[str], weathers: Sequence[str]) -> None:
+    """Print the share of the 8 commonest colours with scenery: a row per view, a column per weather."""
+    print(f"| view | {' | '.join(weathers)} |\n|---|{'---|' * len(weathers)}")
+    for name in names:
+        dressed = dress_map(load_map(name), Scenery.FULL)
+        for k, place in enumerate(choose_places(dressed)):
+            shares = [f"{look(dressed, place, weather).commonest:.0%}" for weather in weathers]
+            print(f"| {dressed.name} {k + 1} | {' | '.join(shares)} |", flush=True)
+
+
 def main() -> None:
     """Print the table as Markdown, or draw the sheet."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("maps", nargs="+")
     parser.add_argument("--weather", nargs="+", default=["clear-noon", "rain-noon"])
+    parser.add_argument(
+        "--wide", action="store_true", help="shares with scenery, a column per weather"
+    )
     parser.add_argument("--picture", type=Path)
     chosen = parser.parse_args()
+    if chosen.wide:
+        print_shares(chosen.maps, chosen.weather)
+        return
     if chosen.picture is not None:
         draw_sheet(chosen.maps, chosen.picture)
         return

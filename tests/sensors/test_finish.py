@@ -17,6 +17,7 @@ from skidpad.physics.presets import preset
 from skidpad.roads.roadside import Box, SignalHead
 from skidpad.sensors.finish.extras import ALL_EXTRAS, NO_EXTRAS, Extra
 from skidpad.sensors.finish.outline import MOST, spans
+from skidpad.sensors.finish.tone import CURVE, curve_of, set_tone
 from skidpad.sensors.pictures.lighting import lighting
 from skidpad.sensors.raster.view import camera_view
 from skidpad.sensors.scene.materials import Material
@@ -227,6 +228,31 @@ def test_a_calm_picture_has_less_noise_and_the_streaks():
     calm = Seen(preset("rain-night"), {Extra.CALM}, camera_effect=True).rgb
     assert calm[:100].std() < 0.6 * loud[:100].std()
     assert (np.abs(calm - Seen(preset("rain-night"), NO_EXTRAS).rgb).max(axis=2) > 20).any()
+
+
+def test_tone_makes_corners_darker_by_day_and_night_and_contrast_by_day_only():
+    for weather, contrast in (("clear-noon", True), ("clear-night", False)):
+        seen, other, _ = both(preset(weather), Extra.TONE)
+        curve = curve_of(seen.suite.shading.light)
+        assert (curve > 0.5) == contrast
+    seen, other, _ = both(preset("clear-noon"), Extra.TONE)
+    corner, middle = (slice(0, 20), slice(0, 20)), (slice(100, 120), slice(190, 210))
+    brighter = [other.rgb[at].mean() / seen.rgb[at].mean() for at in (corner, middle)]
+    assert brighter[0] < 0.97 * brighter[1]
+
+
+@pytest.mark.parametrize("curve", [0.0, CURVE])
+def test_the_curve_of_tone_keeps_the_order_of_all_greys(curve):
+    camera = CameraSpec("a", Modality.RGB, 256, 1, 1.0, DRIVER)  # so narrow that no light is lost
+    grey = np.arange(256, dtype=np.uint32)
+    out = (grey | grey << 8 | grey << 16 | np.uint32(0xFF000000))[None].astype(np.uint32)
+    set_tone(camera_view(camera, Pose(0.0, 0.0)), curve, out)
+    found = out.view(np.uint8).reshape(256, 4).astype(int)
+    assert (np.diff(found[:, 0]) >= 0).all()
+    assert (found[:, :3] == found[:, :1]).all()
+    assert found[[0, 255], 0].tolist() == [0, 255]
+    steepest = np.diff(found[:, 0])[80:120].mean()
+    assert (steepest > 1.2) == (curve > 0.0)
 
 
 def test_switched_off_again_the_picture_is_the_plain_one():

@@ -14,10 +14,12 @@ from skidpad.roads.bundled import load_map
 from skidpad.roads.roadside import Box, Shape
 from skidpad.scenery.dressing import dress_map
 from skidpad.sensors.finish.extras import ALL_EXTRAS
+from skidpad.sensors.pictures.blocks import BLOCK, COLUMNS, LANES, R, W, gather
+from skidpad.sensors.pictures.lane_wear import soften_strips
 from skidpad.sensors.pictures.roughness import COARSE_SIZE, SIZE, make_tiles
 from skidpad.sensors.pictures.settled_snow import NOTHING_SETTLES
 from skidpad.sensors.scene.grain import NO_GRAIN
-from skidpad.sensors.scene.materials import ASPHALTS, FIELDS, Material
+from skidpad.sensors.scene.materials import ASPHALTS, FIELDS, MATERIALS, Material, base_palette
 from skidpad.sensors.scene.mesh import Mesh
 from skidpad.sensors.scene.road_mesh import road_pieces
 from skidpad.sensors.scene.shapes import shape_levels
@@ -131,6 +133,29 @@ def test_age_and_tracks_of_asphalt_differ_in_material_only() -> None:
     assert near == set(ASPHALTS)
     plain = build_scene(road_map.samples, road_map.lanes, road_map.roadside)
     assert not (near - {Material.ASPHALT}) & set((plain.chunks.key & 255).tolist())
+
+
+def test_strips_of_one_asphalt_run_into_each_other_and_into_nothing_else() -> None:
+    runs = [(Material.ASPHALT, 40), (Material.ASPHALT_TRACK, 30), (Material.ASPHALT, 30)]
+    keys = np.repeat([*(m for m, _ in runs), Material.NEW_OIL], [*(n for _, n in runs), 20])
+    keys = keys.astype(np.int32)
+    table = np.zeros((2 * MATERIALS, COLUMNS), dtype=np.float32)
+    table[:MATERIALS, :3] = (base_palette() / 255.0) ** 2
+    work = np.zeros(LANES * BLOCK, dtype=np.float32)
+    gather(keys[None], 0, 0, keys.size, table, work)
+    work[W : W + keys.size] = 0.1  # 10 m away
+    before = work.copy()
+    soften_strips(np.float32(400.0), keys.size, keys, table, work)
+    red, old = work[R : R + keys.size], before[R : R + keys.size]
+    assert np.abs(np.diff(red[:90])).max() < 0.3 * np.abs(np.diff(old[:90])).max()
+    assert (np.diff(red[:50]) >= 0.0).all()
+    assert np.array_equal(red[86:], old[86:]), "another asphalt keeps its joint"
+    assert np.array_equal(red[:28], old[:28]), "11 px are 0.28 m"
+    actors = keys + (1 << 16)
+    table[MATERIALS:] = table[:MATERIALS]
+    work[:] = before
+    soften_strips(np.float32(400.0), keys.size, actors, table, work)
+    assert np.array_equal(work, before), "actors have no strips"
 
 
 def _area_of(mesh: Mesh, rows: np.ndarray) -> float:

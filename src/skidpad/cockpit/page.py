@@ -48,6 +48,7 @@ EXTRAS = {
     Extra.CLOUDS: "clouds, stars",
     Extra.EDGES: "soft edges",
     Extra.SNOW: "snow on the road",
+    Extra.TONE: "contrast, dim corners",
     Extra.CALM: "less camera noise",
 }
 MEANINGS = {

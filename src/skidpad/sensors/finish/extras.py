@@ -15,6 +15,7 @@ class Extra(str, Enum):
     CLOUDS = "clouds"  # and stars, where there are few of them at night; fog before both
     EDGES = "edges"  # softened where one surface meets another
     SNOW = "snow"  # on the road, not only beside it
+    TONE = "tone"  # the contrast of a camera by day, and less light towards the corners
     CALM = "calm"  # less of the published camera effect, so that a night can be read
 
 

@@ -29,6 +29,7 @@ from skidpad.sensors.finish.shadows import (
     standing,
 )
 from skidpad.sensors.finish.stars import STARS, draw_stars, starlight_of
+from skidpad.sensors.finish.tone import curve_of, set_tone
 from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.pictures.shading import ROADLIKE
 from skidpad.sensors.raster.passes import Pass
@@ -60,6 +61,7 @@ class Finish:
         self._light = light
         self._shade = shade_of(light)
         self._gains = gains(light)
+        self._curve = curve_of(light)
         self._layer = layer_of(weather, light)
         self._stars = starlight_of(weather, light)
         self._fog = fog_of(weather, light)
@@ -103,6 +105,8 @@ class Finish:
         bloom, wet = Extra.LAMPS in extras, self._wet if Extra.REFLECTIONS in extras else 0.0
         if bloom or wet > 0.0:
             shine(view, self._sources, bloom, wet, light.air, WETTABLE, inverse, key, out)
+        if Extra.TONE in extras:
+            set_tone(view, self._curve, out)
 
 
 def _within(bodies: Bodies, ego: Pose, reach: float) -> Bodies:

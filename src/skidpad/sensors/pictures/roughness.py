@@ -23,7 +23,7 @@ MORE_LANES = 3  # of the array of a block, behind those of shading
 SIZE, COARSE_SIZE = 256, 512  # texels of the edges of the tiles of grains and of patches
 FINE, COARSE = 0.04, 0.3  # m, a texel of grains and one of patches
 REPAIRS = 420  # rectangles in a tile, which cover about a fifth of it
-OCTAVES = (2, 8, 32, 64)  # texels from one value of the noise to the next
+OCTAVES = (4, 8, 32, 64)  # texels from one value of the noise to the next
 NO_TILES = np.zeros(0, dtype=np.int8)
 
 
@@ -82,7 +82,7 @@ _PER_BYTE = np.float32(1.0 / 127.0)
 _PER_FINE, _PER_COARSE = np.float32(1.0 / FINE), np.float32(1.0 / COARSE)
 _LEAN_X, _LEAN_Y = np.float32(0.37), np.float32(0.91)  # m per m of height, so that walls vary too
 _NEAR = np.float32(9.0)  # m beyond which grains fade
-_FORE, _EVEN = np.float32(2.0), np.float32(0.30)  # m; rough ground is brighter at grazing angles
+_FORE, _EVEN = np.float32(3.0), np.float32(0.42)  # m; rough ground is brighter at grazing angles
 _SPREAD = np.float32(0.35)  # m by which grains blur the edges of patches
 _FARTHEST = np.float32(1e-5)
 _LEAST = np.float32(0.35)
@@ -92,6 +92,7 @@ _SOFT = np.float32(6.0)  # veils reach their full strength this steeply above th
 _AROUND, _CLOSE, _DEEP = np.float32(0.26), np.float32(0.26), np.float32(0.32)
 _VEILED, _TINTED, _WARM = np.float32(0.28), np.float32(0.11), np.float32(0.08)
 _HALF = np.float32(0.5)
+_COOL = np.float32(0.14)  # of what grazing light adds: it comes from the sky, not from the sun
 _GREEN = np.float32(0.35)
 _SHEEN = np.float32(0.5)  # of rough ground towards the sun's image, by eye
 
@@ -164,9 +165,10 @@ def roughen(
             toward *= toward
             toward *= toward
             near += sheen * toward * toward
-            share = ONE + grains * fade * run[F + n] + run[A + n] + graze * near
+            grazing = graze * near
+            share = ONE + grains * fade * run[F + n] + run[A + n] + grazing
             share = share if share > _LEAST else _LEAST
-            hue = tints * run[C + n] * share
+            hue = tints * run[C + n] * share - _COOL * grazing
             run[R + n] *= share + hue
             run[G + n] *= share + _GREEN * hue
             run[B + n] *= share - hue

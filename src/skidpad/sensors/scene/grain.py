@@ -15,9 +15,9 @@ NO_GRAIN = np.zeros((0, 5), dtype=np.float32)
 # shares by which grains, patches, tints and repairs change a colour, about three standard deviations, and by
 # which it is brighter at grazing angles
 GRAIN: dict[Material, tuple[float, float, float, float, float]] = {
-    Material.ASPHALT: (0.26, 0.52, 0.16, 0.26, 1.05),
-    Material.NEW_ASPHALT: (0.20, 0.40, 0.12, 0.0, 0.90),
-    Material.WORN_ASPHALT: (0.30, 0.54, 0.16, 0.32, 1.05),
+    Material.ASPHALT: (0.26, 0.66, 0.11, 0.30, 1.05),
+    Material.NEW_ASPHALT: (0.20, 0.56, 0.10, 0.0, 0.95),
+    Material.WORN_ASPHALT: (0.30, 0.66, 0.11, 0.34, 1.05),
     Material.SHOULDER: (0.26, 0.45, 0.14, 0.0, 0.95),
     Material.MARKING: (0.20, 0.45, 0.06, 0.10, 0.60),
     Material.GRASS: (0.46, 0.74, 0.34, 0.0, 0.95),
@@ -32,7 +32,7 @@ GRAIN: dict[Material, tuple[float, float, float, float, float]] = {
     Material.FENCE: (0.12, 0.20, 0.08, 0.0, 0.20),
     Material.ROOF: (0.20, 0.34, 0.12, 0.0, 0.30),
 }
-LEAVES, WALLS = (0.70, 0.60, 0.30, 0.0, 0.40), (0.12, 0.26, 0.08, 0.0, 0.20)
+LEAVES, WALLS = (0.70, 0.60, 0.30, 0.0, 0.40), (0.12, 0.36, 0.10, 0.0, 0.30)
 
 
 def grain_table(boxes: Iterable[tuple[int, int]]) -> Floats32:

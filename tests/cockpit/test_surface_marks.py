@@ -5,6 +5,7 @@ import pytest
 
 from skidpad.cockpit.marks import PX_MOST, Lying, patch_marks
 from skidpad.cockpit.pictures import SURFACES, draw
+from skidpad.cockpit.screen import Screen
 from skidpad.cockpit.studio import FOLLOW, TOP
 from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.geometry import Pose
@@ -67,3 +68,14 @@ def test_what_events_lay_is_outlined_from_their_tick_on():
     lying = Lying(road, [puddle], (LaidSurface(4, (puddle, ice)), LaidSurface(10, ())))
     kinds = [[outline.kind for outline in lying.outlines(tick)] for tick in (0, 3, 4, 9, 10, 2)]
     assert kinds == [["water"], ["water"], ["water", "ice"], ["water", "ice"], [], ["water"]]
+
+
+def test_a_live_drive_draws_what_an_event_lays_from_its_tick_on():
+    road = load_map("straight")
+    screen = Screen(None, None, road, None)
+    laid = []
+    screen.follow_surface(laid)
+    assert len(screen.lying.outlines(5)) == 0
+    place = road.at(0, 300.0)
+    laid.append(LaidSurface(6, (SurfacePatch(water_mm=2.0, circle=(place.x, place.y, 4.0)),)))
+    assert [len(screen.lying.outlines(tick)) for tick in (5, 6, 7)] == [0, 1, 1]

@@ -9,6 +9,7 @@ import pytest
 from msgspec import structs
 from typer.testing import CliRunner
 
+from skidpad.campaign.driving.loop import Sink
 from skidpad.campaign.driving.outdoors import NO_SURFACE, FileChanges
 from skidpad.campaign.driving.run_setup import check_scenario, stage_of
 from skidpad.campaign.runs.rerun import last_ticks
@@ -150,6 +151,27 @@ def test_a_checkpoint_file_holds_what_events_have_laid(tmp_path):
         assert int(rest.tick[0]) == tick + 1
         assert log_hash(rest) == log_hash(last_ticks(log, tick + 1))
         assert (rest.mu[0, 0].max() < 0.2) == (tick == 16)
+
+
+def test_who_looks_on_is_told_what_lies_there_in_the_tick_in_which_it_is_felt(tmp_path):
+    write_ice(tmp_path)
+    events = event("ice comes", named("ice.yaml"), time(0.5))
+    _, spec, _ = played(tmp_path, stories=story(events))
+
+    class Onlooker(Sink):
+        def follow_surface(self, laid):
+            self.laid, self.there, self.felt = laid, [], []
+
+        def see(self, moment):
+            self.there.append(surface_at((), self.laid, moment.truth.tick) == (ICE,))
+            self.felt.append(moment.truth.mu[0].max() < 0.2)
+
+    onlooker = Onlooker()
+    drive(spec, sinks=[onlooker])
+    assert not onlooker.there[5]
+    assert onlooker.there[-1]
+    first = onlooker.there.index(True), onlooker.felt.index(True)
+    assert abs(first[0] - first[1]) <= 1
 
 
 def test_a_carla_server_says_that_it_lays_no_surface_of_an_event(tmp_path):

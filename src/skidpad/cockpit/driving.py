@@ -63,10 +63,10 @@ def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
         }
         return Shown(desk.outside, told)
 
-    map = stage_of(spec).map
+    stage = stage_of(spec)
     looks = Looks(spec.scenery, spec.bodywork)
-    surface = present_patches(spec.surface, spec.weather.air_temperature_c)
-    screen = Screen(feed, link, map, describe, spec.seed, surface, looks)
+    surface = present_patches(stage.setup.patches, spec.weather.air_temperature_c)
+    screen = Screen(feed, link, stage.map, describe, spec.seed, surface, looks)
     time = CockpitPacer(link, screen.show, own_gc=about["own_gc"])
     try:
         driven = drive_at_desk(spec, desk, folder, (screen, time))

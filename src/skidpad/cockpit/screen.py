@@ -82,6 +82,10 @@ class Screen(Sink):
         """Takes a function that gives the latest readings, which are shown beside the pictures."""
         self.latest = latest
 
+    def follow_surface(self, laid: Sequence[LaidSurface]) -> None:
+        """Takes what events lay on the road during a live drive; a replay knows it from the begin."""
+        self.lying.laid = laid
+
     def see(self, moment: Moment) -> None:
         """Notes a tick's events and shows it, or drops it, as a slow or absent page costs nothing."""
         t = round(moment.truth.tick * DT, 2)

@@ -22,6 +22,7 @@ from skidpad.core.objects.slots import fill_slots
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import Supervision
+from skidpad.recording.run.surfaces import LaidSurface
 from skidpad.roads.journeys import Journey
 from skidpad.simulation.backend import Backend
 from skidpad.simulation.recovery import Action
@@ -102,6 +103,12 @@ class Sink:
         """Takes a function that gives the latest readings of further sensors and functions, in words.
 
         It is called before `begin`, and only in runs that have any; does nothing unless overridden.
+        """
+
+    def follow_surface(self, laid: Sequence[LaidSurface]) -> None:
+        """Takes the sequence that grows, before its tick is seen, by what events lay on the road.
+
+        It is called before the first tick; does nothing unless overridden.
         """
 
     def see(self, moment: Moment) -> None:

@@ -471,6 +471,8 @@ class OpenRun:
             self.recorder, sinks = recorder, (recorder, *sinks)
             for sink in self.sinks:
                 sink.follow_readings(lambda: recorder.latest)
+        for sink in self.sinks:
+            sink.follow_surface(self.log.laid)
         frame = backend.reset(setup, self.spec.seed)
         self.driver = driver
         wheel = driver if self._at_wheel is None else self._at_wheel(driver)

@@ -191,6 +191,24 @@ def test_snow_lies_on_roofs_and_crowns_and_not_on_walls() -> None:
     assert not paler[labels == SemanticClass.ROAD].any()
 
 
+def test_broad_leaved_crowns_are_bare_where_snow_lies_and_conifers_stay_green() -> None:
+    boxes = dress_map(load_map("town"), Scenery.FULL).roadside.boxes
+    broad = {b.rgb for b in boxes if b.shape is Shape.CROWN}
+    conifers = {b.rgb for b in boxes if b.shape is Shape.CONE}
+    assert not broad & conifers
+    summer, winter = (look(Scenery.FULL, 3, 0.5, w)[0] for w in ("clear-noon", "snow"))
+    palette = summer.scene.static.palette
+
+    def greenness(suite: PixelSuite, colours: set[tuple[int, int, int]]) -> np.ndarray:
+        numbers = [int(np.flatnonzero((palette == rgb).all(axis=1))[-1]) for rgb in colours]
+        red, green, blue = suite.shading._table[numbers, :3].T
+        return green / np.maximum(red, blue)
+
+    assert (greenness(summer, broad) > 1.2).all()
+    assert (greenness(winter, broad) < 1.05).all()
+    assert np.array_equal(greenness(summer, conifers), greenness(winter, conifers))
+
+
 def test_by_day_no_pane_tells_that_it_will_be_lit() -> None:
     for weather, alike in (("clear-noon", True), ("clear-night", False)):
         table = look(Scenery.FULL, 3, 0.5, weather)[0].shading._table

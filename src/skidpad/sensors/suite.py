@@ -125,7 +125,13 @@ class PixelSuite:
         snowed = Extra.SNOW in settings.extras
         static = self.scene.static
         self.shading = Shading(
-            static.palette, self._table, light, snowed, static.grain, static.street_light
+            static.palette,
+            self._table,
+            light,
+            snowed,
+            static.grain,
+            static.street_light,
+            static.leafy,
         )
         if settings.extras:
             self._finish.look_out(weather, light)

@@ -75,6 +75,11 @@ STAINED = 0.06  # share of the tints of surfaces that is left on snow
 GLOSSY = (Material.PAINT, Material.GLASS, Material.LAMP_GLASS)
 WET_DARKENING = 0.52  # of asphalt's albedo; Lekner and Dorf (1988) give 0.4 to 0.7
 SNOW = np.array([0.80, 0.83, 0.88], dtype=np.float32)
+TWIGS, BARE = (
+    np.array([98, 86, 76], dtype=np.float32),
+    0.85,
+)  # grey levels of bare crowns, share of it
+NO_LEAVES = np.zeros(0, dtype=np.intp)
 BRAKE_LIGHT = np.array([1.5, 0.03, 0.03], dtype=np.float32)  # of lit lamps, linear
 INDICATOR_LIGHT = np.array([1.5, 0.55, 0.03], dtype=np.float32)
 BEHIND_BY = 1e-3  # of a ray's length, so that rounding cannot bring a point before the lamps
@@ -92,17 +97,18 @@ class Shading:
         snow_on_road: bool = False,
         grain: Floats32 = NO_GRAIN,
         street_light: StreetLight = NO_STREET_LIGHT,
+        leafy: NDArray[np.intp] = NO_LEAVES,
     ) -> None:
         """snow_on_road: for people; what a stack reads has snow beside the road only.
 
-        grain, street_light: of the scene (`StaticScene`).
+        grain, street_light, leafy: of the scene (`StaticScene`).
         """
         self._street_light = street_light
         self._grain = _grain_in(light, grain, snow_on_road)
         self._settling = _settling(light) if snow_on_road else NOTHING_SETTLES
         self._tiles = make_tiles() if grain.size else NO_TILES
         self.light = light
-        self._table = _look_up(palette, table, light, snow_on_road)
+        self._table = _look_up(_in_season(palette, leafy, light), table, light, snow_on_road)
         self._plain_tail = self._table.reshape(-1, MATERIALS, COLUMNS)[0, Material.TAIL_LAMP].copy()
         self._work = np.zeros((LANES + MORE_LANES) * BLOCK, dtype=np.float32)
         self._braking = np.zeros(len(table), dtype=np.bool_)
@@ -172,6 +178,15 @@ class Shading:
             key,
             out,
         )
+
+
+def _in_season(palette: Floats32, leafy: NDArray[np.intp], light: Lighting) -> Floats32:
+    """Returns the palette with bare crowns where snow lies; leafy: materials of broad-leaved crowns."""
+    if light.snow <= 0.0 or not leafy.size:
+        return palette
+    result = palette.copy()
+    result[leafy] += np.float32(BARE * light.snow) * (TWIGS - result[leafy])
+    return result
 
 
 def _look_up(palette: Floats32, table: ActorTable, light: Lighting, snow_on_road: bool) -> Floats32:

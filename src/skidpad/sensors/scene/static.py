@@ -70,6 +70,7 @@ class StaticScene:
     palette: NDArray[np.float32]  # (256, 3) sRGB grey levels by material
     street_light: StreetLight
     grain: NDArray[np.float32]  # unevenness by material; of dressed maps only
+    leafy: NDArray[np.intp]  # materials of crowns that are bare in winter
 
     def lamp_keys(self, lights: Mapping[int, LightState]) -> Ints32:
         """Returns (n,) keys of the lamp triangles while the lights show these states; others are dark."""
@@ -106,7 +107,9 @@ def build_scene(samples: LaneSamples, lanes: LaneTable, roadside: Roadside) -> S
     lamps_found = _find_lamps(chunks, roadside, blocks, grouped)
     street_light = street_light_of(roadside.boxes)
     grain = _grain_of(roadside, box_material)
-    return StaticScene(chunks, lamps_found, palette, street_light, grain)
+    crowns = {box_material[b.rgb] for b in roadside.boxes if b.shape is Shape.CROWN}
+    leafy = np.array(sorted(crowns), dtype=np.intp)
+    return StaticScene(chunks, lamps_found, palette, street_light, grain, leafy)
 
 
 def _is_dressed(roadside: Roadside) -> bool:

@@ -55,7 +55,13 @@ class Pictured:
             self.weather = weather
             static, light = self.live.static, lighting(weather)
             self.shading = Shading(
-                static.palette, self.bodies, light, False, static.grain, static.street_light
+                static.palette,
+                self.bodies,
+                light,
+                False,
+                static.grain,
+                static.street_light,
+                static.leafy,
             )
 
 

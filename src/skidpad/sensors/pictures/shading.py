@@ -184,7 +184,7 @@ def _in_season(palette: Floats32, leafy: NDArray[np.intp], light: Lighting) -> F
     """Returns the palette with bare crowns where snow lies; leafy: materials of broad-leaved crowns."""
     if light.snow <= 0.0 or not leafy.size:
         return palette
-    result = palette.copy()
+    result: Floats32 = palette.copy()
     result[leafy] += np.float32(BARE * light.snow) * (TWIGS - result[leafy])
     return result
 

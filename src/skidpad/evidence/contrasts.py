@@ -6,10 +6,11 @@ them. One whose columns or runs are not in the results cannot be drawn.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import Enum
-from typing import NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import polars as pl
@@ -78,17 +79,23 @@ def rows_of(column: str, *values: str, name: str = "") -> Rows:
     return Rows(name or ", ".join(values), pl.col(column).is_in(values))
 
 
-class Criterion(Protocol):
+class Criterion(ABC):
     """What a finding asks of results."""
 
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
     @property
+    @abstractmethod
     def test(self) -> tuple[str, ...]:
         """Returns how it is tested, in phrases."""
 
     @property
     def amounts(self) -> tuple[Amount, ...]:
-        """Returns the margins and bounds by which it is judged."""
+        """Returns the margins and bounds by which it is judged: the amounts among its fields."""
+        values = (getattr(self, field.name) for field in fields(self))
+        return tuple(v for v in values if isinstance(v, Amount))
 
+    @abstractmethod
     def draw(self, table: pl.DataFrame) -> Contrast | None:
         """Returns the contrast; None when its columns or rows are not in `table`."""
 
@@ -103,7 +110,7 @@ class Claim(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Paired:
+class Paired(Criterion):
     """A claim about `column` on one side and on the other of runs that agree in `by`."""
 
     column: str
@@ -118,11 +125,6 @@ class Paired:
     def test(self) -> tuple[str, ...]:
         """Returns the phrases for sign changes of paired differences."""
         return (f"paired by {list_text(self.by)}", SIGNS)
-
-    @property
-    def amounts(self) -> tuple[Amount, ...]:
-        """Returns the margin or bound."""
-        return (self.amount,)
 
     @property
     def label(self) -> str:
@@ -157,7 +159,7 @@ class Paired:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Outweighs:
+class Outweighs(Criterion):
     """The effect of one factor on `column` is larger than that of the other, whatever its sign."""
 
     column: str
@@ -170,11 +172,6 @@ class Outweighs:
     def test(self) -> tuple[str, ...]:
         """Returns the phrases for sign changes of paired differences."""
         return (f"paired by {list_text(self.by)}", SIGNS)
-
-    @property
-    def amounts(self) -> tuple[Amount, ...]:
-        """Returns the margin, the only amount here."""
-        return (self.margin,)
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:
         """Returns the contrast of the differences of two effects per pair.
@@ -207,7 +204,7 @@ def lowest(column: str) -> Rows:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Mean:
+class Mean(Criterion):
     """The mean of `value` over rows is positive; rows without a value count not."""
 
     label: str
@@ -221,11 +218,6 @@ class Mean:
     def test(self) -> tuple[str, ...]:
         """Returns the phrases for sign changes."""
         return (f"means over {self.over}", SIGNS if "seed" in self.by else SEGMENTS)
-
-    @property
-    def amounts(self) -> tuple[Amount, ...]:
-        """Returns the margin, the only amount here."""
-        return (self.margin,)
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:
         """Returns the contrast of the values of all rows; sums within `value` are over the whole table.
@@ -244,7 +236,7 @@ class Mean:
 
 
 @dataclass(frozen=True, slots=True)
-class Never:
+class Never(Criterion):
     """A deterministic claim: one case that breaks it contradicts, none shows it."""
 
     cases: str  # what is counted
@@ -254,11 +246,6 @@ class Never:
     def test(self) -> tuple[str, ...]:
         """Returns the phrase for counting."""
         return (f"counting {self.cases}; one contradicts",)
-
-    @property
-    def amounts(self) -> tuple[Amount, ...]:
-        """Returns nothing, as counting has no amount."""
-        return ()
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:
         """Returns a contrast that is certain either way, so its p values are 0 and 1; None without a case."""

@@ -8,14 +8,14 @@ from math import ceil
 import polars as pl
 from scipy import stats
 
-from skidpad.evidence.contrasts import Amount, Contrast, distinct, has_columns
+from skidpad.evidence.contrasts import Amount, Contrast, Criterion, distinct, has_columns
 from skidpad.evidence.statistics import NO_LIMITS, Interval, Rate, event_rate, runs_with_text
 
 RUNS_WITHOUT_EVENT = 3.7  # / limit: runs without an event that bound a rate, -ln(0.025)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RateBelow:
+class RateBelow(Criterion):
     """Events per run, or hour, are fewer than the limit."""
 
     what: str  # the events

@@ -29,20 +29,8 @@ def lane_arrays(baked: BakedMap) -> LaneArrays:
     return LaneArrays(
         sample=np.ascontiguousarray(np.column_stack(columns)),
         lane_of=p.lane,
-        first=t.first,
-        size=t.size,
-        length=t.length,
-        road=t.road,
-        lane_id=t.lane_id,
-        junction=t.junction,
+        **{name: column for name, column in t._asdict().items() if name in LaneArrays._fields},
         drivable=((t.kind == LaneKind.DRIVING) | (t.kind == LaneKind.RAMP)).astype(np.int32),
-        left=t.left,
-        right=t.right,
-        opposite=t.opposite,
-        next_start=t.next_start,
-        next_lane=t.next_lane,
-        prev_start=t.prev_start,
-        prev_lane=t.prev_lane,
         signal_start=np.searchsorted(baked.signals.lane[order], np.arange(len(t.road) + 1)).astype(
             np.int32
         ),

@@ -94,9 +94,7 @@ def _table(document: Document, shapes: Sequence[LaneShape]) -> LaneTable:
         junction=np.array(
             [document.roads[shape.key.road].junction for shape in shapes], dtype=np.int32
         ),
-        left=beside.left,
-        right=beside.right,
-        opposite=beside.opposite,
+        **beside._asdict(),
         next_start=next_start,
         next_lane=next_lane,
         prev_start=prev_start,

@@ -14,7 +14,7 @@ from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.lanes import SignalTable
 from skidpad.roads.opendrive.document import Document, Node, Reader, RoadRecord
 from skidpad.roads.opendrive.lane_shapes import LaneShape
-from skidpad.roads.opendrive.signals import road_place, signal_heads
+from skidpad.roads.opendrive.signals import node_place, road_place, signal_heads, valid_lanes
 from skidpad.roads.roadside import (
     UNPAINTED,
     Barrier,
@@ -171,9 +171,7 @@ def _points(road: RoadRecord, s: Floats, t: Floats, up: Floats) -> Floats:
 
 def _straight_line(read: Reader, road: RoadRecord, node: Node) -> Floats:
     """Returns the two ends (2, 3) of an object with a length only, centred on its place; (0, 3) without."""
-    place = road_place(
-        road, read.number(node, "s"), read.number(node, "t"), read.number(node, "zOffset", 0.0)
-    )
+    place = node_place(read, road, node)
     yaw = place.heading + read.number(node, "hdg", 0.0)
     half = 0.5 * read.number(node, "length", 0.0)
     if half <= 0.0:
@@ -185,9 +183,7 @@ def _straight_line(read: Reader, road: RoadRecord, node: Node) -> Floats:
 
 def _outlines(read: Reader, road: RoadRecord, node: Node) -> Iterator[Floats]:
     """Yields corner polygons (n, 3) in world coordinates; a rectangle when only a size is given."""
-    place = road_place(
-        road, read.number(node, "s"), read.number(node, "t"), read.number(node, "zOffset", 0.0)
-    )
+    place = node_place(read, road, node)
     yaw = place.heading + read.number(node, "hdg", 0.0)
     outlines = _outline_nodes(node)
     for outline in outlines:
@@ -277,9 +273,7 @@ def _around(corners: Floats, height: float, label: int, rgb: tuple[int, int, int
 
 def _parking(read: Reader, road: RoadRecord, node: Node) -> ParkingSpace:
     """Returns the parking space of an object; 5 m by 2 m where the file gives no size."""
-    place = road_place(
-        road, read.number(node, "s"), read.number(node, "t"), read.number(node, "zOffset", 0.0)
-    )
+    place = node_place(read, road, node)
     yaw = place.heading + read.number(node, "hdg", 0.0)
     numbers = (place.x, place.y, place.z, yaw)
     x, y, z, yaw = (round(v, 5) for v in numbers)
@@ -328,11 +322,7 @@ def bridges_of(read: Reader, road: RoadRecord) -> Iterator[Bridge]:
         whole = Bridge(road.id, round(s, 5), end)
         if s >= end:
             continue
-        spans = [
-            sorted(read.integer(valid, name) for name in ("fromLane", "toLane"))
-            for valid in node.findall("validity")
-        ]
-        yield from [replace(whole, lanes=(low, high)) for low, high in spans] or [whole]
+        yield from [replace(whole, lanes=span) for span in valid_lanes(read, node)] or [whole]
 
 
 def _place(read: Reader, node: Node, name: str) -> float:

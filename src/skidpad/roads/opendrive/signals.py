@@ -70,6 +70,19 @@ def road_place(road: RoadRecord, s: float, t: float, z_offset: float = 0.0) -> P
     )
 
 
+def node_place(read: Reader, road: RoadRecord, node: Node) -> Place:
+    """Returns where a <signal> or an <object> of a road stands."""
+    s, t = read.number(node, "s"), read.number(node, "t")
+    return road_place(road, s, t, read.number(node, "zOffset", 0.0))
+
+
+def valid_lanes(read: Reader, node: Node) -> list[tuple[int, int]]:
+    """Returns least and greatest lane id of each <validity> of a node."""
+    found = node.findall("validity")
+    ends = [sorted(read.integer(v, name) for name in ("fromLane", "toLane")) for v in found]
+    return [(low, high) for low, high in ends]
+
+
 def signal_kind(node: Node) -> SignalKind:
     """Returns what a <signal> demands, by its type's number in the German catalogue; OTHER for any else."""
     if node.get("type") in LIGHTS:
@@ -178,12 +191,7 @@ def _rows(
         if id not in signals or signals[id][1].get("type") == STOP_LINE:
             continue
         home, signal = signals[id]
-        head = road_place(
-            home,
-            read.number(signal, "s"),
-            read.number(signal, "t"),
-            read.number(signal, "zOffset", 0.0),
-        )
+        head = node_place(read, home, signal)
         kind = signal_kind(signal)
         value = _limit(read, signal) if kind is SignalKind.SPEED_LIMIT else np.nan
         group = document.controllers.get(id, road.junction)
@@ -204,10 +212,7 @@ def _governed_lanes(
     """Returns indices of drivable lanes on which a signal is valid: its validity, else its orientation."""
     s = read.number(node, "s")
     section = max((i for i, sec in enumerate(road.sections) if sec.s_start <= s + 1e-6), default=0)
-    ranges = [
-        sorted((read.integer(v, "fromLane"), read.integer(v, "toLane")))
-        for v in node.findall("validity")
-    ]
+    ranges = valid_lanes(read, node)
     orientation = node.get("orientation", "none")
     lanes = []
     for record in road.sections[section].lanes:

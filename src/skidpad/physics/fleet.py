@@ -105,13 +105,11 @@ class Fleet:
         s.vx[i], s.vy[i] = v * cos(pose.yaw), v * sin(pose.yaw)
         s.yaw_rate[i] = s.ax[i] = s.ay[i] = 0.0
         s.present[i] = True
-        self.wheels.omega[i] = v / self.params.wheel_radius[i]
-        self.wheels.steer[i] = 0.0
-        self.wheels.slip_y[i] = 0.0
-        self.wheels.a_load[i] = 0.0
-        self.wheels.slide[i] = 0.0
-        self.wheels.memory[i] = 0.0
-        self.wheels.memory[i, PRESSURE : PRESSURE + 4] = 1.0
+        w = self.wheels
+        w.omega[i] = v / self.params.wheel_radius[i]
+        for column in (w.steer, w.slip_y, w.a_load, w.slide, w.memory):
+            column[i] = 0.0
+        w.memory[i, PRESSURE : PRESSURE + 4] = 1.0
 
     def step(
         self,

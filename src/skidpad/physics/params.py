@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,13 @@ class WheelStates(NamedTuple):
 STIFFNESS, WATER, FEEL = 4, 8, 12
 
 
+ALIKE = (  # parameters that a VehicleType has under the same name
+    "mass", "yaw_inertia", "x_cog", "track", "cog_height", "wheel_radius", "wheel_inertia",
+    "tyre_width", "power", "force_max", "engine_drag", "handbrake_torque", "steer_max",
+    "pitch_gradient", "roll_gradient",
+)  # fmt: skip
+
+
 def vehicle_params(types: Sequence[VehicleType]) -> VehicleParams:
     """Returns the parameters of these vehicles, in their order.
 
@@ -79,27 +86,16 @@ def vehicle_params(types: Sequence[VehicleType]) -> VehicleParams:
     def column(values: list[float]) -> Floats:
         return np.array(values, dtype=np.float64)
 
+    alike: dict[str, Any] = {name: column([getattr(t, name) for t in types]) for name in ALIKE}
     return VehicleParams(
-        mass=column([t.mass for t in types]),
-        yaw_inertia=column([t.yaw_inertia for t in types]),
-        x_cog=column([t.x_cog for t in types]),
+        **alike,
         a=column([t.x_front_axle - t.x_cog for t in types]),
         b=column([t.x_cog - t.x_rear_axle for t in types]),
-        track=column([t.track for t in types]),
-        cog_height=column([t.cog_height for t in types]),
-        wheel_radius=column([t.wheel_radius for t in types]),
-        wheel_inertia=column([t.wheel_inertia for t in types]),
-        tyre_width=column([t.tyre_width for t in types]),
         drive_front=column([t.drive_share_front for t in types]),
-        power=column([t.power for t in types]),
-        force_max=column([t.force_max for t in types]),
         speed_max=column([inf if t.speed_max is None else t.speed_max for t in types]),
-        engine_drag=column([t.engine_drag for t in types]),
         brake_torque=np.array(
             [(t.brake_torque_front, t.brake_torque_rear) for t in types], dtype=np.float64
         ).reshape(-1, 2),
-        handbrake_torque=column([t.handbrake_torque for t in types]),
-        steer_max=column([t.steer_max for t in types]),
         steer_rate=np.radians(column([t.steer_rate_deg for t in types])),
         drag=0.5 * AIR_DENSITY * column([t.drag_area for t in types]),
         rolling=column([t.rolling_resistance for t in types]),
@@ -107,8 +103,6 @@ def vehicle_params(types: Sequence[VehicleType]) -> VehicleParams:
             [(t.stiffness_front, t.stiffness_rear) for t in types], dtype=np.float64
         ).reshape(-1, 2),
         roll_front=column([t.roll_share_front for t in types]),
-        pitch_gradient=column([t.pitch_gradient for t in types]),
-        roll_gradient=column([t.roll_gradient for t in types]),
         side=side_coefficients(types),
         anti_lock=np.array([t.abs for t in types], dtype=np.bool_),
         cycling=np.zeros(len(types), dtype=np.bool_),

@@ -17,7 +17,7 @@ from skidpad.roads.kernels import LaneArrays, advance_point, project_point
 from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.channels.control import Controller
-from skidpad.stack.channels.planning import PlanParams, find_blocks, roll_out
+from skidpad.stack.channels.planning import SPEED_FACTOR, PlanParams, find_blocks, roll_out
 from skidpad.stack.channels.route import SEARCH, STEP, Line, RoutePath, locate
 from skidpad.stack.channels.settings import CarModel, ChannelSettings
 from skidpad.stack.channels.tracking import Tracker
@@ -45,12 +45,8 @@ class Channel:
     ) -> None:
         self.name, self.settings, self.car = name, settings, car
         self.map, self.route = map, route
-        c = settings
-        self._params = PlanParams(
-            c.headway, c.gap_min, c.a_max, c.b_comfort, c.a_lateral, c.speed_factor, c.margin,
-            0.5 * car.length, 0.5 * car.width,
-        )  # fmt: skip
-        self._times = np.arange(0.0, c.prediction_horizon + 1e-9, c.prediction_step)
+        self._params = PlanParams(0.5 * car.length, 0.5 * car.width)
+        self._times = np.arange(0.0, settings.prediction_horizon + 1e-9, settings.prediction_step)
         self._polygon = footprint(0.0, 0.0, 0.0, car.length, car.width)
         self.tracker = Tracker(settings)
         self.controller = Controller(car, CYCLE)
@@ -69,7 +65,7 @@ class Channel:
 
     def keep_below(self, v_max: float) -> None:
         """Plans from now on for no more than `v_max` (m/s, > 0); inf: as it would by itself."""
-        factor = min(self.settings.speed_factor, v_max / float(self.route.points.limit.max()))
+        factor = min(SPEED_FACTOR, v_max / float(self.route.points.limit.max()))
         self._params = self._params._replace(speed_factor=factor)
 
     def update(self, view: ChannelView) -> ChannelFrame:
@@ -158,7 +154,7 @@ class Channel:
         """
         c = self.settings
         front = self.at * STEP + 0.5 * self.car.length
-        way = v * RELIEF + v * v / (2.0 * c.b_comfort) + HALT_REACH
+        way = v * RELIEF + v * v / (2.0 * self._params.b_comfort) + HALT_REACH
         return any(
             -1.0 <= line.s - front <= way
             and not (c.reads_lights if line.kind is SignalKind.LIGHT else c.reads_stop_lines)

@@ -24,20 +24,21 @@ CROSSING_MARGIN = 1.5  # s between the ego and who crosses its path
 FADE = 10.0  # m in which the ego's offset from the path fades by 1/e
 LINE_MARGIN = 1.0  # m kept to a line
 ALONG = 0.5  # cosine: objects that move with the path are leaders and not crossers
+SPEED_FACTOR = 0.9  # of the limit
 
 
 class PlanParams(NamedTuple):
-    """Numbers of `ChannelSettings` and `CarModel` that the kernel needs."""
+    """What the kernel needs: size of the own body, and a manner that all channels share."""
 
-    headway: float
-    gap_min: float
-    a_max: float
-    b_comfort: float
-    a_lateral: float
-    speed_factor: float
-    margin: float
-    half_length: float
+    half_length: float  # m
     half_width: float
+    headway: float = 1.6  # s; comfortable time gaps of 1.2 to 2.0 s in ISO 15622
+    gap_min: float = 3.0  # m to a standing object
+    a_max: float = 1.5  # m/s^2
+    b_comfort: float = 2.0  # m/s^2
+    a_lateral: float = 2.0  # m/s^2 in bends, comfort limit of ISO 11270 is 3
+    speed_factor: float = SPEED_FACTOR
+    margin: float = 0.3  # m kept beside the own body
 
 
 class Blocks(NamedTuple):

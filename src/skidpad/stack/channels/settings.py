@@ -31,13 +31,6 @@ class ChannelSettings:
     reads_stop_lines: bool  # stops at stop lines, slows at yield lines (C-024)
     lane_prediction: bool  # predicts vehicles along their lanes, else straight on
     gives_ids: bool = True
-    headway: float = 1.6  # s; comfortable time gaps of 1.2 to 2.0 s in ISO 15622
-    gap_min: float = 3.0  # m to a standing object
-    a_max: float = 1.5  # m/s^2
-    b_comfort: float = 2.0  # m/s^2
-    a_lateral: float = 2.0  # m/s^2 in bends, comfort limit of ISO 11270 is 3
-    speed_factor: float = 0.9  # of the limit
-    margin: float = 0.3  # m kept beside the own body
     confirm: int = 3  # detections that make an object
     coast: float = 0.5  # s for which an undetected object is kept
 

@@ -49,7 +49,7 @@ KINDS = {
     "adas": adas_run(3, "rain-night", profile="thesis_text", settings={"mu_ref": 0.8}),
     "adas on CARLA": adas_run(3, backend=SERVER),
     "adas with a stack": adas_run(driver=StackDriver("a.b:C", {"gain": [1, 2.5]}, name="x")),
-    "study": speed_and_dropout([1])[1].run,
+    "study": speed_and_dropout(1)[1].run,
     "tuning": tuning_run(Candidate("lead_slowdown", {"Deceleration": 6.0}), 900_001),
     "grip": scenario_run("ghost_cut_in", "statistical", overlay=True),
     "play": scenario_run("/x/y.xosc", course=Scenario(ego="a", actors=ActorMode.IDEAL)),
@@ -96,7 +96,7 @@ def again(run: Path) -> str:
 @pytest.mark.req("A-139", "A-260")
 def test_a_folder_of_every_command_is_driven_again(tmp_path: Path) -> None:
     adas = adas_run(2, seed=3, duration=1.0, vehicles=3)
-    blinking = replace(speed_and_dropout((1,))[2].run, seed=4, duration=1.0)
+    blinking = replace(speed_and_dropout(1)[2].run, seed=4, duration=1.0)
     grip = replace(tuning_run(Candidate("lead_slowdown", {}), 1), duration=1.0)
     played = replace(grip, driver=Passenger())
     Campaign(MATRIX, [adas, blinking]).run(tmp_path, here)

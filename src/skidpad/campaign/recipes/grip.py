@@ -12,19 +12,10 @@ from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from msgspec import structs
-
 from skidpad import __version__
 from skidpad.campaign.cells.grip import Cross, cross, scenario_of, template
 from skidpad.campaign.recipes.recipe import Driven, Recipe
-from skidpad.campaign.runs.folder import (
-    Stopwatch,
-    fresh_folder,
-    last_line,
-    write_config,
-    write_played,
-    write_run,
-)
+from skidpad.campaign.runs.folder import Stopwatch, fresh_folder, last_line, write_drive
 from skidpad.campaign.user_files import keep_road
 from skidpad.campaign.workers.worker import Job, Runner
 from skidpad.core.run import RunSpec
@@ -100,9 +91,7 @@ def drive_and_judge(
         off_road=driven.off_road,
     )
     if keep or driven.error:
-        write_config(folder, structs.replace(cell, surface=driven.surface).to_plain())
-        write_run(folder, driven)
-        write_played(folder, driven)
+        write_drive(folder, cell, driven)
         keep_road(out, driven.road)
     return GripDrive(driven, metrics, log_hash(driven.log), watch.timing_of(driven))
 

@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import yaml
+from msgspec import structs
 
 from skidpad.core.files.names import inside
+from skidpad.core.run import RunSpec
 from skidpad.evidence.pairs import Pair, pairs, pairs_of_others
 from skidpad.recording.campaign.folder import RUNS
 from skidpad.recording.campaign.results import Timing
@@ -78,6 +80,13 @@ def write_run(folder: Path, driven: Run) -> str:
     if driven.error:
         write_bytes(folder / ERROR, driven.error.encode())
     return digest
+
+
+def write_drive(folder: Path, spec: RunSpec, driven: Run) -> None:
+    """Writes all that a run leaves: the run with what lay on its road at the begin, log, and story."""
+    write_config(folder, structs.replace(spec, surface=driven.surface).to_plain())
+    write_run(folder, driven)
+    write_played(folder, driven)
 
 
 def write_played(folder: Path, driven: Run) -> None:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from msgspec import structs
-
 from skidpad.campaign.driving.backends import WATCHDOG, keep_server, make_backend
 from skidpad.campaign.driving.run_setup import load_scenario
-from skidpad.campaign.runs.folder import write_config, write_played, write_run
+from skidpad.campaign.runs.folder import write_drive
 from skidpad.campaign.runs.run import Run, run
 from skidpad.campaign.user_files import keep_road
 from skidpad.campaign.workers.pool import run_jobs
@@ -52,8 +50,6 @@ def run_task(task: Task) -> Run:
     keep_server(task.run.backend)
     backend = make_backend(task.run.backend, WATCHDOG)
     driven = run(task.run, backend=backend, folder=task.out, checkpoints_s=task.checkpoints_s)
-    write_config(task.out, structs.replace(task.run, surface=driven.surface).to_plain())
-    write_run(task.out, driven)
-    write_played(task.out, driven)
+    write_drive(task.out, task.run, driven)
     keep_road(task.out, driven.road)
     return driven

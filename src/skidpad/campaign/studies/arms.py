@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -31,11 +31,14 @@ class Variant:
     recovery: Mapping[str, Any] = field(default_factory=dict)  # other values of the supervisor
 
 
+Arms = Callable[[int], list[Variant]]  # of a seed
+
+
 @dataclass(frozen=True, slots=True)
 class Study:
     """Arms of a study with their seeds, and the claims that are judged on their runs."""
 
-    arms: Callable[[Sequence[int]], list[Variant]]
+    arms: Arms
     claims: tuple[str, ...]
 
 
@@ -64,78 +67,58 @@ def make_changed_run(stack: str, seed: int, configuration: int, **change: Any) -
     return structs.replace(base, driver=driver, seed=seed)
 
 
-def by_settings(arms: Mapping[str, Mapping[str, Any]], configuration: int = 2) -> Any:
-    """Returns a function of seeds that makes arms which differ in settings alone, named as `arms`."""
-
-    def make(seeds: Sequence[int]) -> list[Variant]:
-        return [
-            Variant(
-                structs.replace(base_run(configuration, settings=values), seed=seed),
-                {"variant": name},
-            )
-            for seed in seeds
-            for name, values in arms.items()
-        ]
-
-    return make
+def by_settings(arms: Mapping[str, Mapping[str, Any]], configuration: int = 2) -> Arms:
+    """Returns a function of a seed that makes arms which differ in settings alone, named as `arms`."""
+    return lambda seed: [
+        Variant(
+            structs.replace(base_run(configuration, settings=values), seed=seed), {"variant": name}
+        )
+        for name, values in arms.items()
+    ]
 
 
-def speed_and_dropout(seeds: Sequence[int]) -> list[Variant]:
+def speed_and_dropout(seed: int) -> list[Variant]:
     """Returns arms for F-08: every cruise target with every share of time without any sensing."""
     return [
         Variant(
             make_changed_run("Blinking", seed, 2, cruise_kmh=target, dropout=share),
             {"target_kmh": target, "dropout_injected": share},
         )
-        for seed in seeds
         for target in TARGETS_KMH
         for share in DROPOUT_SHARES
     ]
 
 
-def by_stacks(
-    arms: Mapping[str, str], configuration: int = 2
-) -> Callable[[Sequence[int]], list[Variant]]:
-    """Returns a function of seeds that makes arms which differ in the stack of `stacks.py`."""
-
-    def make(seeds: Sequence[int]) -> list[Variant]:
-        return [
-            Variant(make_changed_run(stack, seed, configuration), {"variant": name})
-            for seed in seeds
-            for name, stack in arms.items()
-        ]
-
-    return make
+def by_stacks(arms: Mapping[str, str], configuration: int = 2) -> Arms:
+    """Returns a function of a seed that makes arms which differ in the stack of `stacks.py`."""
+    return lambda seed: [
+        Variant(make_changed_run(stack, seed, configuration), {"variant": name})
+        for name, stack in arms.items()
+    ]
 
 
-def preliminary(seeds: Sequence[int]) -> list[Variant]:
+def preliminary(seed: int) -> list[Variant]:
     """Returns arms for A-278: preliminary and recommended profile, with the same grip and sight."""
     same = {"grip": "none", "range": "none", "mu_ref": 1.5, "camera": False}
     return [
         Variant(
-            structs.replace(
-                base_run(2),
-                seed=seed,
-                settings=load_profile(profile, same),
-            ),
+            structs.replace(base_run(2), seed=seed, settings=load_profile(profile, same)),
             {"variant": name},
         )
-        for seed in seeds
         for name, profile in (("preliminary", "preliminary"), ("final", "recommended"))
     ]
 
 
-def pace(seeds: Sequence[int]) -> list[Variant]:
+def pace(seed: int) -> list[Variant]:
     """Returns arms for F-25: the same runs, and each tick 1 ms slower."""
     base = structs.replace(base_run(4, "rain-night"), duration=100.0)
     return [
         Variant(structs.replace(base, seed=seed), {"variant": name}, slow_s=slow)
-        for seed in seeds
         for name, slow in (("paced", 0.0), ("slowed", 1e-3))
     ]
 
 
-def recovery(seeds: Sequence[int]) -> list[Variant]:
+def recovery(seed: int) -> list[Variant]:
     """Returns arms for F-30: configuration 0 in rain, whole and without one safeguard each."""
     arms: dict[str, dict[str, Any]] = {
         "whole": {},
@@ -143,22 +126,17 @@ def recovery(seeds: Sequence[int]) -> list[Variant]:
         "no_warm_up": {"warm_up": ONE_TICK},
         "no_grace": {"grace": 0.0},
     }
+    base = base_run(0, "rain-noon")
     return [
-        Variant(
-            structs.replace(base_run(0, "rain-noon"), seed=seed),
-            {"variant": name},
-            recovery=values,
-        )
-        for seed in seeds
+        Variant(structs.replace(base, seed=seed), {"variant": name}, recovery=values)
         for name, values in arms.items()
     ]
 
 
-def noise(seeds: Sequence[int]) -> list[Variant]:
+def noise(seed: int) -> list[Variant]:
     """Returns arms with perception noise of cited sizes, all else a clear noon (A-230)."""
     return [
         Variant(make_changed_run("Noisy", seed, 2, noise=asdict(strength)), {"variant": name})
-        for seed in seeds
         for name, strength in NOISE.items()
     ]
 

@@ -10,12 +10,11 @@ import polars as pl
 from msgspec import structs
 
 from skidpad.campaign.driving.drivers import find_driver
-from skidpad.campaign.recipes.matrix import roads_of, warm_up
+from skidpad.campaign.recipes.matrix import roads_of
 from skidpad.campaign.runs.run import run
-from skidpad.campaign.workers.pool import local
+from skidpad.campaign.studies.study import drive_all
 from skidpad.campaign.workers.worker import Job
 from skidpad.core.environment.surface import SurfacePatch
-from skidpad.core.errors import SkidpadError
 from skidpad.core.run import CameraDriver, Roads, RunSpec
 from skidpad.core.settings.parts import load_profile
 from skidpad.core.vocabulary import SensorLevel
@@ -209,17 +208,9 @@ def drive_effects(
         for seed in seeds
         for spec in (plan_arm(stack, weather, arm, seed, duration, map),)
     ]
-    rows: dict[str, dict[str, Any]] = {}
-    for finished in local(workers, warm_up)(jobs):
-        if finished.failure is not None:
-            how = finished.failure.value
-            raise SkidpadError(f"a run of effects {how}: {finished.detail.strip()}")
-        arm = finished.job.key.rsplit("-", 1)[0]
-        rows[finished.job.key] = {
-            "stack": stack, "weather": weather, "map": map, "arm": arm, **finished.value
-        }  # fmt: skip
-        on_run(len(rows), len(jobs))
-    return pl.DataFrame([rows[job.key] for job in jobs])
+    about = {"stack": stack, "weather": weather, "map": map}
+    rows = zip(jobs, drive_all("effects", jobs, workers, on_run), strict=True)
+    return pl.DataFrame([about | {"arm": job.key.rsplit("-", 1)[0]} | row for job, row in rows])
 
 
 def compare_effects(rows: pl.DataFrame) -> list[Result]:

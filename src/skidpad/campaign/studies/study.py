@@ -73,6 +73,23 @@ def drive_variant(variant: Variant) -> dict[str, Any]:
     }
 
 
+def drive_all(
+    what: str, jobs: Sequence[Job], workers: int, on_run: Callable[[int, int], None]
+) -> list[dict[str, Any]]:
+    """Returns the rows of all jobs, in their order; `on_run` as in `run_study`.
+
+    SkidpadError, which begins with `what`, as soon as a run failed.
+    """
+    rows: dict[str, dict[str, Any]] = {}
+    for finished in local(workers, warm_up)(jobs):
+        if finished.failure is not None:
+            how = finished.failure.value
+            raise SkidpadError(f"{what}: a run {how}: {finished.detail.strip()}")
+        rows[finished.job.key] = finished.value
+        on_run(len(rows), len(jobs))
+    return [rows[job.key] for job in jobs]
+
+
 def run_study(
     id: str,
     seeds: Sequence[int],
@@ -89,15 +106,8 @@ def run_study(
     """
     require_choice("study", id, tuple(STUDIES))
     study = STUDIES[id]
-    variants = study.arms(seeds)
+    variants = [variant for seed in seeds for variant in study.arms(seed)]
     jobs = [Job(f"{id}-{k}", drive_variant, v, v.run.deadline_s) for k, v in enumerate(variants)]
-    rows: dict[str, dict[str, Any]] = {}
-    for finished in local(workers, warm_up)(jobs):
-        if finished.failure is not None:
-            how = finished.failure.value
-            raise SkidpadError(f"study {id}: a run {how}: {finished.detail.strip()}")
-        rows[finished.job.key] = finished.value
-        on_run(len(rows), len(jobs))
-    table = pl.DataFrame([rows[j.key] for j in jobs])
+    table = pl.DataFrame(drive_all(f"study {id}", jobs, workers, on_run))
     claims = [BY_ID[claim] for claim in study.claims]
     return judge(claims, [table] * len(claims), astray(table)), table

@@ -23,7 +23,8 @@ from skidpad.report.elements.figures import scatter
 OWN = {"3": "bare", "4": "fixed 80 km/h", "5": "envelope", "reference": "reference driver"}
 RIVALS = {
     "envelope": "envelope", "table": "table of three speeds", "rss": "RSS, constant grip",
-    "oracle": "envelope, true grip",
+    "oracle": "envelope, true grip", "oracle-sight": "envelope, true sight",
+    "full": "envelope, walkers and lane boundaries too",
     "pulses": "envelope with brake pulses", "only-sight": "sight alone", "only-lead": "lead alone",
     "only-bend": "bend alone", "only-water": "water alone", "grip-low": "grip 30 % too low",
     "grip-high": "grip 30 % too high", "first-curve": "envelope, resume ends behind the first bend",

@@ -15,7 +15,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.run import Passenger, Roads, RunSpec, Scenario
 from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.states import EgoEstimate, VehicleCommand
-from skidpad.core.vocabulary import Govern, GripModel, Outcome, SensorLevel
+from skidpad.core.vocabulary import Govern, GripModel, Outcome, RangeModel, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.envelope.govern import (
     PULSE_BRAKE,
@@ -31,6 +31,7 @@ from skidpad.envelope.govern import (
 )
 from skidpad.envelope.grip import Grip
 from skidpad.envelope.limits import Binding
+from skidpad.envelope.sight import Sight
 from skidpad.physics.presets import preset
 from skidpad.sensors.outside import make_rain_sensor, make_thermometer, wiper_stage
 from skidpad.stack.configurations import numbered_driver
@@ -178,6 +179,21 @@ def test_the_oracle_knows_the_tyres_of_the_run():
         return choose_envelope(RunSpec(govern=Govern.ORACLE), setup).oracle(10.0)
 
     assert grip("summer") < grip("winter") < grip("studded")
+
+
+def test_the_oracle_of_sight_knows_how_far_the_radar_reaches_in_rain():
+    def reach(weather, range_model=RangeModel.PHYSICAL):
+        setup = Setup(
+            map="figure8", specs=(), ego=ActorSetup(name="ego", type="tesla", place=Pose(0.0, 0.0)),
+            weather=weather, range_model=range_model,
+        )  # fmt: skip
+        true_range = choose_envelope(RunSpec(govern=Govern.ORACLE_SIGHT), setup).oracle_sight
+        return Sight(None, 0.05, true_range(100.0)).reach
+
+    rain = Weather(precipitation=100.0)
+    assert reach(Weather()) == pytest.approx(100.0)
+    assert reach(rain) < 99.0
+    assert reach(rain, RangeModel.NONE) == pytest.approx(100.0)
 
 
 def test_settings_out_of_range_are_told():

@@ -314,8 +314,9 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             description="Keep any stack's speed inside its grip and sight: envelope; full also by lane "
             "boundaries, walkers and bridges of the map; watch records alone what it would allow; pulses "
             "also brakes a little to feel the grip. For studies: oracle "
-            "(true grip), table (80, 60, 40 km/h: dry, rain, cold), fixed (80 km/h), rss (constant "
-            "grip), only-sight, only-lead, only-bend, only-water, grip-low, grip-high (30 % wrong)."
+            "(true grip), oracle-sight (true range of the radar), table (80, 60, 40 km/h: dry, rain, cold), "
+            "fixed (80 km/h), rss (constant grip), only-sight, only-lead, only-bend, only-water, "
+            "grip-low, grip-high (30 % wrong)."
         ),
     ] = Govern.NONE
     backend: BackendChoice = BackendChoice()

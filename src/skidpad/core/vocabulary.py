@@ -285,6 +285,7 @@ class Govern(str, Enum):
     NONE = "none"
     ENVELOPE = "envelope"  # grip and sight from own signals
     ORACLE = "oracle"  # the same with true grip, for studies
+    ORACLE_SIGHT = "oracle-sight"  # the same with the true range of the radar, for studies
     WATCH = "watch"  # records what the envelope would allow, and lets the stack drive
     TABLE = "table"  # a rival: three speeds by wiper stage and temperature
     FIXED = "fixed"  # another one: 80 km/h always

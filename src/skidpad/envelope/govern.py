@@ -79,6 +79,7 @@ class EnvelopeSettings:
         factor: on the estimated grip, for studies.
         table_kmh: speeds when dry, in rain, in the cold, in the place of the envelope: a rival.
         oracle: true grip, for studies only.
+        oracle_sight: true range in m of a radar with a nominal one, for studies only.
         limits: those that count; all but for ablations.
         rss: RSS distances with constant grip and the dry row of the table, in its place: a rival.
         watches: it records what it would allow and leaves the stack alone.
@@ -100,6 +101,7 @@ class EnvelopeSettings:
     factor: float = 1.0
     table_kmh: tuple[float, float, float] | None = None
     oracle: GripAt | None = None
+    oracle_sight: Callable[[float], float] | None = None
     limits: frozenset[Binding] = frozenset(Binding)
     rss: bool = False
     watches: bool = False
@@ -153,7 +155,9 @@ class Envelope:
     ) -> None:
         self.map, self.settings = map, settings
         radar = next((spec for spec in specs if isinstance(spec, RadarSpec)), None)
-        self.sight = Sight(radar, settings.dt)
+        true_range = settings.oracle_sight
+        known = None if true_range is None or radar is None else true_range(radar.range)
+        self.sight = Sight(radar, settings.dt, known)
         self.grip = GripEstimator(settings.dt, stiffness=settings.stiffness)
         self.bus = CarBus(settings.seed, settings.bus, self.grip.car.steer_max)
         self.further: FurtherSight | None = None

@@ -73,10 +73,13 @@ class Lead:
 
 
 class Sight:
-    """Leads by the radar, and the distance at which they are seen."""
+    """Leads by the radar, and the distance at which they are seen.
 
-    def __init__(self, radar: RadarSpec | None, dt: float) -> None:
-        self.radar, self.dt = radar, dt
+    known: m at which they are seen first, for studies; None: it is found out.
+    """
+
+    def __init__(self, radar: RadarSpec | None, dt: float, known: float | None = None) -> None:
+        self.radar, self.dt, self.known = radar, dt, known
         self.lead: Lead | None = None
         self.first_seen: deque[float] = deque(maxlen=SEEN_KEPT)
         self.unseen = inf  # s since the last return of the lead
@@ -109,6 +112,8 @@ class Sight:
 
         SEEN_PRIOR before SEEN_LEAST were noted, and half of it at least.
         """
+        if self.known is not None:
+            return self.known
         if len(self.first_seen) < SEEN_LEAST:
             return SEEN_PRIOR
         return max(float(np.quantile(self.first_seen, SEEN_SHARE)), SEEN_PRIOR / 2.0)

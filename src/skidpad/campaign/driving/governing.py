@@ -6,10 +6,12 @@ from dataclasses import replace
 
 from skidpad.core.run import AdasDriver, RunSpec
 from skidpad.core.setup import Setup
-from skidpad.core.vocabulary import Govern
+from skidpad.core.vocabulary import Govern, RangeModel
+from skidpad.core.weather import Weather
 from skidpad.envelope.govern import TABLE_KMH, EnvelopeSettings, govern
 from skidpad.envelope.limits import Binding
 from skidpad.physics.grip import mu_at, road_of
+from skidpad.physics.optics import radar_range
 from skidpad.stack.interface import Stack
 
 FIXED_KMH = 80.0
@@ -35,14 +37,18 @@ def choose_envelope(spec: RunSpec, setup: Setup) -> EnvelopeSettings | None:
     own = isinstance(spec.driver, AdasDriver) and spec.driver.envelope
     kind = Govern.ENVELOPE if own and spec.govern is Govern.NONE else spec.govern
     found = describe_envelope(kind, setup.dt, spec.seed)
-    if found is None or kind is not Govern.ORACLE:
-        return found
-    params = road_of(setup).params()
-    return replace(found, oracle=lambda v: float(mu_at(params, v)))
+    if found is not None and kind is Govern.ORACLE:
+        params = road_of(setup).params()
+        return replace(found, oracle=lambda v: float(mu_at(params, v)))
+    if found is not None and kind is Govern.ORACLE_SIGHT:
+        is_limited = setup.range_model is RangeModel.PHYSICAL
+        weather = setup.weather if is_limited else Weather()
+        return replace(found, oracle_sight=lambda nominal: radar_range(weather, nominal))
+    return found
 
 
 def describe_envelope(kind: Govern, dt: float, seed: int) -> EnvelopeSettings | None:
-    """Returns the settings of a word of --govern, those of an oracle without its grip; None: no envelope."""
+    """Returns the settings of a word of --govern, oracles without what they know; None: no envelope."""
     plain = EnvelopeSettings(dt=dt, seed=seed)
     if kind in LIMITS:
         return replace(plain, limits=frozenset({LIMITS[kind]}))

@@ -27,8 +27,9 @@ from skidpad.simulation.world.feel import feel_motion
 
 EGO_ROLES = ("hero", "ego", "ego_vehicle")  # of ScenarioRunner and examples; ROS bridges
 RADAR = RadarSpec("envelope_radar", Pose(2.0, 0.0, 1.0))  # where the twelve sensors have theirs
-# those that need what a client's program does not give: true grip, or cameras of the stack
-SERVED = tuple(g for g in Govern if g not in (Govern.NONE, Govern.ORACLE, Govern.FULL))
+# they need what a client's program does not give: the truth of the weather, or cameras of the stack
+UNSERVED = (Govern.NONE, Govern.ORACLE, Govern.ORACLE_SIGHT, Govern.FULL)
+SERVED = tuple(g for g in Govern if g not in UNSERVED)
 
 
 class ClientStack:

@@ -8,6 +8,7 @@ elsewhere end the call; the stepper then drives that tick. `why_not_quick` says 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 from typing import Any, NamedTuple
 
 from skidpad.campaign.driving.loop import Stepper, Timer, Unsupervised
@@ -245,6 +246,7 @@ class QuickDrive:
     def _rules(self, arrays: TickArrays) -> Rules:
         """Returns what holds in all ticks of a call."""
         world, stack, supervisor = self.parts.world, self.parts.stack, self.parts.supervisor
+        far, stuck = (inf, inf) if world.traffic is None else world.traffic.limits()
         return Rules(
             dt=world.dt,
             substeps=world.fleet.steps,
@@ -254,6 +256,8 @@ class QuickDrive:
             stuck_speed=0.0 if supervisor is None else supervisor.settings.stuck_speed,
             reach=LIGHT_REACH,
             v_told=stack.v_told,
+            far=far,
+            stuck=stuck,
             assists=stack.assists,
             hsv_required=stack.lock.hsv_required,
         )

@@ -85,6 +85,8 @@ class Rules(NamedTuple):
     stuck_speed: float  # m/s
     reach: float  # m to a light that explains standing
     v_told: float  # m/s
+    far: float  # m from the ego up to which vehicles stay; below 0: some wait for room
+    stuck: float  # s for which they may stand
     assists: bool  # the stack stops at lights
     hsv_required: bool  # only at those whose lamp it sees
 
@@ -146,6 +148,18 @@ def is_change_due(t: Tables, dt: float) -> bool:
 
 
 @kernel
+def is_traffic_due(a: Arena, far: float, stuck: float) -> bool:
+    """Returns whether a vehicle that drives itself is farther from the ego, or stands for longer."""
+    s, state, due = a.rows.states, a.drivers.state, far < 0.0
+    for i in range(len(state)):
+        if not state[i].active:
+            continue
+        dx, dy = s.x[i] - s.x[EGO], s.y[i] - s.y[EGO]
+        due |= state[i].stuck > stuck or (s.present[i] and dx * dx + dy * dy > 0.999 * far * far)
+    return due
+
+
+@kernel
 def drive_ticks(
     joined: Held[Joined], begun: bool, tick: int, n: int, k: int, grace: int,
     throttle: float, brake: float, steer: float, handbrake: bool,
@@ -178,9 +192,13 @@ def drive_ticks(
             touches, crossed = call(
                 at.advance, advance, (arena, stages, tick, rules.dt, rules.substeps, 0.0, 0.0)
             )
-            if looks:
+            if looks and is_traffic_due(a, rules.far, rules.stuck):
                 why = MOVED
                 break
+            if looks:
+                _, crossed = call(
+                    at.advance, advance, (arena, SETTLE, tick, rules.dt, rules.substeps, 0.0, 0.0)
+                )
             if touches > 0 or crossed or is_change_due(t, rules.dt):
                 why = STEPPED
                 break

@@ -52,6 +52,7 @@ PUT_BACK_NEAREST = 100.0  # m from the ego, decision M-7
 PUT_BACK_SPEED = 0.8  # of the desired speed there
 NOSE = 5.0  # m from a car's middle to where it stands before a line
 BUBBLE = 500.0  # m, random traffic lives within this distance of the ego (A-209)
+KEPT = 1.2 * BUBBLE  # m from the ego, beyond which it is moved on
 CHECK_PERIOD = 20  # ticks between two looks at wrecks and the bubble
 Claimed = Callable[[], Places]  # of `claims`, made at the first call
 
@@ -247,6 +248,19 @@ class Traffic:
         elif self.waiting:
             yield from self._let_in(states, claimed, Area(UNSEEN, BUBBLE))
 
+    def limits(self) -> tuple[float, float]:
+        """Returns m from the ego and s without motion: up to them all vehicles stay where they are.
+
+        At present `moves` has nothing to yield while no vehicle that drives is farther away, or stands for
+        longer. -1 m where some wait for room.
+        """
+        stuck = STUCK_TIME if self.setup.put_wrecks_back else inf
+        if self.waiting:
+            return -1.0, stuck
+        if self.free_choice:
+            return KEPT, stuck
+        return (UNSEEN if self.setup.mode is TrafficStart.PACK else inf), stuck
+
     def _keep_pack(self, states: ActorStates, claimed: Claimed, pack: Pack) -> Iterator[Move]:
         """Yields the moves that bring waiting and lost vehicles to entrances around the ego's pack."""
 
@@ -274,7 +288,7 @@ class Traffic:
         x, y = float(states.x[0]), float(states.y[0])
         driving = self.drivers.state["active"] & states.present
         for i in np.flatnonzero(driving).tolist():
-            if hypot(states.x[i] - x, states.y[i] - y) > 1.2 * BUBBLE and self._is_alone(
+            if hypot(states.x[i] - x, states.y[i] - y) > KEPT and self._is_alone(
                 i, states, claimed
             ):
                 yield from self._claim_place(i, states, claimed, area, Reason.FAR)

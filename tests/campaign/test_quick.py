@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +12,14 @@ from msgspec import structs
 
 from skidpad.campaign.cells.grip import Cross, cross, template
 from skidpad.campaign.driving.loop import Moment, Sink
+from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.campaign.runs.run import OpenRun, Run
 from skidpad.core.run import Roads, RunSpec
-from skidpad.core.vocabulary import Govern, Outcome, SensorLevel, TrafficStart
+from skidpad.core.vocabulary import Govern, Outcome, RelocationReason, SensorLevel, TrafficStart
 from skidpad.physics.presets import all_presets, find_weather
 from skidpad.recording.run.log import RunLog
 from skidpad.scenarios.shipped import NAMES
+from skidpad.simulation.recovery import RecoverySettings, Supervisor
 from support.runs import adas_run, scenario_run
 from support.scenarios.files import at, event, private, story, time, write
 
@@ -149,6 +152,24 @@ def test_a_script_that_changes_what_is_seen_and_felt_gives_the_same_bits(tmp_pat
     assert one.log.weathers == other.log.weathers
     assert opened.quick is not None
     assert 0.2 * len(one.log) < opened.quick.ticks < 0.8 * len(one.log)
+
+
+@pytest.mark.parametrize("number", [0, 4])
+def test_an_ego_that_is_stuck_is_moved_in_the_same_tick(number: int) -> None:
+    """Stuck is one below 5 m/s for a second without a reason."""
+    spec = adas_run(number, duration=60.0)
+    logs = []
+    for quickly in (False, True):
+        stage = stage_of(spec)
+        settings = RecoverySettings(stuck_speed=5.0, stuck_time=1.0, release_speed=2.0)
+        supervisor = Supervisor(stage.map, settings, stage.setup.dt)
+        opened = OpenRun(spec, stage=replace(stage, supervisor=supervisor))
+        while opened.drive(100) if quickly else opened.step() is not None:
+            pass
+        opened.close()
+        logs.append(opened.finish().log)
+    assert RelocationReason.STUCK in {moved.reason for moved in logs[0].relocations}
+    assert not first_difference(*logs)
 
 
 def test_a_run_may_be_cut_anywhere() -> None:

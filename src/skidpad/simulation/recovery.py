@@ -200,11 +200,14 @@ class Supervisor:
             return self._realign(self.truth.states)
         return Action(command)
 
-    def pass_ticks(self, ticks: int, last: tuple[int, float, float]) -> None:
-        """Takes in so many ticks in which the stack drove, as it should; last: lane, s and offset there."""
+    def pass_ticks(self, ticks: int, last: tuple[int, float, float], standing: int) -> None:
+        """Takes in so many ticks in which the stack drove, as it should.
+
+        last: lane, s and offset there; standing: ticks without motion or reason by then.
+        """
         self.cool_down = max(self.cool_down - ticks, 0)
         self.grace = max(self.grace - ticks, 0)
-        self.standing = self.off = 0
+        self.standing, self.off = standing, 0
         self._last = last
 
     def _recover(self, states: ActorStates) -> Action:

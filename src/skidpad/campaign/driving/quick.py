@@ -37,6 +37,7 @@ from skidpad.recording.run.ticks import TickArrays, TickLog, copy_actors
 from skidpad.sensors.object_level.objects import ObjectSuite, sense
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.simulation.recovery import (
+    HOLDING,
     LIGHT_REACH,
     Action,
     Supervisor,
@@ -222,9 +223,10 @@ class QuickDrive:
         at: their first row in the log. begun: the world has made the step of the first one already.
         """
         world, supervisor = self.parts.world, self.parts.supervisor
-        grace = 0 if supervisor is None else supervisor.grace
-        told = drive_ticks(joined, begun, world.tick, n, at, grace, *last)
-        ticks, why, touches, crossed, throttle, brake, steer, handbrake, lane, s, offset = told
+        grace, stood = (0, 0) if supervisor is None else (supervisor.grace, supervisor.standing)
+        told = drive_ticks(joined, begun, world.tick, n, at, grace, stood, *last)
+        ticks, why, touches, crossed, throttle, brake, steer, handbrake = told[:8]
+        lane, s, offset, standing = told[8:]
         steps = ticks + (why in (UNUSUAL, REFUSED)) - begun
         if steps:
             world.pass_ticks(steps)
@@ -233,7 +235,7 @@ class QuickDrive:
             if self.parts.timer is not None:
                 self.parts.timer.left -= ticks
             if supervisor is not None:
-                supervisor.pass_ticks(ticks, (lane, s, offset))
+                supervisor.pass_ticks(ticks, (lane, s, offset), standing)
         return Stop(ticks, why, touches, crossed, Request(throttle, brake, steer, handbrake))
 
     def _refuse(self, request: Request) -> None:
@@ -254,6 +256,8 @@ class QuickDrive:
             bumper_first=self.parts.suite.camera_ids[0] == stack.cameras.bumper.depth_id,
             supervised=supervisor is not None,
             stuck_speed=0.0 if supervisor is None else supervisor.settings.stuck_speed,
+            stuck_time=inf if supervisor is None else supervisor.settings.stuck_time,
+            holding=sum(1 << tier for tier in HOLDING),
             reach=LIGHT_REACH,
             v_told=stack.v_told,
             far=far,

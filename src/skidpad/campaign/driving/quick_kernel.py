@@ -83,6 +83,8 @@ class Rules(NamedTuple):
     bumper_first: bool  # of the two cameras
     supervised: bool
     stuck_speed: float  # m/s
+    stuck_time: float  # s
+    holding: int  # tiers that explain standing, as bits
     reach: float  # m to a light that explains standing
     v_told: float  # m/s
     far: float  # m from the ego up to which vehicles stay; below 0: some wait for room
@@ -161,15 +163,16 @@ def is_traffic_due(a: Arena, far: float, stuck: float) -> bool:
 
 @kernel
 def drive_ticks(
-    joined: Held[Joined], begun: bool, tick: int, n: int, k: int, grace: int,
+    joined: Held[Joined], begun: bool, tick: int, n: int, k: int, grace: int, standing: int,
     throttle: float, brake: float, steer: float, handbrake: bool,
-) -> tuple[int, int, int, int, float, float, float, bool, int, float, float]:  # fmt: skip
+) -> tuple[int, int, int, int, float, float, float, bool, int, float, float, int]:  # fmt: skip
     """Drives up to n ticks after `tick` and writes rows of the log from k on.
 
     begun: the world has made the step of the first tick already, and stands at `tick`. grace: ticks without
-    the detector of an ego that is stuck. throttle, brake, steer, handbrake: of the tick before. Returns ticks
-    that are whole, why it came back, contacts and crossed markings of the step, the last request, and lane
-    (-1: not looked for), s and offset of the ego.
+    the detector of an ego that is stuck. standing: ticks for which it stands without a reason. throttle,
+    brake, steer, handbrake: of the tick before. Returns ticks that are whole, why it came back, contacts and
+    crossed markings of the step, the last request, lane (-1: not looked for), s and offset of the ego, and
+    `standing`.
     """
     at, rules, t = joined.value.at, joined.value.rules, joined.value.tables
     arena, states, map, sensors = (
@@ -181,7 +184,7 @@ def drive_ticks(
     far = eyes.other if rules.bumper_first else eyes.one
     echoes = eyes.around.radar.echoes
     done, why, touches, crossed = 0, DONE, 0, 0
-    lane, along, offset = -1, nan, nan
+    lane, along, offset, stands = -1, nan, nan, False
     while done < n:
         if not begun:
             commands[EGO, 0], commands[EGO, 1], commands[EGO, 2] = throttle, brake, steer
@@ -208,13 +211,16 @@ def drive_ticks(
         if rules.supervised:
             found = call(at.find_ego, find_ego, (map, states))
             usual = found[0] >= 0 and found[4] and found[3] >= WRONG_WAY_DOT
-            speed2 = s.vx[EGO] * s.vx[EGO] + s.vy[EGO] * s.vy[EGO]
-            if usual and grace - done - 1 <= 0 and speed2 < 1.001 * rules.stuck_speed**2:
-                usual = call(
+            v2, slow2 = s.vx[EGO] * s.vx[EGO] + s.vy[EGO] * s.vy[EGO], rules.stuck_speed**2
+            stands = grace - done - 1 <= 0 and v2 < 1.001 * slow2
+            if usual and stands:
+                stands = not call(
                     at.has_reason,
                     has_reason,
                     (map, states, t.stop_lane, t.stop_s, t.shown, rules.reach),
                 )
+            if stands:  # close to the limits the supervisor decides itself
+                usual &= v2 < 0.999 * slow2 and (standing + 1) * rules.dt < rules.stuck_time
             if not usual:
                 why = UNUSUAL
                 break
@@ -253,6 +259,7 @@ def drive_ticks(
         if not fits:
             why = REFUSED
             break
+        standing = standing + 1 if stands and not (rules.holding >> told[0]) & 1 else 0
         t.ticks[k, 0], t.ticks[k, 1], t.ticks[k, 2] = tick, 0, rules.weather
         row = t.rows[k]
         row[0], row[1], row[2], row[3] = x, y, yaw, v
@@ -269,4 +276,5 @@ def drive_ticks(
         done += 1
     return (
         done, why, touches, crossed, throttle, brake, steer, handbrake, lane, along, offset,
+        standing,
     )  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from math import hypot
+from math import hypot, sqrt
 from typing import Any, Protocol
 
 from skidpad.core.geometry import Pose
@@ -310,7 +310,8 @@ class Actor:
         """
         placed, before, self.motion = self.placed_by_file, self.motion, motion
         vx, vy, old_vx, old_vy = motion.vx, motion.vy, before.vx, before.vy
-        v, now = hypot(old_vx, old_vy), hypot(vx, vy)
+        # as kernels do it, to the bit
+        v, now = sqrt(old_vx * old_vx + old_vy * old_vy), sqrt(vx * vx + vy * vy)
         box = self.entity.box
         if placed:
             was = self.pose

@@ -6,6 +6,7 @@ from collections import deque
 from dataclasses import dataclass
 from enum import Enum
 from functools import partial
+from math import inf
 
 from skidpad.scenarios.conditions.base import Condition, EntityCondition, Probe
 from skidpad.scenarios.conditions.by_entity import BY_ENTITY
@@ -89,7 +90,8 @@ class Watched:
         self.is_immediate = timed.edge is Edge.NONE and timed.delay <= 0.0
         self.said = False
         self.before: bool | None = None
-        self.past: deque[tuple[float, bool]] = deque()
+        self.sent = self.late = False  # what goes into the delay, and what has come out of it
+        self.past: deque[tuple[float, bool]] = deque()  # its changes, each with when it is due
 
     def holds(self, scene: Scene) -> bool:
         """Returns the result of `delay` s ago; adds a change of it to the story. Once per step."""
@@ -111,10 +113,17 @@ class Watched:
             now = (rose and edge is not Edge.FALLING) or (fell and edge is not Edge.RISING)
         if self.timed.delay <= 0.0:
             return now
-        self.past.append((scene.t + self.timed.delay, now))
-        if self.past[0][0] <= scene.t + 1e-9:
-            return self.past.popleft()[1]
-        return False
+        if now is not self.sent:
+            self.sent = now
+            self.past.append((scene.t + self.timed.delay, now))
+        if self.wakes <= scene.t + 1e-9:
+            self.late = self.past.popleft()[1]
+        return self.late
+
+    @property
+    def wakes(self) -> float:
+        """Returns when the next change comes out of its delay, s; inf: none is on its way."""
+        return self.past[0][0] if self.past else inf
 
 
 class Watch:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from msgspec import Struct
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.kernels.jit import Held, hold, kernel
+from skidpad.core.kernels.jit import Held, hold, inner_kernel, kernel
 from skidpad.core.maths.constants import G
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import ActorKind
@@ -81,21 +81,20 @@ class ActorDriver:
     def __init__(self, kind: str, skill: float = 1.0) -> None:
         t = vehicle_type(kind)
         self.type = t
-        self.hands = hold(
-            Hands(
-                speed_gain=SPEED_GAIN * skill,
-                omega=OMEGA * skill,
-                a_drive=t.a_drive,
-                p_drive=t.power / t.mass,
-                a_brake=t.a_brake,
-                drag=0.5 * AIR_DENSITY * t.drag_area / t.mass,
-                rolling=t.rolling_resistance * G,
-                engine_drag=t.engine_drag,
-                wheelbase=t.wheelbase,
-                steer_max=t.steer_max,
-                understeer=t.understeer,
-            )
+        self.own_hands = Hands(
+            speed_gain=SPEED_GAIN * skill,
+            omega=OMEGA * skill,
+            a_drive=t.a_drive,
+            p_drive=t.power / t.mass,
+            a_brake=t.a_brake,
+            drag=0.5 * AIR_DENSITY * t.drag_area / t.mass,
+            rolling=t.rolling_resistance * G,
+            engine_drag=t.engine_drag,
+            wheelbase=t.wheelbase,
+            steer_max=t.steer_max,
+            understeer=t.understeer,
         )
+        self.hands = hold(self.own_hands)
 
     def command(self, motion: Motion, demand: Demand) -> VehicleCommand:
         """Returns pedals and steer for the coming step."""
@@ -137,7 +136,23 @@ def drive_forwards(
     a_lateral: float,
 ) -> tuple[float, float, float]:
     """Returns throttle, brake and steer for a motion and what is asked, as in `Motion` and `Demand`."""
-    h = held.value
+    return drive_by(
+        held.value, yaw, vx, vy, v_told, a_told, curvature, error, error_rate, a_lateral
+    )
+
+
+@kernel
+def press_pedals(held: Held[Hands], v: float, v_told: float, a_told: float) -> tuple[float, float]:
+    """Returns throttle and brake at speed v, m/s, for a speed and its rate that are told."""
+    return press_by(held.value, v, v_told, a_told)
+
+
+@inner_kernel
+def drive_by(
+    h: Hands, yaw: float, vx: float, vy: float, v_told: float, a_told: float,
+    curvature: float, error: float, error_rate: float, a_lateral: float,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Returns throttle, brake and steer of these hands, or of a record with their fields."""
     speed = vx * cos(yaw) + vy * sin(yaw)
     v, w = max(speed, V_LATERAL_MIN), h.omega
     a = a_lateral - w * w * error - 2.0 * ZETA * w * error_rate
@@ -145,17 +160,13 @@ def drive_forwards(
     kappa = min(max(curvature + a / (v * v), -most), most)
     angle = atan(h.wheelbase * kappa) + h.understeer * v * v * kappa
     steer = min(max(angle / (h.steer_max * steer_share(v)), -1.0), 1.0)
-    throttle, brake = press_pedals(held, speed, v_told, a_told)
+    throttle, brake = press_by(h, speed, v_told, a_told)
     return throttle, brake, steer
 
 
-@kernel
-def press_pedals(held: Held[Hands], v: float, v_told: float, a_told: float) -> tuple[float, float]:
-    """Returns throttle and brake at speed v, m/s, for a speed and its rate that are asked.
-
-    HOLD_BRAKE where both speeds are below V_STANDING.
-    """
-    h = held.value
+@inner_kernel
+def press_by(h: Hands, v: float, v_told: float, a_told: float) -> tuple[float, float]:
+    """Returns throttle and brake at speed v, m/s; HOLD_BRAKE where both speeds are below V_STANDING."""
     if v_told < V_STANDING and v < V_STANDING:
         return 0.0, HOLD_BRAKE
     a = a_told + h.speed_gain * (v_told - v)

@@ -178,7 +178,7 @@ class FileChanges:
 
     def hands(self, command: VehicleCommand) -> VehicleCommand:
         """Returns the driver's command with what the file's controllers override of it."""
-        ego = self.player.actors.get(self.player.scenario.ego)
+        ego = self.player.scene.actors.get(self.player.scenario.ego)
         return command if ego is None else ego.overridden(command)
 
 

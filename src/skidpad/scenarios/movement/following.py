@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import cos, nan, pi, sin
 
-from skidpad.core.kernels.jit import Held, kernel
+from skidpad.core.kernels.jit import Held, inner_kernel, kernel
 from skidpad.roads.kernels import LaneArrays, advance_point
-from skidpad.simulation.scripted import Hands, drive_forwards
+from skidpad.simulation.scripted import Hands, drive_by
 
 Followed = tuple[
     int, float, float, float, float, float, float, float, float, float, float, float
@@ -25,8 +25,22 @@ def follow_lane(
     The same as `Guide.demand` and `ActorDriver.command` forwards. lane, s, px, py, heading, curvature: the
     point before; beyond the road's end the lane is -1, and it is braked for the point before.
     """
+    return follow(
+        map.value, hands.value, lane, s, px, py, heading, curvature, x, y, yaw, vx, vy,
+        v, a, along, offset, offset_rate, offset_bend,
+    )  # fmt: skip
+
+
+@inner_kernel
+def follow(
+    map: LaneArrays, hands: Hands,
+    lane: int, s: float, px: float, py: float, heading: float, curvature: float,
+    x: float, y: float, yaw: float, vx: float, vy: float,
+    v: float, a: float, along: float, offset: float, offset_rate: float, offset_bend: float,
+) -> Followed:  # fmt: skip
+    """Returns what `follow_lane` does, for hands or a record with their fields."""
     c, s_ = cos(heading), sin(heading)
-    point = advance_point(map.value, lane, s, (x - px) * c + (y - py) * s_, nan)
+    point = advance_point(map, lane, s, (x - px) * c + (y - py) * s_, nan)
     if point[0] < 0:
         v, a = 0.0, 0.0
     else:
@@ -36,7 +50,7 @@ def follow_lane(
     c, s_ = cos(heading), sin(heading)
     left = (y - py) * c - (x - px) * s_
     drift = vy * c - vx * s_
-    pedals = drive_forwards(
+    pedals = drive_by(
         hands, yaw, vx, vy, v, a, along * curvature, left - along * offset,
         drift - along * offset_rate, along * offset_bend,
     )  # fmt: skip

@@ -85,7 +85,7 @@ class Guide:
     def __init__(self, network: Network, place: Place, v: float) -> None:
         point, pose = place.lane, place.pose
         self.network, self._base = network, point
-        self._followed: Followed | None = None  # the answer of this tick, whose point is the base
+        self.followed: Followed | None = None  # the answer of this tick, whose point is the base
         self.free = pose  # where there is no lane: straight on
         self.v, self.a = v, 0.0
         self.dv = self.da = 0.0  # of a disturbance, on top of v and a
@@ -104,8 +104,8 @@ class Guide:
     @property
     def base(self) -> LanePoint | None:
         """The reference point on the lane's centre, made when it is asked for; None without a lane."""
-        if self._followed is not None:
-            lane, s, offset, x, y, z, heading, curvature, width, *_ = self._followed
+        if self.followed is not None:
+            lane, s, offset, x, y, z, heading, curvature, width, *_ = self.followed
             road, lane_id = self.network.map.name_of(lane)
             self.base = LanePoint(
                 lane, s, x, y, z, heading, curvature, width, road, lane_id, offset
@@ -115,7 +115,7 @@ class Guide:
     @base.setter
     def base(self, point: LanePoint | None) -> None:
         """Sets the reference point; None: there is no lane."""
-        self._base, self._followed = point, None
+        self._base, self.followed = point, None
 
     @property
     def v_now(self) -> float:
@@ -185,7 +185,7 @@ class Guide:
 
         By one kernel, without the reference point as an object, where it goes forwards without a route.
         """
-        network, before, base = self.network, self._followed, self._base
+        network, before, base = self.network, self.followed, self._base
         if base is None or self.v < 0.0 or self.roads or network.even_forks:
             return driver.command(motion, self.demand(motion))
         if before is None:
@@ -200,7 +200,7 @@ class Guide:
         )  # fmt: skip
         self.at_end = found[0] < 0
         if not self.at_end:
-            self._followed = found
+            self.followed = found
         return VehicleCommand(found[9], found[10], found[11])
 
     def ideal(self, dt: float) -> Pose:

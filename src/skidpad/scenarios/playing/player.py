@@ -20,6 +20,7 @@ from skidpad.scenarios.movement.network import Place
 from skidpad.scenarios.movement.tracking import track_demand
 from skidpad.scenarios.playing.disturbing import Disturbances
 from skidpad.scenarios.playing.staging import WayOfEgo, staging_of
+from skidpad.scenarios.playing.table import NoTable, StoryTable, TableUse, tabulate
 from skidpad.scenarios.playing.telling import Telling
 from skidpad.scenarios.reading.entities import TYRES, Box
 from skidpad.scenarios.scenario import Scenario
@@ -32,6 +33,7 @@ from skidpad.simulation.scripted import ActorDriver, Motion
 DURATION_MAX = 3600.0  # s, for files that never end
 PHYSICAL = ActorMode.PHYSICAL  # asked in every step
 WAY_BACK = 1.0  # m, less is no reversing; assumption
+WORTH, LONGEST_PAUSE = 10, 63  # ticks that a table is worth, and between attempts to make one
 ASIDE = Place(Pose(0.0, 0.0))  # of what is not in the world yet
 
 
@@ -52,6 +54,7 @@ class Played:
     staging: Staging
     lamps: tuple[LampChange, ...] = ()
     tilts: tuple[Tilted, ...] = ()
+    table: TableUse = TableUse(0, 0, "")
 
 
 def setups(scenario: Scenario) -> tuple[ActorSetup, tuple[ActorSetup, ...]]:
@@ -82,6 +85,7 @@ class Player:
     end_on_collision: a contact of the ego ends the run; else the file alone decides.
     seed: of the traffic that actions bring.
     disturbances: of other vehicles; None: there are none.
+    tables: a kernel plays the ticks in which nothing begins or ends, as a table; else Python plays all.
     """
 
     def __init__(
@@ -95,13 +99,14 @@ class Player:
         dt: float = DT,
         seed: int = 0,
         disturbances: Disturbances | None = None,
+        tables: bool = True,
     ) -> None:
         self.scenario, self.duration, self.end_on_collision = scenario, duration, end_on_collision
         self.modes, self.skill = dict(modes or {}), dict(skill or {})
-        self.actors: dict[str, Actor] = {}
+        self._actors: dict[str, Actor] = {}
         self.disturbances = disturbances or Disturbances((), {}, seed)
         self.scene = Scene(
-            scenario.network, dt, self.actors, dict(scenario.parameters),
+            scenario.network, dt, self._actors, dict(scenario.parameters),
             dict(scenario.variables), ego=scenario.ego, seed=seed,
         )  # fmt: skip
         self.telling = Telling(scenario.storyboard)
@@ -111,6 +116,17 @@ class Player:
         self.hit = False  # the ego has touched something
         self.way_back = 0.0  # m that the ego has gone backwards
         self.way = WayOfEgo()
+        self.tables = tables
+        self.table: StoryTable | None = None
+        self.ticks = self.by_table = 0
+        self.reason = ""  # why Python played what no table can hold, the first one
+        self.pause = self.rest = 0  # ticks between attempts to make a table, and those left of them
+
+    @property
+    def actors(self) -> Mapping[str, Actor]:
+        """Returns the actors by name as they are now; none before the first step."""
+        self.settle()
+        return self._actors
 
     @property
     def has_triggered_all(self) -> bool:
@@ -132,7 +148,10 @@ class Player:
             self.scenario, story, driven_by_file,
             went_back=self.way_back > WAY_BACK, left_way=self.way.is_left,
         )  # fmt: skip
-        return Played(story, boxes, staging, tuple(self.scene.lamps), tuple(self.scene.tilts))
+        return Played(
+            story, boxes, staging, tuple(self.scene.lamps), tuple(self.scene.tilts),
+            TableUse(self.ticks, self.by_table, self.reason),
+        )  # fmt: skip
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
         """Takes in the moment, goes on with the story and returns what actors do until the next.
@@ -140,10 +159,61 @@ class Player:
         The first call makes the actors and begins the actions of <Init>. `ended` is set at the end of the
         scenario, of `duration`, or at a contact of the ego where that ends it.
         """
-        first = not self.actors
+        self.ticks += 1
+        if self.table is not None:
+            if truth.tick * self.scene.dt < self.duration:
+                words = self.table.play(truth)
+                if words is not None:
+                    self.by_table += 1
+                    return words
+            if self.table.played < WORTH:
+                self.pause = self.rest = min(2 * self.pause + 1, LONGEST_PAUSE)
+            self.settle()
+        before = self._count_happenings()
+        words = self._play_tick(truth)
+        if self._count_happenings() != before:
+            self.pause = self.rest = 0
+        elif self.rest > 0:
+            self.rest -= 1
+        elif self.tables and not (truth.contacts or self.ended):
+            self._tabulate()
+        return words
+
+    def settle(self) -> None:
+        """Brings actors and actions to where the table has come, if there is one.
+
+        Python then plays the next tick.
+        """
+        table, self.table = self.table, None
+        if table is not None and table.played:
+            table.settle()
+            self.way_back = table.way_back
+
+    def _count_happenings(self) -> tuple[int, int, int]:
+        """Returns numbers that change as soon as anything begins or ends."""
+        return len(self.scene.story), len(self.scene.moves), len(self.going)
+
+    def _tabulate(self) -> None:
+        """Makes the table of the story, in which nothing began or ended in this tick, if it can be one."""
+        try:
+            if self.signals.controllers or self.disturbances.drifts:
+                raise NoTable("signal controllers or disturbances")
+            if self.way.line is not None:
+                raise NoTable("the ego's way round a corner")
+            telling, going = self.telling, self.going
+            self.table = tabulate(
+                self.scene, telling.watched(), [*going, *telling.under_way()], self.way_back
+            )
+        except NoTable as found:
+            self.reason = self.reason or str(found)
+            self.pause = self.rest = min(2 * self.pause + 1, LONGEST_PAUSE)
+
+    def _play_tick(self, truth: WorldTruth) -> Sequence[ActorCommand]:
+        """Plays a tick in Python."""
+        first = not self._actors
         if first:
             self._cast(truth)
-        scene, telling, actors = self.scene, self.telling, self.actors
+        scene, telling, actors = self.scene, self.telling, self._actors
         scene.observe(truth)
         for actor in actors.values():
             if actor.v_after_track is not None:
@@ -201,9 +271,9 @@ class Player:
             )
             if begin.place is None:
                 actor.present, actor.word = False, ActorCommand(entity.name, present=False)
-            self.actors[entity.name] = actor
-        connect_at_begin(self.actors)
-        self.actors[self.scenario.ego].handed = not self.scenario.ego_is_handed_later
+            self._actors[entity.name] = actor
+        connect_at_begin(self._actors)
+        self._actors[self.scenario.ego].handed = not self.scenario.ego_is_handed_later
 
     def _begin(self) -> None:
         """Begins the actions of the Init phase: time of day, global actions, then those of each entity."""
@@ -213,7 +283,7 @@ class Player:
             self.going.append(worldwide.happen(self.scene))
         for name, begin in self.scenario.start.entities.items():
             for action in begin.actions:
-                self.going.append(action.begin(self.scene, self.actors[name]))
+                self.going.append(action.begin(self.scene, self._actors[name]))
 
 
 def _motion(pose: Pose, v: float) -> Motion:

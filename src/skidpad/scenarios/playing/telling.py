@@ -6,7 +6,7 @@ esmini: what begins in a step takes part in it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from skidpad.scenarios.scene import Move, Path, Running, Scene, State
 from skidpad.scenarios.storyboard import (
@@ -19,7 +19,7 @@ from skidpad.scenarios.storyboard import (
     Story,
     Storyboard,
 )
-from skidpad.scenarios.triggers import Watch
+from skidpad.scenarios.triggers import Watch, Watched
 
 RUNNING, COMPLETE = State.RUNNING, State.COMPLETE  # asked in every step
 
@@ -233,6 +233,12 @@ class ToldAct(ToldParent):
                     if manoeuvre.state is RUNNING:
                         manoeuvre.look(scene)
 
+    def running_manoeuvres(self) -> Iterator[ToldManoeuvre]:
+        """Yields the manoeuvres under way of the groups under way."""
+        for group in self.groups:
+            if group.state is RUNNING:
+                yield from (m for m in group.manoeuvres if m.state is RUNNING)
+
 
 class ToldStory(ToldParent):
     """Acts of one story while it is played."""
@@ -263,6 +269,27 @@ class Telling:
     def events(self) -> list[ToldEvent]:
         """Returns every event of all stories."""
         return [e for a in self.acts for g in a.groups for m in g.manoeuvres for e in m.events]
+
+    def watched(self) -> Iterator[Watched]:
+        """Yields the conditions that `look` looks at as long as nothing begins or ends."""
+        watches = [self.halt]
+        for act in (a for s in self.stories if s.state is RUNNING for a in s.acts):
+            if act.state is State.STANDBY:
+                watches.append(act.begin)
+            elif act.state is RUNNING:
+                watches.append(act.halt)
+                watches += [e.watch for m in act.running_manoeuvres() for e in m.events]
+        for watch in watches:
+            for group in watch.groups:
+                yield from group
+
+    def under_way(self) -> Iterator[Running]:
+        """Yields the actions that go on, in the order of their steps."""
+        for act in (a for s in self.stories if s.state is RUNNING for a in s.acts):
+            for manoeuvre in act.running_manoeuvres() if act.state is RUNNING else ():
+                for event in manoeuvre.events:
+                    for _, runs in event.going:
+                        yield from runs
 
     def look(self, scene: Scene) -> None:
         """Looks at the triggers of all stories, which the first call starts; `ended` by the stop trigger."""

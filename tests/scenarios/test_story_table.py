@@ -1,0 +1,86 @@
+"""A story that a kernel plays as a table goes as the same story in Python, tick by tick, to the bit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from scenario_catalogue import SCENARIOS, file_name
+from skidpad.campaign.cells.grip import template
+from skidpad.campaign.driving.backends import make_backend
+from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.core.run import ActorMode, Scenario
+from skidpad.core.states import VehicleCommand
+from skidpad.scenarios.export.version import OscVersion
+from skidpad.scenarios.playing.player import Player
+from skidpad.scenarios.shipped import FOLDER
+from support.oracle.cases import CASES
+from support.oracle.reference import write_case
+
+LOOKS = 50  # ticks between two looks at all that is known of every actor
+LONGEST = 500  # ticks
+GUIDE = ("v", "a", "pace", "offset", "offset_rate", "offset_bend", "adds_offset", "at_end", "base")
+ACTOR = (
+    "motion", "pose", "a", "acceleration", "travelled", "stood", "at_end", "present", "word", "seen",
+)  # fmt: skip
+
+
+def play_both(file, mode=ActorMode.PHYSICAL, ego=None, ticks=LONGEST):
+    """Plays a file both ways in one world; returns the player with tables, and how many ticks it played."""
+    spec = template(course=Scenario(file=str(file), actors=mode))
+    stage = stage_of(spec)
+    compiled = stage.player.scenario
+    modes = {**dict.fromkeys(compiled.entities, mode), compiled.ego: ego}
+    table, python = (
+        Player(compiled, modes=modes, duration=40.0, tables=tables) for tables in (True, False)
+    )
+    backend = make_backend(spec.backend)
+    backend.reset(replace(stage.setup, specs=()), 1)
+    for tick in range(ticks):
+        truth = backend.truth()
+        words = python.step(truth)
+        assert list(table.step(truth)) == list(words), tick
+        assert table.scene.t == python.scene.t
+        assert (table.ended, table.hit) == (python.ended, python.hit)
+        assert table.scene.story == python.scene.story, tick
+        if python.ended or (tick + 1) % LOOKS == 0:
+            assert states_of(table) == states_of(python), tick
+        if python.ended:
+            break
+        backend.step(VehicleCommand(throttle=0.3, steer=0.001), words)
+    assert python.by_table == 0
+    return table, tick + 1
+
+
+def states_of(player):
+    """Returns all that changes about a player and its actors."""
+    actors = player.actors.values()
+    return (
+        player.way_back, player.scene.moves, player.scene.notices,
+        [[getattr(a, name) for name in ACTOR] for a in actors],
+        [[getattr(a.guide, name) for name in GUIDE] for a in actors],
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("ego", [None, ActorMode.PHYSICAL])
+@pytest.mark.parametrize("version", OscVersion)
+@pytest.mark.parametrize("name", [s.name for s in SCENARIOS])
+def test_a_shipped_scenario_is_played_as_in_python(name, version, ego):
+    player, ticks = play_both(FOLDER / file_name(name, version), ego=ego)
+    assert player.reason == ""
+    assert player.by_table > 0.7 * ticks > 30  # with a look every so many ticks
+    assert player.played.table.by_table == player.by_table
+    assert len(player.scene.story) > 8
+
+
+@pytest.mark.parametrize("name", sorted(CASES)[::5])
+def test_a_file_of_the_oracle_is_played_as_in_python(tmp_path, name):
+    player, ticks = play_both(write_case(name, tmp_path), ego=ActorMode.PHYSICAL, ticks=240)
+    assert player.by_table > 0 or player.reason or ticks < 10
+
+
+def test_what_no_table_can_hold_is_named(tmp_path):
+    player, _ = play_both(FOLDER / "lead_slowdown.xosc", mode=ActorMode.IDEAL, ticks=80)
+    assert player.by_table == 0
+    assert player.played.table.reason == "lead is put where the file says"

@@ -420,6 +420,8 @@ class OpenRun:
         """Returns what decides how the run goes on, without what looks on; the last says what acts next."""
         assert self.stepper is not None, "step() comes first"
         s = self.stepper
+        if self.stage.player is not None:
+            self.stage.player.settle()
         return [s.backend, s.driver, s.supervisor, s.script, self.log, [s.action, s.words]]
 
     def take_parts(self, parts: list[Any]) -> None:

@@ -162,10 +162,10 @@ class Player:
         self.ticks += 1
         if self.table is not None:
             if truth.tick * self.scene.dt < self.duration:
-                words = self.table.play(truth)
-                if words is not None:
+                played = self.table.play(truth)
+                if played is not None:
                     self.by_table += 1
-                    return words
+                    return played
             if self.table.played < WORTH:
                 self.pause = self.rest = min(2 * self.pause + 1, LONGEST_PAUSE)
             self.settle()
@@ -202,7 +202,10 @@ class Player:
                 raise NoTable("the ego's way round a corner")
             telling, going = self.telling, self.going
             self.table = tabulate(
-                self.scene, telling.watched(), [*going, *telling.under_way()], self.way_back
+                self.scene,
+                telling.list_conditions(),
+                [*going, *telling.list_actions()],
+                self.way_back,
             )
         except NoTable as found:
             self.reason = self.reason or str(found)

@@ -15,7 +15,7 @@ from math import hypot, inf, isnan
 import numpy as np
 
 from skidpad.core.geometry import Pose
-from skidpad.core.kernels.jit import Held, hold
+from skidpad.core.kernels.jit import hold
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import ActorStates, VehicleCommand, WorldTruth
 from skidpad.scenarios.actions.lateral import ChangeOfOffset
@@ -83,8 +83,8 @@ class StoryTable:
         """changes: the actions of the rows; wakes: s, when a delay is over."""
         self.scene, self.rows, self.changes, self.wakes = scene, rows, changes, wakes
         self.held, self.map = hold(rows), scene.network.map.held
-        self.states: ActorStates | None = None
-        self.held_states: Held[ActorStates] | None = None
+        self.states = ActorStates.empty(0)  # of the world, once there was a tick
+        self.held_states = hold(self.states)
         told = rows.actors["is_told"].tolist()
         self.told = [(name, k) for k, name in enumerate(scene.actors) if told[k]]
         self.played = 0
@@ -143,7 +143,8 @@ def tabulate(
     if scene.network.even_forks:
         raise NoTable("a fork with no straightest way")
     index = {name: k for k, name in enumerate(scene.actors)}
-    conditions, wakes = [], inf
+    conditions: list[tuple[float, ...]] = []
+    wakes = inf
     for one in watched:
         conditions += condition_rows(one, scene, index)
         wakes = min(wakes, one.wakes)

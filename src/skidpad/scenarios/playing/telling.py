@@ -270,7 +270,7 @@ class Telling:
         """Returns every event of all stories."""
         return [e for a in self.acts for g in a.groups for m in g.manoeuvres for e in m.events]
 
-    def watched(self) -> Iterator[Watched]:
+    def list_conditions(self) -> Iterator[Watched]:
         """Yields the conditions that `look` looks at as long as nothing begins or ends."""
         watches = [self.halt]
         for act in (a for s in self.stories if s.state is RUNNING for a in s.acts):
@@ -283,7 +283,7 @@ class Telling:
             for group in watch.groups:
                 yield from group
 
-    def under_way(self) -> Iterator[Running]:
+    def list_actions(self) -> Iterator[Running]:
         """Yields the actions that go on, in the order of their steps."""
         for act in (a for s in self.stories if s.state is RUNNING for a in s.acts):
             for manoeuvre in act.running_manoeuvres() if act.state is RUNNING else ():

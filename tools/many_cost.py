@@ -1,4 +1,4 @@
-"""Processor time of runs alone and of runs that share: `python -m skidpad.campaign.bench.many`."""
+"""Processor time of runs alone and of runs that share."""
 
 from __future__ import annotations
 

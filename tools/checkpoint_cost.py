@@ -1,4 +1,4 @@
-"""Size and processor time of checkpoints as files: `python -m skidpad.campaign.bench.checkpoints`."""
+"""Size and processor time of checkpoints as files."""
 
 from __future__ import annotations
 

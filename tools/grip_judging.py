@@ -20,7 +20,7 @@ from skidpad.core.setup import DT
 from skidpad.core.states import EgoEstimate, VehicleCommand
 from skidpad.envelope.govern import AIR_ID, RAIN_ID
 from skidpad.envelope.grip import STIFFNESS, GripEstimator
-from skidpad.envelope.sight import grade_at
+from skidpad.envelope.sight import way_ahead
 from skidpad.envelope.signals import BusModel, CarBus
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
@@ -48,7 +48,8 @@ class KeptSignals(Sink):
         self.ego.append(moment.frame.ego)
         self.commands.append(moment.command)
         self.air.append((int(moment.frame.extra[RAIN_ID]), float(moment.frame.extra[AIR_ID])))
-        self.grades.append(grade_at(self.map, moment.frame.ego.pose))
+        way = way_ahead(self.map, moment.frame.ego.pose)
+        self.grades.append(0.0 if way is None else way.grade)
         self.truth.append(float(np.nanmean(moment.truth.mu[0])))
 
 

@@ -120,9 +120,16 @@ class Bench:
         self._rows.append(
             (
                 s.x.copy(), s.y.copy(), s.yaw.copy(), self.v, s.yaw_rate.copy(),
-                self.fleet.slip_angles(), self.fleet.wheels.steer.copy(),
+                self.slip_angles(), self.fleet.wheels.steer.copy(),
             )
         )  # fmt: skip
+
+    def slip_angles(self) -> Floats:
+        """(n,) side slip of the centres of gravity in rad, left positive; 0 below 1 m/s."""
+        s, x_cog = self.fleet.states, self.fleet.params.x_cog
+        u = self.v
+        v = s.vy * np.cos(s.yaw) - s.vx * np.sin(s.yaw) + s.yaw_rate * x_cog
+        return np.where(np.hypot(u, v) > 1.0, np.arctan2(v, u), 0.0)
 
     @property
     def ticks(self) -> int:
@@ -175,7 +182,7 @@ def lateral_limit(kind: VehicleType, mu: float = MU) -> float:
     """Largest steady lateral acceleration on the circle in m/s^2."""
     bench, _ = circle(kind, np.linspace(0.6, 1.0, 9) * mu * G, mu)
     rate, v = bench.fleet.states.yaw_rate, bench.v
-    held = (np.abs(bench.fleet.slip_angles()) < SPUN) & (rate * RADIUS < 1.05 * v)
+    held = (np.abs(bench.slip_angles()) < SPUN) & (rate * RADIUS < 1.05 * v)
     return float((rate * v)[held].max())
 
 

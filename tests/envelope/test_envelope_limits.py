@@ -12,9 +12,7 @@ from skidpad.envelope.limits import (
     floating_speed,
     following_speed,
     lowest,
-    rss_gap,
     rss_speed,
-    safe_gap,
     sight_speed,
     speed_before_bend,
 )
@@ -57,7 +55,8 @@ def test_a_follower_misses_a_braking_lead_from_2_percent_below_and_not_from_15_p
     limit = following_speed(gap, v_lead, mu * G, mu * G, delay)
     assert not has_contact(gap, 0.98 * limit, v_lead, mu * G, mu * G, delay)
     assert has_contact(gap, 1.15 * limit, v_lead, mu * G, mu * G, delay)
-    assert safe_gap(limit, v_lead, mu * G, mu * G, delay) == pytest.approx(gap)
+    own, lead = limit * delay + limit * limit / (2.0 * mu * G), v_lead * v_lead / (2.0 * mu * G)
+    assert own - lead == pytest.approx(gap)
 
 
 def test_a_lead_that_brakes_harder_needs_a_larger_gap():
@@ -98,6 +97,12 @@ def test_the_whole_vehicle_model_stops_within_sight_below_the_limit_and_not_abov
     limit = sight_speed(60.0, mu * G, 0.1)
     below, above = stops([GripParams(mu, 1.0, 0.0)] * 2, [0.98 * limit, 1.15 * limit])
     assert below.distance < 60.0 < above.distance
+
+
+def rss_gap(v, v_lead, c):
+    t, a = c.response, c.acceleration
+    own = v * t + 0.5 * a * t * t + (v + a * t) ** 2 / (2.0 * c.brake_least)
+    return max(own - v_lead * v_lead / (2.0 * c.brake_most), 0.0)
 
 
 @pytest.mark.parametrize("v_lead", [0.0, 10.0, 25.0])

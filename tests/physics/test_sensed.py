@@ -30,7 +30,7 @@ def test_speed_and_side_slip_follow_the_truth_in_a_turn_on_wet_road():
         memory = bench.fleet.wheels.memory[0]
         if k > 50:
             assert memory[SPEED] == pytest.approx(bench.v[0], rel=0.02)
-            assert memory[SIDE] == pytest.approx(float(bench.fleet.slip_angles()[0]), abs=0.03)
+            assert memory[SIDE] == pytest.approx(float(bench.slip_angles()[0]), abs=0.03)
 
 
 @pytest.mark.parametrize("mu", [0.9, 0.2])

@@ -42,25 +42,15 @@ def sight_speed(distance: float, deceleration: float, delay: float) -> float:
     return sqrt(b * b + 2.0 * deceleration * distance) - b
 
 
-def safe_gap(
-    v: float, v_lead: float, deceleration: float, lead_deceleration: float, delay: float
-) -> float:
-    """Returns the gap that keeps a follower out of a lead that brakes at once.
-
-    The longitudinal distance of RSS without acceleration in the response time (Shalev-Shwartz, Shammah
-    and Shashua, On a Formal Model of Safe and Scalable Self-driving Cars, 2017, arXiv 1708.06374, lemma
-    2; IEEE 2846-2022 has the same form).
-    """
-    own = v * delay + v * v / (2.0 * deceleration)
-    return max(own - v_lead * v_lead / (2.0 * lead_deceleration), 0.0)
-
-
 def following_speed(
     gap: float, v_lead: float, deceleration: float, lead_deceleration: float, delay: float
 ) -> float:
-    """Returns the highest speed for which `gap` is a safe one: `safe_gap` solved for v.
+    """Returns the highest speed for which `gap` keeps a follower out of a lead that brakes at once.
 
-    The stops are compared. Where the lead brakes less hard than the follower can, the two may come
+    It solves gap = v t + v^2 / (2 a) - v_lead^2 / (2 a_lead) for v: the longitudinal distance of RSS without
+    acceleration in the response time (Shalev-Shwartz, Shammah and Shashua, On a Formal Model of Safe and
+    Scalable Self-driving Cars, 2017, arXiv 1708.06374, lemma 2; IEEE 2846-2022 has the same form). The
+    stops are compared. Where the lead brakes less hard than the follower can, the two may come
     nearer before both stand, so the lead's deceleration must be its hardest possible one.
     """
     lead_way = v_lead * v_lead / (2.0 * lead_deceleration)
@@ -77,18 +67,12 @@ class RssParameters:
     brake_most: float = 8.0  # m/s^2 of the lead
 
 
-def rss_gap(v: float, v_lead: float, constants: RssParameters) -> float:
-    """Returns the longitudinal safe distance of RSS, arXiv 1708.06374, lemma 2; IEEE 2846-2022.
-
-    v t + a t^2 / 2 + (v + a t)^2 / (2 b_least) - v_lead^2 / (2 b_most), at least 0.
-    """
-    t, a = constants.response, constants.acceleration
-    own = v * t + 0.5 * a * t * t + (v + a * t) ** 2 / (2.0 * constants.brake_least)
-    return max(own - v_lead * v_lead / (2.0 * constants.brake_most), 0.0)
-
-
 def rss_speed(gap: float, v_lead: float, constants: RssParameters) -> float:
-    """Returns the highest speed for which `gap` is safe by `rss_gap`: solved for v + a t."""
+    """Returns the highest speed for which `gap` is the safe distance of RSS, which is solved for v + a t.
+
+    v t + a t^2 / 2 + (v + a t)^2 / (2 b_least) - v_lead^2 / (2 b_most), at least 0 (arXiv 1708.06374, lemma
+    2; IEEE 2846-2022).
+    """
     t, a = constants.response, constants.acceleration
     way = max(gap, 0.0) + v_lead * v_lead / (2.0 * constants.brake_most) + 0.5 * a * t * t
     return max(sight_speed(way, constants.brake_least, t) - a * t, 0.0)

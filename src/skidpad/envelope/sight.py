@@ -50,12 +50,6 @@ def way_ahead(map: RoadMap, pose: Pose) -> Way | None:
     return Way(s, x, y, z, curvature, grade)
 
 
-def grade_at(map: RoadMap, pose: Pose) -> float:
-    """Returns the map's grade at a pose, uphill > 0; 0 off every lane."""
-    way = way_ahead(map, pose)
-    return 0.0 if way is None else way.grade
-
-
 def locate_on(way: Way, x: Floats, y: Floats) -> tuple[NDArray[np.intp], Floats]:
     """Returns (n,) the nearest place of the way and the m to its left of (n,) points of the world."""
     nearest = np.argmin(np.hypot(x[:, None] - way.x, y[:, None] - way.y), axis=1)

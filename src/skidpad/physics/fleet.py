@@ -177,14 +177,6 @@ class Fleet:
         s = self.states
         return float(s.vx[i] * cos(s.yaw[i]) + s.vy[i] * sin(s.yaw[i]))
 
-    def slip_angles(self) -> Floats:
-        """Returns (n,) side slip of the centres of gravity in rad, left positive; 0 below 1 m/s."""
-        s, x_cog = self.states, self.params.x_cog
-        c, sn = np.cos(s.yaw), np.sin(s.yaw)
-        u = s.vx * c + s.vy * sn
-        v = s.vy * c - s.vx * sn + s.yaw_rate * x_cog
-        return np.where(np.hypot(u, v) > 1.0, np.arctan2(v, u), 0.0)
-
     def gear(self, i: int, reverse: bool = False) -> int:
         """Returns the gear that the box of vehicle i shows, see `shown_gear`."""
         return shown_gear(self.speed(i), reverse)

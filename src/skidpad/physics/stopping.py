@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from skidpad.core.environment.tyres import REFERENCE, find_tyres
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, mps_from_kmh
-from skidpad.core.maths.constants import G
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.fleet import Fleet
@@ -30,13 +29,6 @@ class Stop:
     v0: float  # m/s
     distance: float  # m
     mfdd: float  # m/s^2, mean fully developed deceleration
-
-    @property
-    def mu_effective(self) -> float:
-        """The constant friction that gives the same distance: v0^2 / (2 g d); 0 from standstill."""
-        if self.v0 == 0.0:
-            return 0.0
-        return self.v0**2 / (2.0 * G * self.distance)
 
 
 def mean_deceleration(v: NDArray[np.float64], s: NDArray[np.float64]) -> float:

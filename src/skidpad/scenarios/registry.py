@@ -16,6 +16,7 @@ from skidpad.core.objects.registry import Registry
 from skidpad.core.states import VehicleCommand
 from skidpad.core.text.told import describe_value
 from skidpad.scenarios.reading.document import Node
+from skidpad.scenarios.reading.entities import read_properties
 from skidpad.scenarios.reading.findings import Finding, Kind
 from skidpad.scenarios.scene import Scene
 from skidpad.scenarios.traffic import lead_of
@@ -213,9 +214,7 @@ def controller_of(node: Node, names: Names) -> tuple[ControllerOf | None, Findin
     made = names.find(name)
     if made is None:
         return None, names.unknown(node, "controller", name)
-    found = node.find("Properties")
-    rows = () if found is None else found.children("Property")
-    properties = {p.text("name"): p.text("value") for p in rows}
+    properties = read_properties(node)
     if getattr(made, "checks_properties", False):
         try:
             made(properties)

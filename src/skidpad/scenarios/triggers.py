@@ -186,17 +186,14 @@ def condition(node: Node, ctx: Context) -> Condition:
     inner = node.only()
     if inner.tag == "ByValueCondition":
         leaf = inner.only()
-        if leaf.tag not in BY_VALUE:
-            raise leaf.unsupported_fault()
-        return BY_VALUE[leaf.tag](leaf, ctx)
+        return leaf.choose(BY_VALUE)(leaf, ctx)
     if inner.tag != "ByEntityCondition":
         raise inner.unsupported_fault()
     who = inner.child("TriggeringEntities")
     leaf = inner.child("EntityCondition").only()
-    if leaf.tag not in ENTITY_CONDITIONS:
-        raise leaf.unsupported_fault()
+    make = leaf.choose(ENTITY_CONDITIONS)
     names = ctx.actors(who.children("EntityRef"))
     rule = who.text("triggeringEntitiesRule")
     if rule not in ("any", "all"):
         raise who.error(f"triggeringEntitiesRule must be any or all, got {rule!r}")
-    return AnyEntity(names, rule == "all", ENTITY_CONDITIONS[leaf.tag](leaf, ctx))
+    return AnyEntity(names, rule == "all", make(leaf, ctx))

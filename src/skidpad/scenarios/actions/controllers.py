@@ -133,9 +133,7 @@ def compile_override(node: Node, ctx: Context) -> PrivateAction:
     del ctx
     inputs: dict[str, float | None] = {}
     for part in node.children():
-        if part.tag not in INPUTS:
-            raise part.unsupported_fault()
-        name, value = INPUTS[part.tag]
+        name, value = part.choose(INPUTS)
         active = part.flag("active", default=False)
         if name and not (active and part.find("BrakeForce") is not None):
             inputs[name] = value(part) if active else None
@@ -196,17 +194,10 @@ def compile_visibility(node: Node, ctx: Context) -> Visibility:
 
 def compile_controller(node: Node, ctx: Context) -> PrivateAction:
     """Compiles a <ControllerAction>: one action, or before 1.1 several."""
-    made = [TABLE[child.tag](child, ctx) for child in node.children() if _is_known(child)]
+    made = [child.choose(TABLE)(child, ctx) for child in node.children()]
     if not made:
         raise node.error("needs an action")
     return made[0] if len(made) == 1 else Several(tuple(made))
-
-
-def _is_known(node: Node) -> bool:
-    """Returns True for a supported tag; raises the error "not supported" for any other."""
-    if node.tag not in TABLE:
-        raise node.unsupported_fault()
-    return True
 
 
 def no_effect(node: Node, ctx: Context) -> NoEffect:

@@ -57,6 +57,4 @@ def private_action(node: Node, ctx: Context) -> PrivateAction:
     inner = node.only()
     if inner.tag in GROUPS:
         inner = inner.only()
-    if inner.tag not in PRIVATE:
-        raise inner.unsupported_fault()
-    return PRIVATE[inner.tag](inner, ctx)
+    return inner.choose(PRIVATE)(inner, ctx)

@@ -216,6 +216,4 @@ def compile_traffic(node: Node, ctx: Context) -> GlobalAction:
     name, what = node.text("trafficName", ""), node.only()
     if what.tag == "TrafficStopAction":
         return StopTraffic(name)
-    if what.tag not in TRAFFIC:
-        raise what.unsupported_fault()
-    return StartTraffic(name, TRAFFIC[what.tag](what, ctx))
+    return StartTraffic(name, what.choose(TRAFFIC)(what, ctx))

@@ -199,6 +199,4 @@ GLOBAL: Mapping[str, Callable[[Node, Context], GlobalAction]] = {
 def global_action(node: Node, ctx: Context) -> GlobalAction:
     """Compiles the action inside a <GlobalAction>; raises an error for an unsupported one."""
     inner = node.only()
-    if inner.tag not in GLOBAL:
-        raise inner.unsupported_fault()
-    return GLOBAL[inner.tag](inner, ctx)
+    return inner.choose(GLOBAL)(inner, ctx)

@@ -20,7 +20,7 @@ from skidpad.scenarios.signals import read_signal_state
 
 @dataclass(frozen=True, slots=True)
 class SimulationTime:
-    """Time since the scenario began."""
+    """Time since the scenario began, s."""
 
     rule: Rule
 
@@ -28,12 +28,6 @@ class SimulationTime:
         """Returns the function of a scene that compares its time in s with the value."""
         is_met = self.rule.is_met
         return lambda scene: is_met(scene.t)
-
-
-def _time(node: Node, ctx: Context) -> Condition:
-    """Compiles a condition on the simulation time in s."""
-    del ctx
-    return SimulationTime(rule(node))
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,7 +199,7 @@ def _signal(node: Node, ctx: Context) -> Condition:
 
 
 BY_VALUE: Mapping[str, Callable[[Node, Context], Condition]] = {
-    "SimulationTimeCondition": _time,
+    "SimulationTimeCondition": lambda node, _: SimulationTime(rule(node)),
     "ParameterCondition": _value,
     "VariableCondition": _value,
     "StoryboardElementStateCondition": _element,

@@ -102,7 +102,7 @@ def measure(node: Node, free: str = "freespace") -> Measure:
 
 @dataclass(frozen=True, slots=True)
 class Distance:
-    """Distance to another entity or to a place."""
+    """Distance to another entity or to a place, m."""
 
     rule: Rule
     measure: Measure
@@ -124,19 +124,9 @@ def target(scene: Scene, other: str | None, goal: Position | None) -> tuple[Pose
     return goal.place(scene).pose, None
 
 
-def _relative_distance(node: Node, ctx: Context) -> EntityCondition:
-    """Compiles a condition on the distance in m from an entity to another entity."""
-    return Distance(rule(node), measure(node), ctx.entity(node), None)
-
-
-def _distance(node: Node, ctx: Context) -> EntityCondition:
-    """Compiles a condition on the distance in m from an entity to a position."""
-    return Distance(rule(node), measure(node), None, position(node.child("Position"), ctx))
-
-
 @dataclass(frozen=True, slots=True)
 class TimeHeadway:
-    """Time until the entity is where the other one is now, at its own speed.
+    """Time in s until the entity is where the other one is now, at its own speed.
 
     There is none while the entity stands, or for one that is behind it: the whole of it, where bodies count.
     """
@@ -155,11 +145,6 @@ class TimeHeadway:
         if behind and distance > 0.0 and self.measure.direction is Direction.LONGITUDINAL:
             return False
         return self.rule.is_met(distance / own.v)
-
-
-def _headway(node: Node, ctx: Context) -> EntityCondition:
-    """Compiles a condition on the time headway in s from an entity to another entity."""
-    return TimeHeadway(rule(node), measure(node), ctx.entity(node))
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,8 +187,14 @@ def _collision_time(node: Node, ctx: Context) -> EntityCondition:
 
 
 DISTANCES: Mapping[str, Callable[[Node, Context], EntityCondition]] = {
-    "RelativeDistanceCondition": _relative_distance,
-    "DistanceCondition": _distance,
-    "TimeHeadwayCondition": _headway,
+    "RelativeDistanceCondition": lambda node, ctx: Distance(
+        rule(node), measure(node), ctx.entity(node), None
+    ),
+    "DistanceCondition": lambda node, ctx: Distance(
+        rule(node), measure(node), None, position(node.child("Position"), ctx)
+    ),
+    "TimeHeadwayCondition": lambda node, ctx: TimeHeadway(
+        rule(node), measure(node), ctx.entity(node)
+    ),
     "TimeToCollisionCondition": _collision_time,
 }

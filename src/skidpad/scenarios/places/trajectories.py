@@ -56,9 +56,7 @@ def compile_trajectory(node: Node, ctx: Context) -> Trajectory:
         if known and len(known) == len(quick) and heights in (0, len(known)):
             _check_times(shape, [v.time for v in known])
             return Trajectory(name, closed, Line(known, closed=closed))
-    if shape.tag not in SHAPES:
-        raise shape.unsupported_fault()
-    nodes, make = SHAPES[shape.tag](shape)
+    nodes, make = shape.choose(SHAPES)(shape)
     places = tuple(_place(n, ctx) for n in nodes)
     fixed = [p.fixed.pose for p in places if isinstance(p, Fixed)]
     from_here = shape.tag == "ClothoidSpline" and not _begins(next(shape.children()))

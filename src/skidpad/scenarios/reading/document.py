@@ -19,6 +19,7 @@ from skidpad.scenarios.reading.older import renew
 SIZE_MAX = 64_000_000  # bytes
 TRUE, FALSE = ("true", "1"), ("false", "0")
 Choice = TypeVar("Choice", bound=Enum)
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +53,12 @@ class Node:
         """Returns the fault to raise about an element that is sound, but unknown here."""
         text = what or f"<{self.tag}> is not supported"
         return Fault(self.finding(text, Kind.UNSUPPORTED))
+
+    def choose(self, table: Mapping[str, Made]) -> Made:
+        """Returns what a table has for this element's name; raises a Fault "not supported" for others."""
+        if self.tag not in table:
+            raise self.unsupported_fault()
+        return table[self.tag]
 
     def with_parameters(self, values: Mapping[str, str]) -> Node:
         """Returns the same element with other parameters in scope."""

@@ -212,7 +212,7 @@ def compile_entity_object(node: Node, name: str, catalogs: Catalogs) -> Entity:
     if found is None:
         raise node.error("needs a <Vehicle>, <Pedestrian>, <MiscObject> or a reference to one")
     body = catalogs.resolve(found)
-    properties = _properties(body)
+    properties = read_properties(body)
     if body.tag == "Vehicle":
         return _vehicle(name, body, properties)
     if body.tag == "Pedestrian":
@@ -328,7 +328,7 @@ LIMITS = (
 )  # fmt: skip
 
 
-def _properties(node: Node) -> dict[str, str]:
+def read_properties(node: Node) -> dict[str, str]:
     """Returns the properties as {name: value}; empty where the node has none."""
     found = node.find("Properties")
     if found is None:

@@ -6,15 +6,16 @@ import operator
 import re
 from collections.abc import Callable
 from enum import Enum
+from typing import Any
 
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.text.told import describe_value
 
-OPERATORS: dict[str, Callable[[float, float], bool]] = {
-    ">=": operator.ge,
-    "<=": operator.le,
+OPERATORS: dict[str, Callable[[Any, Any], Any]] = {  # of numbers, or arrays of them
     ">": operator.gt,
+    ">=": operator.ge,
     "<": operator.lt,
+    "<=": operator.le,
 }
 LIST_COLUMNS = "skidpad compare --columns"  # the command that lists what a rule can be about
 RULE = re.compile(r"^\s*(\w+)\s*(>=|<=|>|<)\s*([-+]?[0-9.]+(?:e[-+]?\d+)?)\s*$")

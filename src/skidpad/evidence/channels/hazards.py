@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import operator
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -23,6 +21,7 @@ from skidpad.evidence.channels.choices import Form, Profile
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.evidence.channels.indicators.layout import IndicatorReadings, Layout
 from skidpad.evidence.channels.risk import RiskMatrix
+from skidpad.evidence.comparisons import OPERATORS
 
 SCORED_HAZARDS = (
     HazardType.INCONSISTENT_LOCALISATION,
@@ -89,13 +88,6 @@ _UNSTEADY = {
     Indicator.RISK_BEHIND_SHARE,
 }
 _STEADY = tuple(i for i in Indicator if i not in _UNSTEADY)
-
-OPERATORS: dict[str, Callable[[Any, Any], Any]] = {
-    ">": operator.gt,
-    ">=": operator.ge,
-    "<": operator.lt,
-    "<=": operator.le,
-}
 
 
 @dataclass(frozen=True, slots=True)

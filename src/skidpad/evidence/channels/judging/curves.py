@@ -17,12 +17,13 @@ from skidpad.core.channels import ChannelFrame, Cycle
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.choices import Profile
 from skidpad.evidence.channels.frames import usable
-from skidpad.evidence.channels.hazards import OPERATORS, SCORED_HAZARDS, Rule, Signal, load_rules
+from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Rule, Signal, load_rules
 from skidpad.evidence.channels.identifier.model import Detector, events_of, probability_of
 from skidpad.evidence.channels.matching import Span, tally
 from skidpad.evidence.channels.tracked.distance import SafeDistance
 from skidpad.evidence.channels.tracked.tracks import Lookout, Seen
 from skidpad.evidence.channels.tracked.vote import Tracked
+from skidpad.evidence.comparisons import OPERATORS
 
 Table = Mapping[Signal, Floats]  # of a drive, (k,) each; NaN: not evaluated
 Sweep = Mapping[float, Sequence[Span]]  # what is found, by limit

@@ -9,6 +9,7 @@ import numpy as np
 
 from skidpad.core.geometry import wrap_angle
 from skidpad.core.vocabulary import SemanticClass
+from skidpad.roads.checked import kinds
 from skidpad.roads.lanes import SignalKind, SignalTable
 from skidpad.roads.opendrive.document import Document, Node, Reader, RoadRecord
 from skidpad.roads.opendrive.lane_shapes import LaneKey, LaneShape
@@ -46,9 +47,14 @@ class Place(NamedTuple):
 
 
 class _Row(NamedTuple):
+    """A row of the table, with its columns."""
+
     id: int
     kind: SignalKind
-    place: Place
+    x: float
+    y: float
+    z: float
+    heading: float
     lane: int
     s: float
     value: float
@@ -102,21 +108,12 @@ def signal_table(
     for row in _rows(read, document, shapes, index):
         rows.setdefault((row.id, row.lane), row)
     lines = list(_stop_lines(read, document, shapes, index))
-    ordered = [
-        row._replace(s=_nearest_line(row, lines)) for row in sorted(rows.values(), key=_order)
-    ]
-    return SignalTable(
-        id=np.array([r.id for r in ordered], dtype=np.int32),
-        kind=np.array([r.kind for r in ordered], dtype=np.uint8),
-        x=np.array([r.place.x for r in ordered], dtype=np.float64),
-        y=np.array([r.place.y for r in ordered], dtype=np.float64),
-        z=np.array([r.place.z for r in ordered], dtype=np.float64),
-        heading=np.array([_heading(shapes[r.lane], r.s) for r in ordered], dtype=np.float64),
-        lane=np.array([r.lane for r in ordered], dtype=np.int32),
-        s=np.array([r.s for r in ordered], dtype=np.float64),
-        value=np.array([r.value for r in ordered], dtype=np.float64),
-        group=np.array([r.group for r in ordered], dtype=np.int32),
-    )
+    ordered = []
+    for row in sorted(rows.values(), key=_order):
+        s = _nearest_line(row, lines)
+        ordered.append(row._replace(s=s, heading=_heading(shapes[row.lane], s)))
+    types = enumerate(kinds(SignalTable).values())
+    return SignalTable(*(np.array([row[k] for row in ordered], dtype=t) for k, t in types))
 
 
 def signal_heads(
@@ -199,7 +196,7 @@ def _rows(
             s = _along(shapes[lane], read.number(node, "s"))
             if road.junction >= 0 and kind is not SignalKind.SPEED_LIMIT:
                 s = 0.0  # one waits before the crossing, wherever the file puts the reference
-            yield _Row(id, kind, head, lane, s, value, group)
+            yield _Row(id, kind, *head[:3], np.nan, lane, s, value, group)
 
 
 def _governed_lanes(

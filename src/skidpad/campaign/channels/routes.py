@@ -8,8 +8,9 @@ from enum import Enum
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
-from msgspec import Struct, structs, yaml
+from msgspec import convert, structs, yaml
 
 from skidpad.core.errors import require_choice
 from skidpad.core.run import ChannelCrew, Route, RunSpec
@@ -48,33 +49,22 @@ CONDITIONS = {
 }
 
 
-class _Row(Struct, frozen=True, forbid_unknown_fields=True):
-    title: str
-    map: str
-    weather: Weather
-    vehicles: int
-    parked: int
-    pedestrians: int
-    cyclists: int
-
-    def run(self, name: str) -> RunSpec:
-        """Returns a run of this route with the name given."""
-        plain = structs.asdict(self)
-        weather = replace(plain.pop("weather"), name=name)
-        return RunSpec(
-            driver=ChannelCrew(),
-            course=Route(name=name, **plain),
-            weather=weather,
-            sensors=SensorLevel.OBJECTS,
-        )
+def _run_on(name: str, weather: dict[str, Any], **course: Any) -> RunSpec:
+    """Returns a run of a shipped route, as its file describes it."""
+    return RunSpec(
+        driver=ChannelCrew(),
+        course=Route(name=name, **course),
+        weather=convert({**weather, "name": name}, Weather),
+        sensors=SensorLevel.OBJECTS,
+    )
 
 
 @lru_cache(maxsize=1)
 def driven_routes() -> dict[str, RunSpec]:
     """Returns a run of each shipped route by name."""
     text = resources.files("skidpad.campaign.channels").joinpath("routes.yaml").read_bytes()
-    rows = yaml.decode(text, type=dict[str, _Row])
-    return {name: row.run(name) for name, row in rows.items()}
+    rows = yaml.decode(text, type=dict[str, dict[str, Any]])
+    return {name: _run_on(name, **row) for name, row in rows.items()}
 
 
 def chosen_routes(

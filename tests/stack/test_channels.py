@@ -9,7 +9,7 @@ from skidpad.core.channels import ChannelView
 from skidpad.core.vocabulary import LightState, SemanticClass
 from skidpad.roads.bundled import load_map
 from skidpad.roads.lanes import SignalKind
-from skidpad.stack.channels.arbiter import Arbiter, ArbiterSettings, Reason
+from skidpad.stack.channels.arbiter import Arbiter, Reason
 from skidpad.stack.channels.channel import Channel
 from skidpad.stack.channels.route import route_path
 from skidpad.stack.channels.settings import CarModel, load_channel_settings
@@ -186,7 +186,7 @@ def test_keeps_clear_of_a_leader_and_of_who_crosses():
 @pytest.mark.req("C-093", "C-096")
 class TestArbiter:
     def arbiter(self, preferred="a"):
-        return Arbiter(("a", "b"), ArbiterSettings(preferred=preferred))
+        return Arbiter(("a", "b"), preferred)
 
     def run(self, arbiter, rows, frames=(1, 1)):
         """rows: (t, score a, score b)."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 import shapely
@@ -29,10 +31,18 @@ EGO = (0.0, 0.0, 0.0, 10.0, 0.0)
 PRINTED = RiskForm.AS_PRINTED
 
 
+class Times(NamedTuple):
+    """To the one object of the world, s; None: there is none."""
+
+    ttc: float | None
+    pet: float | None
+
+
 def single(ego, obj, form=RiskForm.RECOMMENDED, **more):
     f = frame(0.0, ego, [obj], **more)
-    matrix = risk_matrix([f, f], per_object=True, form=form)
-    return matrix, matrix.objects[0][1][0]
+    matrix = risk_matrix([f, f], form)
+    times = (float(matrix.ttc[0, 1]), float(matrix.pet[0, 1]))
+    return matrix, Times(*(None if t == np.inf else t for t in times))
 
 
 def hit(ttc):
@@ -56,7 +66,7 @@ def test_closing_on_a_standing_car_by_hand():
     assert one.pet is None  # never together with a time to collision
     assert matrix.safety_scores == pytest.approx([1 - hit(2.0)] * 2)
     assert single(EGO, standing, PRINTED)[0].safety_scores == pytest.approx([0.5, 0.5])
-    assert not one.behind
+    assert matrix.risk_behind[0, 1] == 0.0
 
 
 @pytest.mark.req("C-092", "C-094")

@@ -42,7 +42,7 @@ from skidpad.recording.channels.drives import DriveOutcome
 from skidpad.recording.channels.mcap_files import ChannelWriter, Item
 from skidpad.sensors.channels.suite import CYCLE
 from skidpad.simulation.world.traffic.variety import risky_character
-from skidpad.stack.channels.arbiter import Arbiter, ArbiterSettings, Choice, Reason
+from skidpad.stack.channels.arbiter import Arbiter, Choice, Reason
 from skidpad.stack.channels.channel import Channel
 from skidpad.stack.channels.settings import load_channel_settings
 
@@ -72,7 +72,7 @@ class Crew:
             Channel(name, load_channel_settings(name), segment.car, segment.map, segment.route)
             for name in names
         ]
-        self.arbiter = Arbiter(names, ArbiterSettings(preferred=names[0]))
+        self.arbiter = Arbiter(names, names[0])
         self.ticks = 0  # driven so far
 
     def begin(self, table: ActorTable) -> None:

@@ -47,16 +47,6 @@ class RiskForm(str, Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class ObjectRisk:
-    """What one object of channel b's world means to the plan of channel a."""
-
-    ttc: float | None  # s
-    pet: float | None  # s; never together with ttc
-    behind: bool
-    risk: float
-
-
-@dataclass(frozen=True, slots=True)
 class RiskMatrix:
     """Risk of every plan in every world; rows are plans, columns worlds. NaN: not evaluated."""
 
@@ -69,7 +59,6 @@ class RiskMatrix:
     ttc_behind: Floats  # (n, n) s
     worst_ahead: NDArray[np.int64]  # (n, n) object index in the world's frame, -1: none
     worst_behind: NDArray[np.int64]
-    objects: tuple[tuple[tuple[ObjectRisk, ...], ...], ...] | None = None
 
     @property
     def safety_scores(self) -> Floats:
@@ -212,33 +201,19 @@ def _worst(judged: Floats) -> tuple[float, float, float, float, float, int, int]
     return ahead, behind, ttc_ahead, ttc_behind, pet, i_ahead, i_behind
 
 
-def _object_risk(row: Floats) -> ObjectRisk:
-    """Returns a row (TTC s, PET s, behind, risk) as a value; infinite times become None."""
-    ttc, pet, behind, risk = row.tolist()
-    return ObjectRisk(
-        ttc=ttc if ttc < np.inf else None,
-        pet=pet if pet < np.inf else None,
-        behind=behind > 0.0,
-        risk=risk,
-    )
-
-
 def risk_matrix(
-    frames: Sequence[ChannelFrame | None],
-    per_object: bool = False,
-    form: RiskForm = RiskForm.RECOMMENDED,
+    frames: Sequence[ChannelFrame | None], form: RiskForm = RiskForm.RECOMMENDED
 ) -> RiskMatrix:
     """Returns the risk of every channel's plan in every channel's world.
 
     `frames` as in a cycle: None for an absent channel, whose row and column stay NaN. Objects must
-    be finite (see `frames.usable`). `per_object` keeps each object's times as well.
+    be finite (see `frames.usable`).
     """
     n, printed = len(frames), form is RiskForm.AS_PRINTED
     risk, ahead, behind, ttc_ahead, ttc_behind, pet = np.full((6, n, n), np.nan)
     worst_ahead, worst_behind = np.full((2, n, n), -1, dtype=np.int64)
     egos = [ego_movers(frame) for frame in frames]
     worlds = [world_movers(frame) for frame in frames]
-    details: list[list[tuple[ObjectRisk, ...]]] = [[()] * n for _ in range(n)]
     for b, world in enumerate(worlds):
         frame_b = frames[b]
         if world is None or frame_b is None:
@@ -254,12 +229,9 @@ def risk_matrix(
                 worst_ahead[a, b], worst_behind[a, b],
             ) = _worst(judged)  # fmt: skip
             risk[a, b] = max(ahead[a, b], behind[a, b])
-            if per_object:
-                details[a][b] = tuple(_object_risk(row) for row in judged)
-    objects = tuple(tuple(row) for row in details) if per_object else None
     ttc = np.minimum(ttc_ahead, ttc_behind)
     return RiskMatrix(
-        risk, ahead, behind, ttc, pet, ttc_ahead, ttc_behind, worst_ahead, worst_behind, objects
+        risk, ahead, behind, ttc, pet, ttc_ahead, ttc_behind, worst_ahead, worst_behind
     )
 
 

@@ -9,7 +9,13 @@ from enum import Enum
 import numpy as np
 
 from skidpad.core.channels import ChannelFrame
-from skidpad.core.errors import require_range
+
+# decision C-9
+SAFE, UNSAFE = 0.8, 0.2  # scores; below UNSAFE for all: minimal-risk stop
+DWELL = 1.0  # s between two changes
+SETTLE = 0.5  # s for which another channel must be wanted, unless it is urgent
+MARGIN = 0.1  # of the score by which another channel must be safer, none being safe
+DEAD_AFTER = 0.3  # s without a message
 
 
 class Reason(str, Enum):
@@ -27,23 +33,6 @@ class Reason(str, Enum):
     ORDERED = "a teleoperator ordered a minimal-risk stop"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ArbiterSettings:
-    """Holds the limits by which the arbiter chooses a channel (decision C-9)."""
-
-    preferred: str | None = None  # channel; None: the most progressing
-    safe: float = 0.8
-    unsafe: float = 0.2  # below this for all: minimal-risk stop
-    dwell: float = 1.0  # s between two changes
-    settle: float = 0.5  # s for which another channel must be wanted, unless it is urgent
-    margin: float = 0.1  # of the score by which another channel must be safer, none being safe
-    dead_after: float = 0.3  # s without a message
-
-    def __post_init__(self) -> None:
-        require_range("arbiter.unsafe", self.unsafe, 0.0, self.safe)
-        require_range("arbiter.safe", self.safe, 0.0, 1.0)
-
-
 @dataclass(frozen=True, slots=True)
 class Choice:
     """The channel that drives, None for a minimal-risk stop, and why."""
@@ -53,10 +42,13 @@ class Choice:
 
 
 class Arbiter:
-    """Call `update` each cycle; it never looks at indicators."""
+    """Call `update` each cycle; it never looks at indicators.
 
-    def __init__(self, channels: Sequence[str], settings: ArbiterSettings) -> None:
-        self.channels, self.settings = tuple(channels), settings
+    preferred: a channel; None: the one that makes most progress.
+    """
+
+    def __init__(self, channels: Sequence[str], preferred: str | None) -> None:
+        self.channels, self.preferred = tuple(channels), preferred
         self.reset()
 
     def reset(self) -> None:
@@ -84,8 +76,7 @@ class Arbiter:
         for i, frame in enumerate(frames):
             if frame is not None:
                 self.heard_at[i] = t
-        dead_after = self.settings.dead_after - 1e-9
-        alive = [i for i, heard in enumerate(self.heard_at) if t - heard < dead_after]
+        alive = [i for i, heard in enumerate(self.heard_at) if t - heard < DEAD_AFTER - 1e-9]
         able = [i for i in alive if i not in abstaining] or alive
         wanted = self._choose_channel(able, scores, progress)
         if wanted.driving != self.wanted_since[0]:
@@ -108,14 +99,13 @@ class Arbiter:
     def _may_switch(self, t: float, scores: Sequence[float]) -> bool:
         """Returns whether another channel may take over at t: hysteresis in time.
 
-        Not within `dwell` s of a change; then at once from none or an unsafe channel, else after `settle` s.
+        Not within DWELL s of a change; then at once from none or an unsafe channel, else after SETTLE s.
         """
-        s = self.settings
-        if t - self.changed_at < s.dwell - 1e-9:
+        if t - self.changed_at < DWELL - 1e-9:
             return False
-        if self.driving is None or scores[self.driving] < s.unsafe:
+        if self.driving is None or scores[self.driving] < UNSAFE:
             return True
-        return t - self.wanted_since[1] >= s.settle - 1e-9
+        return t - self.wanted_since[1] >= SETTLE - 1e-9
 
     def _choose_channel(
         self, able: Sequence[int], scores: Sequence[float], progress: Sequence[float]
@@ -124,27 +114,25 @@ class Arbiter:
 
         able: channels that may be chosen. Without a score the driving one stays.
         """
-        s = self.settings
         if not able:
             return Choice(None, Reason.ALL_SILENT)
         known = {i: float(scores[i]) for i in able if scores[i] == scores[i]}
         if not known:
             return Choice(self.driving if self.driving in able else able[0], Reason.KEPT)
-        safe = [i for i, score in known.items() if score >= s.safe]
+        safe = [i for i, score in known.items() if score >= SAFE]
         if safe:
             return self._among_safe(safe, progress)
         best = max(known, key=lambda i: (known[i], i == self.driving, -i))
-        if known[best] < s.unsafe:
+        if known[best] < UNSAFE:
             return Choice(None, Reason.MINIMAL_RISK)
         mine = known.get(self.driving, -np.inf) if self.driving is not None else -np.inf
-        if mine >= known[best] - s.margin and mine >= s.unsafe:
+        if mine >= known[best] - MARGIN and mine >= UNSAFE:
             return Choice(self.driving, Reason.KEPT)
         return Choice(best, Reason.SAFER)
 
     def _among_safe(self, safe: Sequence[int], progress: Sequence[float]) -> Choice:
         """Returns the preferred channel if it is safe, else the safe one with most progress."""
-        s = self.settings
-        if s.preferred is not None and self.channels.index(s.preferred) in safe:
-            return Choice(self.channels.index(s.preferred), Reason.PREFERRED)
+        if self.preferred is not None and self.channels.index(self.preferred) in safe:
+            return Choice(self.channels.index(self.preferred), Reason.PREFERRED)
         best = max(safe, key=lambda i: (progress[i], i == self.driving, -i))
         return Choice(best, Reason.PROGRESS)

@@ -96,10 +96,8 @@ class Compiled:
 def compile_scenario(
     file: Path,
     parameters: Mapping[str, float | str] = NOTHING,
-    ego: str | None = None,
     *,
     maps: Sequence[Path] = (),
-    ignore_unsupported: bool = False,
     lenient: bool = False,
 ) -> Scenario:
     """Returns the file as a scenario; ScenarioError lists everything that keeps it from being played.
@@ -107,10 +105,7 @@ def compile_scenario(
     maps: folders with roads that files name without saying where they are. FileError for what is no
     scenario at all. The other options: as in `check`.
     """
-    found = check(
-        file, parameters, ego, maps=maps, ignore_unsupported=ignore_unsupported, lenient=lenient
-    )
-    return found.playable()
+    return check(file, parameters, maps=maps, lenient=lenient).playable()
 
 
 def check(

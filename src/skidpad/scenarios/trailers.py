@@ -73,12 +73,7 @@ def tractors_first(actors: Iterable[Actor]) -> list[Actor]:
     """Returns the actors in their order, but a trailer after the vehicle that tows it."""
     found = list(actors)
     towed = [a for a in found if a.towed_by is not None]
-    return sorted(found, key=_depth) if towed else found
-
-
-def _depth(actor: Actor) -> int:
-    """Returns how many vehicles are before it in its train."""
-    return sum(1 for _ in train_of(actor)) - 1
+    return sorted(found, key=lambda actor: len(tuple(train_of(actor)))) if towed else found
 
 
 def tow_command(actor: Actor, tractor: Actor, dt: float) -> ActorCommand | None:

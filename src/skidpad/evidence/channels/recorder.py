@@ -168,7 +168,7 @@ def _name_involved(
     """
     if hazard is HazardType.INCONSISTENT_LOCALISATION or not np.isfinite(one.risk.risk).any():
         pair = one.signals.gap_pair
-        names = channels if pair is None else _pair(channels, pair)
+        names = channels if pair is None else tuple(combinations(channels, 2))[pair]
         return tuple(names), ()
     behind = hazard is HazardType.EGO_TAILGATED
     risk = one.risk.risk_behind if behind else one.risk.risk_ahead
@@ -185,8 +185,3 @@ def _name_involved(
             channels[int(b)], identity if identity >= 0 else None, round(x, 3), round(y, 3)
         ),
     )
-
-
-def _pair(channels: tuple[str, ...], pair: int) -> tuple[str, ...]:
-    """Returns the names of the channels of the pair of this number."""
-    return tuple(combinations(channels, 2))[pair]

@@ -109,7 +109,7 @@ def signal_table(
         rows.setdefault((row.id, row.lane), row)
     lines = list(_stop_lines(read, document, shapes, index))
     ordered = []
-    for row in sorted(rows.values(), key=_order):
+    for row in sorted(rows.values(), key=lambda r: (r.lane, r.s, r.id)):
         s = _nearest_line(row, lines)
         ordered.append(row._replace(s=s, heading=_heading(shapes[row.lane], s)))
     types = enumerate(kinds(SignalTable).values())
@@ -159,11 +159,6 @@ def _is_on_lane(shapes: Sequence[LaneShape], x: float, y: float, z: float) -> bo
         if ((away < BESIDE) & (np.abs(shape.z - z) < STOREY)).any():
             return True
     return False
-
-
-def _order(row: _Row) -> tuple[int, float, int]:
-    """Returns the sort key of a row: lane, s, then id."""
-    return (row.lane, row.s, row.id)
 
 
 def _signals(document: Document) -> Iterator[tuple[RoadRecord, Node]]:

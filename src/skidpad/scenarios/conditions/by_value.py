@@ -41,11 +41,8 @@ class Value:
 
     def probe(self) -> Probe:
         """Returns a probe of the value as it is when asked."""
-        return self._holds
-
-    def _holds(self, scene: Scene) -> bool:
-        """Returns whether the variable or parameter now meets the comparison."""
-        return self.holds_among(scene.variables if self.variable else scene.parameters)
+        holds = self.holds_among
+        return lambda scene: holds(scene.variables if self.variable else scene.parameters)
 
     def holds_among(self, values: Mapping[str, str]) -> bool:
         """Returns whether it holds among these values; KeyError where the name is not among them."""

@@ -297,7 +297,8 @@ def environment_action(environment: Environment, *, old: bool) -> Any:
         precipitation=xosc.Precipitation(kind, round(rain, 4)),
         **_temperature(environment, old=old),
     )
-    wetness = {} if old else {"wetness": getattr(xosc.Wetness, _wetness(environment).value)}
+    wet = environment.wetness or Wetness.DRY
+    wetness = {} if old else {"wetness": getattr(xosc.Wetness, wet.value)}
     scale = 1.0 if environment.friction_scale is None else environment.friction_scale
     hour = NOON if elevation > 0.0 else MIDNIGHT
     return xosc.EnvironmentAction(
@@ -323,11 +324,6 @@ def _temperature(environment: Environment, *, old: bool) -> dict[str, float]:
     if old or environment.temperature_c is None:
         return {}
     return {"temperature": round(environment.temperature_c + CELSIUS, 2)}
-
-
-def _wetness(environment: Environment) -> Wetness:
-    """Returns the wetness of the road; dry where the environment gives none."""
-    return environment.wetness or Wetness.DRY
 
 
 # Recorded motion in pieces that every player follows alike.

@@ -129,7 +129,9 @@ def judge(
     found, unseen, unseen_found = _truths(channels, cycles, truths, begin, detected, weights)
     if "sim" in found:
         told = told_the_grip(channels, looked, grip_of(cycles), begin)
-        detected[TOLD] = _in_order([*_places(detected[Profile.TRACKED.value]), *told])
+        tracked = detected[Profile.TRACKED.value]  # grip plays no part in localisation
+        places = (s for s in tracked if s.hazard is HazardType.INCONSISTENT_LOCALISATION)
+        detected[TOLD] = tuple(sorted([*places, *told], key=lambda span: span.t_start))
         sweeps[REFERENCE] = dict(reference(cycles, channels, begin))
         detected[REFERENCE] = at_the_truths_limits(sweeps[REFERENCE])
     if marked := tuple(labels):
@@ -197,16 +199,6 @@ def grip_of(cycles: Sequence[Cycle]) -> float:
     """Returns the ego's true grip of a drive: the median over time, within GRIPS; else NOMINAL_GRIP."""
     grips = [c.truth.ego_mu for c in cycles if c.truth is not None and c.truth.ego_mu > 0.0]
     return float(np.clip(np.median(grips), *GRIPS)) if grips else NOMINAL_GRIP
-
-
-def _places(spans: Iterable[Span]) -> list[Span]:
-    """Returns the spans of localisation, in which grip plays no part."""
-    return [s for s in spans if s.hazard is HazardType.INCONSISTENT_LOCALISATION]
-
-
-def _in_order(spans: Iterable[Span]) -> tuple[Span, ...]:
-    """Returns the spans sorted by their start."""
-    return tuple(sorted(spans, key=lambda s: s.t_start))
 
 
 def _truths(

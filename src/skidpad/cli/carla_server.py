@@ -42,6 +42,11 @@ def carla_server(options: ServerOptions) -> None:
     helper = start_compiling(options, say)
     server = CarlaServer(options)
     server.served.before_tick = egos
+    if options.ros_domain is not None:
+        from skidpad.live.ros2.sensor_topics import SensorTopics
+        from skidpad.simulation.carla_server.ros_output import RosOutput
+
+        server.served.ros = RosOutput(SensorTopics(options.ros_domain), server.served.hub)
 
     def ready(ports: Ports) -> None:
         typer.echo(

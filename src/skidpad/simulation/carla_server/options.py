@@ -56,6 +56,15 @@ class ServerOptions(Struct, frozen=True, kw_only=True):
     strict: Annotated[bool, Meta(description="Report unknown calls; exit with 1.")] = False
     record_calls: Annotated[Path | None, Meta(description="Write every call here.")] = None
     data_dir: Annotated[Path | None, Meta(description="Folder for files named by clients.")] = None
+    ros_domain: Annotated[
+        int | None,
+        Meta(
+            ge=0,
+            le=232,
+            description="DDS domain (ROS_DOMAIN_ID) in which sensors publish that clients enable for "
+            "ROS 2; without it they do not. Needs the extra live.",
+        ),
+    ] = None
     idle_exit: Annotated[
         float | None, Meta(ge=0.0, description="Stop after so many seconds without a client.")
     ] = None

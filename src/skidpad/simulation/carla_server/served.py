@@ -15,6 +15,7 @@ from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.protocol.streams import EPISODE_STREAM, StreamHub
 from skidpad.simulation.carla_server.recording.recorder import Recorder
 from skidpad.simulation.carla_server.recording.replayer import Replayer
+from skidpad.simulation.carla_server.ros_output import RosOutput
 
 
 @dataclass(slots=True)
@@ -43,6 +44,7 @@ class Served:
         self.before_sensing: Callable[[], None] | None = None  # once, before the first reading
         # called with frame and step in s before each tick: what holds vehicles back
         self.before_tick: Callable[[Episode, int, float], None] | None = None
+        self.ros: RosOutput | None = None  # where sensors publish that clients enable for ROS 2
         self.last_snapshot: bytes | None = None
         self._map_changed = True  # until the first snapshot of the episode has been sent
         self._lights_told: dict[int, LightState] = {}
@@ -92,6 +94,8 @@ class Served:
         self._publish_snapshot()
         episode.vehicles.let_go()
         self.recorder.tick(clock, episode)
+        if self.ros is not None:
+            self.ros.tick(episode, clock)
         if self.before_sensing is not None and episode.sensors.has_listeners(self.hub):
             self.before_sensing()
             self.before_sensing = None

@@ -117,17 +117,28 @@ def tick_cue(served: Served) -> int:
     return before if served.follows_batch and served.hub.is_client_cleaning_up() else frame
 
 
-for _name in ("enable_sensor_for_ros", "disable_sensor_for_ros"):
+@TABLE.method("enable_sensor_for_ros")
+def enable_sensor_for_ros(served: Served, stream: Any) -> None:
+    """Publishes a sensor's readings on ROS 2 topics, where the server was started with --ros-domain."""
+    number, actors = wire.integer(stream, "stream"), served.episode.actors
+    found = next((a for a in actors.of(Family.SENSOR) if a.stream == number), None)
+    if served.ros is not None and found is not None:
+        served.ros.enable(found, actors.carrier(found))
 
-    @TABLE.method(_name, without_effect="there is no ROS publisher")
-    def no_publisher(_: Served, *__: Any) -> None:
-        """Accepts the call and does nothing, as there is no ROS publisher."""
+
+@TABLE.method("disable_sensor_for_ros")
+def disable_sensor_for_ros(served: Served, stream: Any) -> None:
+    """Ends what a sensor publishes on ROS 2 topics, if it does."""
+    number = wire.integer(stream, "stream")
+    if served.ros is not None:
+        served.ros.disable(number)
 
 
 @TABLE.method("is_sensor_enabled_for_ros")
-def is_sensor_enabled_for_ros(_: Served, __: Any) -> bool:
-    """Returns False, as no sensor publishes to ROS."""
-    return False
+def is_sensor_enabled_for_ros(served: Served, stream: Any) -> bool:
+    """Returns whether a sensor publishes on ROS 2 topics."""
+    number = wire.integer(stream, "stream")
+    return served.ros is not None and served.ros.is_enabled(number)
 
 
 @TABLE.method("send", Shape.VOID)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 EPISODE_STREAM = 1  # the world snapshots
 MAX_PENDING = 64 * 1024 * 1024  # bytes that one client may leave unfetched
@@ -37,6 +37,9 @@ def canonical(stream: int) -> int:
     return EPISODE_STREAM if stream >= EPISODE_ALIASES else stream
 
 
+Tap = Callable[[Sequence[bytes | memoryview]], None]
+
+
 class StreamHub:
     """Holds the streams, and which connections listen to each."""
 
@@ -46,6 +49,7 @@ class StreamHub:
         self._next = EPISODE_STREAM + 1
         self._open: set[int] = {EPISODE_STREAM}
         self._listeners: dict[int, list[asyncio.Transport]] = {}
+        self._taps: dict[int, Tap] = {}  # what is called with each message, beside connections
         self._connections = 0
         self._aliases = EPISODE_ALIASES
         self._held: dict[asyncio.Transport, bytes | None] = {}  # and the newest message withheld
@@ -109,14 +113,22 @@ class StreamHub:
         self._eager.append(callback)
 
     def has_listeners(self, stream: int) -> bool:
-        """Tells whether any connection listens to a stream."""
-        return bool(self._listeners.get(stream))
+        """Tells whether any connection listens to a stream, or a tap."""
+        return bool(self._listeners.get(stream)) or stream in self._taps
+
+    def tap(self, stream: int, callback: Tap | None) -> None:
+        """Calls back with the parts of each message of a stream; None ends that."""
+        self._taps.pop(stream, None)
+        if callback is not None:
+            self._taps[stream] = callback
 
     def publish(self, stream: int, *parts: bytes | memoryview) -> None:
         """Sends one message, of these parts, to all listeners of a stream; does nothing without any.
 
         A client with more than MAX_PENDING bytes not fetched does not get it.
         """
+        if stream in self._taps:
+            self._taps[stream](parts)
         listeners = self._listeners.get(stream)
         if not listeners:
             return
@@ -153,6 +165,7 @@ class StreamHub:
     def close(self, stream: int) -> None:
         """Forgets a stream; its listeners have GRACE s to hang up themselves."""
         self._open.discard(stream)
+        self._taps.pop(stream, None)
         listeners = self._listeners.pop(stream, [])
         if listeners or stream in self._left:
             self._note(self._ended, stream)

@@ -78,10 +78,15 @@ def replay_file(
     if source.map.rsplit("/", 1)[-1] != served.episode.map.name:
         served.load(source.map, reset_settings=False)
     since, until = served.replayer.start(served.episode, source, begin, length, followed)
-    return (
-        f"Replaying File: {asked:.200}\nTotal time recorded: {source.total:.3f}\n"
-        f"Replaying from {since:.3f} s - {until:.3f} s ({source.total:.3f} s)\n"
-    )
+    player, total = served.replayer, f"{source.total:g}"
+    lines = [
+        f"Replaying File: {asked:.200}",
+        f"Total time recorded: {total}",
+        f"Replaying from {since:g} s - {until:g} s ({total} s) at {player.time_factor:.1f}x",
+    ]
+    lines += ["Ignoring Hero vehicle"] if player.ignore_hero else []
+    lines += ["Ignoring Spectator camera"] if player.ignore_spectator else []
+    return "\n".join(lines) + "\n"
 
 
 @TABLE.method("stop_replayer", Shape.VOID)

@@ -6,20 +6,29 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 from msgspec import structs
 
 from skidpad.campaign.cells.grip import Cross, cross, template
 from skidpad.campaign.driving.loop import Moment, Sink
+from skidpad.campaign.driving.quick_kernel import drive_ticks
 from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.campaign.runs.run import OpenRun, Run
 from skidpad.core.run import Roads, RunSpec
 from skidpad.core.vocabulary import Govern, Outcome, RelocationReason, SensorLevel, TrafficStart
 from skidpad.physics.presets import all_presets, find_weather
 from skidpad.recording.run.log import RunLog
+from skidpad.recording.run.ticks import copy_actors
 from skidpad.scenarios.shipped import NAMES
-from skidpad.simulation.recovery import RecoverySettings, Supervisor
+from skidpad.sensors.object_level.objects import sense
+from skidpad.simulation.recovery import RecoverySettings, Supervisor, find_ego, has_reason
+from skidpad.simulation.world.feel import feel_motion
+from skidpad.simulation.world.step import advance
+from skidpad.stack.perception.lights import heed_light
+from skidpad.stack.road import read_road
+from skidpad.stack.think import think
 from support.runs import adas_run, scenario_run
 from support.scenarios.files import at, event, private, story, time, write
 
@@ -179,6 +188,20 @@ def test_a_run_may_be_cut_anywhere() -> None:
     assert opened.quick is not None
     assert opened.quick.ticks > 0.9 * len(whole.log)
     assert not first_difference(whole.log, pieces.log)
+
+
+def test_addresses_are_of_the_types_that_the_kernel_calls() -> None:
+    """Compiled anew, the kernel asks for no machine code but that whose addresses it is given."""
+    drive_quickly(adas_run(4, duration=3.0))
+    called = (
+        advance, feel_motion, sense, read_road, think, find_ego, has_reason, heed_light, copy_actors,
+    )  # fmt: skip
+    known: list[Any] = [set(one.overloads) for one in called]  # type: ignore[attr-defined]
+    kernel: Any = drive_ticks
+    fresh = numba.njit(nogil=True, error_model="numpy")(kernel.py_func)
+    fresh.compile(kernel.signatures[0])
+    assert known == [set(one.overloads) for one in called]  # type: ignore[attr-defined]
+    assert all(known)
 
 
 def test_a_fault_of_one_bit_is_found() -> None:

@@ -226,6 +226,10 @@ class Actor:
         elif self.mode is not ActorMode.IDEAL and self.driver is not None:
             self.guide.advance(self.motion)
 
+    def nearness(self, other: Actor) -> float:
+        """Returns the distance of reference points, m, beyond which two bodies do not touch."""
+        return self.entity.box.length + other.entity.box.length + 2.0
+
     def outline(self) -> list[Point]:
         """Returns the corners of the body on the ground."""
         return corners(self.pose, self.entity.box)
@@ -400,8 +404,8 @@ class Scene:
         one, other = self.actors[a], self.actors[b]
         if not (one.present and other.present) or one.entity.is_ghost or other.entity.is_ghost:
             return False
-        size = one.entity.box.length + other.entity.box.length + 2.0
-        if hypot(one.pose.x - other.pose.x, one.pose.y - other.pose.y) > size:
+        away = hypot(one.pose.x - other.pose.x, one.pose.y - other.pose.y)
+        if away > one.nearness(other):
             return False
         reach = 0.0 if one.placed_by_file and other.placed_by_file else TOUCHING
         if overlap(one.outline(), other.outline()) > reach:

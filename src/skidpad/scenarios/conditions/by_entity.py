@@ -136,10 +136,13 @@ class Collision:
 
     def holds(self, scene: Scene, actor: str) -> bool:
         """Returns whether the actor touches one of the others now."""
-        others = self.others
-        if others is None:
-            others = tuple(n for n, a in scene.actors.items() if a.entity.body is self.body)
-        return any(other != actor and scene.touch(actor, other) for other in others)
+        return any(other != actor and scene.touch(actor, other) for other in self.names(scene))
+
+    def names(self, scene: Scene) -> tuple[str, ...]:
+        """Returns the entities whose touch counts."""
+        if self.others is not None:
+            return self.others
+        return tuple(n for n, a in scene.actors.items() if a.entity.body is self.body)
 
 
 def _collision(node: Node, ctx: Context) -> EntityCondition:

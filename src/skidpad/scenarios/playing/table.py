@@ -20,7 +20,14 @@ from skidpad.core.setup import ActorCommand
 from skidpad.core.states import ActorStates, VehicleCommand, WorldTruth
 from skidpad.scenarios.actions.lateral import ChangeOfOffset
 from skidpad.scenarios.actions.speed import ChangeOfSpeed
-from skidpad.scenarios.conditions.by_entity import SOME, Component, Quantity, Reaches, ReachPosition
+from skidpad.scenarios.conditions.by_entity import (
+    SOME,
+    Collision,
+    Component,
+    Quantity,
+    Reaches,
+    ReachPosition,
+)
 from skidpad.scenarios.conditions.by_entity import Motion as MotionCondition
 from skidpad.scenarios.conditions.by_value import (
     ElementMove,
@@ -223,16 +230,41 @@ def condition_rows(
     if not isinstance(condition, AnyEntity):
         raise NoTable(f"a condition: {type(condition).__name__}")
     for name in condition.names:
-        if scene.actors[name].present:
-            says = bool(condition.condition.holds(scene, name))
-            yield (*_entity_row(condition.condition, scene, name, index), says)
+        if not scene.actors[name].present:
+            continue
+        if isinstance(condition.condition, Collision):
+            yield from _apart_rows(condition.condition, scene, name, index)
+            continue
+        says = bool(condition.condition.holds(scene, name))
+        yield (*_entity_row(condition.condition, scene, name, index), says)
+
+
+def _apart_rows(
+    condition: Collision, scene: Scene, name: str, index: Mapping[str, int]
+) -> Iterator[tuple[float, ...]]:
+    """Yields a row for each body that an entity may touch: it is too far away for that, or Python looks."""
+    for other in condition.names(scene):
+        one, it, rule = scene.actors[name], scene.actors[other], RULES.index("lessOrEqual")
+        if one is not it and it.present and not (one.entity.is_ghost or it.entity.is_ghost):
+            near = one.nearness(it)
+            yield (
+                KINDS.index("distance"),
+                index[name],
+                index[other],
+                0.0,
+                0.0,
+                rule,
+                near,
+                0.0,
+                False,
+            )
 
 
 def _entity_row(
     condition: object, scene: Scene, name: str, index: Mapping[str, int]
 ) -> tuple[float, ...]:
     """Returns the row of an entity's condition without what it says now."""
-    own, _box = index[name], scene.actors[name]
+    own = index[name]
     match condition:
         case Reaches(Quantity.TRAVELLED, value):
             return KINDS.index("travelled"), own, -1, 0.0, 0.0, 0, max(value - SOME, 0.0), 0.0
@@ -244,16 +276,8 @@ def _entity_row(
             return KINDS.index(kind), own, its, 0.0, 0.0, RULES.index(rule.rule), rule.value, 0.0
         case ReachPosition(tolerance, Fixed(place)):
             x, y = place.pose.x, place.pose.y
-            return (
-                KINDS.index("distance"),
-                own,
-                -1,
-                x,
-                y,
-                RULES.index("lessOrEqual"),
-                tolerance,
-                0.0,
-            )
+            rule = RULES.index("lessOrEqual")
+            return KINDS.index("distance"), own, -1, x, y, rule, tolerance, 0.0
         case Distance(rule, measure, other, goal):
             kind = "distance" + _direction(measure)
         case TimeHeadway(rule, measure, other):

@@ -106,6 +106,7 @@ def test_wall_times_stand_apart_from_results(campaign):
     reasons = timing["why_not_quick"].to_list()
     quick = timing["quick_pct"].to_list()
     assert all((share > 0.0) == (why is None) for share, why in zip(quick, reasons, strict=True))
+    assert timing["story_table_pct"].to_list() == [None] * len(timing)  # it plays no story
     assert not {"rtf", "wall_s"} & set(read_results(campaign).columns)
 
 

@@ -17,6 +17,18 @@ from skidpad.scenarios.playing.player import Player
 from skidpad.scenarios.shipped import FOLDER
 from support.oracle.cases import CASES
 from support.oracle.reference import write_case
+from support.scenarios.files import (
+    at,
+    by_entity,
+    condition,
+    event,
+    private,
+    speed,
+    story,
+    time,
+    to,
+    write,
+)
 
 LOOKS = 50  # ticks between two looks at all that is known of every actor
 LONGEST = 500  # ticks
@@ -78,6 +90,30 @@ def test_a_shipped_scenario_is_played_as_in_python(name, version, ego):
 def test_a_file_of_the_oracle_is_played_as_in_python(tmp_path, name):
     player, ticks = play_both(write_case(name, tmp_path), ego=ActorMode.PHYSICAL, ticks=240)
     assert player.by_table > 0 or player.reason or ticks < 10
+
+
+def test_edges_delays_and_collisions_are_waited_for(tmp_path):
+    """The other car brakes after 2 s, goes on 1.5 s after it stands; the ego does not brake and hits it."""
+    stands = by_entity('<SpeedCondition value="0.05" rule="lessThan"/>', "other")
+    hit = by_entity('<CollisionCondition><EntityRef entityRef="other"/></CollisionCondition>')
+    late = event("late", private(speed(to(3), "linear", 1)), "{}").replace(
+        condition("{}"), condition(stands, "rising", 1.5)
+    )
+    file = write(
+        tmp_path,
+        init=at("ego", -1, 30, 8) + at("other", -1, 75, 8),
+        stories=story(
+            event("stop", private(speed(to(0), "cubic", 2)), time(2)),
+            late,
+            event("hit", private(speed(to(1), "linear", 1)), hit),
+        ),
+        end=14.0,
+    )
+    player, ticks = play_both(file, ego=ActorMode.PHYSICAL)
+    what = [h.path[-1] for h in player.scene.story if h.what == "startTransition"]
+    assert [name for name in what if name in ("stop", "late", "hit")] == ["stop", "late", "hit"]
+    assert player.reason == ""
+    assert 0.5 * ticks < player.by_table < ticks
 
 
 def test_what_no_table_can_hold_is_named(tmp_path):

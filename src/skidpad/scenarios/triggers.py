@@ -116,13 +116,18 @@ class Watched:
         if now is not self.sent:
             self.sent = now
             self.past.append((scene.t + self.timed.delay, now))
-        if self.wakes <= scene.t + 1e-9:
+        if self.past and self.past[0][0] <= scene.t + 1e-9:
             self.late = self.past.popleft()[1]
         return self.late
 
     @property
     def wakes(self) -> float:
-        """Returns when the next change comes out of its delay, s; inf: none is on its way."""
+        """Returns when the next change comes out of its delay, s; inf: none is on its way.
+
+        -inf where an edge has just gone in, which is over in the next step.
+        """
+        if self.sent and self.timed.edge is not Edge.NONE:
+            return -inf
         return self.past[0][0] if self.past else inf
 
 

@@ -37,10 +37,13 @@ class Stopwatch:
     def timing_of(self, driven: Run, slow_pct: float | None = None) -> Timing:
         """Returns the times so far with the real-time factor of a run, and how it was driven."""
         log, dt = driven.log, driven.log.header.dt
+        table = None if driven.played is None else driven.played.table
         return replace(
             self.timing(len(log) * dt, slow_pct),
             quick_pct=100.0 * driven.quick_ticks / max(len(log), 1),
             why_not_quick=driven.why_not_quick or None,
+            story_table_pct=None if table is None else 100.0 * table.by_table / max(table.ticks, 1),
+            why_no_story_table=None if table is None else table.reason or None,
         )
 
     def timing(self, simulated_s: float | None = None, slow_pct: float | None = None) -> Timing:

@@ -61,6 +61,7 @@ from skidpad.scenarios.triggers import AnyEntity, Watched
 from skidpad.simulation.scripted import Motion
 
 STEADY = (ElementState, ElementMove, Never, Value)  # say the same until something happens
+WITHIN = RULES.index("lessOrEqual")
 AXES = {Component.TOTAL: "", Component.LONGITUDINAL: " along", Component.LATERAL: " across"}
 
 
@@ -244,20 +245,11 @@ def _apart_rows(
 ) -> Iterator[tuple[float, ...]]:
     """Yields a row for each body that an entity may touch: it is too far away for that, or Python looks."""
     for other in condition.names(scene):
-        one, it, rule = scene.actors[name], scene.actors[other], RULES.index("lessOrEqual")
+        one, it = scene.actors[name], scene.actors[other]
         if one is not it and it.present and not (one.entity.is_ghost or it.entity.is_ghost):
             near = one.nearness(it)
-            yield (
-                KINDS.index("distance"),
-                index[name],
-                index[other],
-                0.0,
-                0.0,
-                rule,
-                near,
-                0.0,
-                False,
-            )
+            its = index[other]
+            yield KINDS.index("distance"), index[name], its, 0.0, 0.0, WITHIN, near, 0.0, False
 
 
 def _entity_row(
@@ -276,8 +268,7 @@ def _entity_row(
             return KINDS.index(kind), own, its, 0.0, 0.0, RULES.index(rule.rule), rule.value, 0.0
         case ReachPosition(tolerance, Fixed(place)):
             x, y = place.pose.x, place.pose.y
-            rule = RULES.index("lessOrEqual")
-            return KINDS.index("distance"), own, -1, x, y, rule, tolerance, 0.0
+            return KINDS.index("distance"), own, -1, x, y, WITHIN, tolerance, 0.0
         case Distance(rule, measure, other, goal):
             kind = "distance" + _direction(measure)
         case TimeHeadway(rule, measure, other):

@@ -189,6 +189,7 @@ def test_a_cut_file_is_refused_in_one_sentence(
     [
         (b"\x89PNG" + FILE, "does not begin with CARLA_RECORDER"),
         (HEAD + counted(3), "packet 3 stands outside of a frame"),
+        (HEAD + FRAMES[0] + FRAMES[0] + packet(1, b""), "frame 1 has no end"),
         (HEAD + FRAMES[0] + packet(6, struct.pack("<H", 2) + bytes(28)), "2 records of 28 bytes"),
         (HEAD + FRAMES[0] + packet(2, struct.pack("<H", 9) + CAR), "bytes expected"),
     ],

@@ -11,6 +11,7 @@ import pytest
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import LightState
 from skidpad.simulation.carla_server.episode import Wanted
+from skidpad.simulation.carla_server.methods.recording import start_recorder
 from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.protocol.rpc import CallError
 from skidpad.simulation.carla_server.protocol.streams import StreamHub
@@ -176,6 +177,72 @@ def test_the_spectator_goes_its_recorded_way_if_asked(tmp_path: Path, ignore: bo
     assert (pose.x, pose.y, pose.z) == pytest.approx((9.0, 9.0, 9.0) if ignore else (1.0, 2.0, 3.0))
 
 
+def test_attributes_that_are_not_offered_leave_out_their_actor(recorded, tmp_path: Path) -> None:
+    served = Served(ServerOptions(data_dir=tmp_path), StreamHub())
+    source = served.recorder.recording(NAME)
+    foreign = ((0, "use_wheelchair", "true"),)
+    kinds = {
+        id: replace(a, attributes=foreign) if a.blueprint.startswith("walker") else a
+        for id, a in source.kinds.items()
+    }
+    served.replayer.start(served.episode, replace(source, kinds=kinds), 0.0, 0.0, 0)
+    served.tick()
+    assert places(served).keys() == {"vehicle.tesla.model3", "vehicle.audi.tt"}
+
+
+def test_a_replay_that_cannot_begin_leaves_the_server_ticking(
+    recorded, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    served = Served(ServerOptions(data_dir=tmp_path), StreamHub())
+
+    def fail(*_: object) -> None:
+        raise CallError("no actors today")
+
+    monkeypatch.setattr(served.episode, "place", fail)
+    with pytest.raises(CallError):
+        replay(served)
+    served.tick()
+
+
+@pytest.mark.parametrize("name", ["", "."])
+def test_a_recording_that_is_refused_leaves_the_replay_running(
+    recorded, tmp_path: Path, name: str
+) -> None:
+    served = Served(ServerOptions(data_dir=tmp_path), StreamHub())
+    replay(served)
+    with pytest.raises(CallError):
+        start_recorder(served, name)
+    for _ in range(3):
+        served.tick()
+    car = "vehicle.tesla.model3"
+    assert places(served)[car] == pytest.approx(recorded[3][car], abs=2e-3)
+    assert not served.episode.moving.rows.simulated.any()
+    start_recorder(served, "other.log")
+    assert served.episode.moving.rows.simulated.all()
+
+
+@pytest.mark.parametrize("frozen", [True, False])
+def test_lights_stand_still_after_a_replay_where_they_did_before(
+    tmp_path: Path, frozen: bool
+) -> None:
+    options = ServerOptions(data_dir=tmp_path, map="town")
+    served = Served(options, StreamHub())
+    served.episode.moving.lights.frozen = frozen
+    served.recorder.start(NAME, served.episode.map.name)
+    served.tick()
+    served.tick()
+    served.recorder.stop()
+
+    served = Served(options, StreamHub())
+    groups = served.episode.moving.lights.groups.values()
+    for group in groups:
+        group.frozen = not frozen
+    replay(served)
+    assert {group.frozen for group in groups} == {frozen}
+    served.replayer.stop(keep_actors=True)
+    assert {group.frozen for group in groups} == {not frozen}
+
+
 def test_a_load_ends_the_recording(tmp_path: Path) -> None:
     served = Served(ServerOptions(data_dir=tmp_path), StreamHub())
     served.recorder.start(NAME, served.episode.map.name)
@@ -189,9 +256,10 @@ def test_a_load_ends_the_recording(tmp_path: Path) -> None:
     ("frames", "words"),
     [
         ([], "no frames"),
-        ([(1, 0.0), (2, 0.0)], "times do not grow"),
-        ([(1, 0.0), (2, float("nan"))], "times do not grow"),
-        ([(1, 0.0), (2, 0.05)], "frame 2 is not finite"),
+        ([(1, 0.0), (3, 0.0)], "times do not grow"),
+        ([(1, 0.0), (3, float("nan"))], "frame 3 its time is nan; allowed is -1e\\+12 to 1e\\+12"),
+        ([(1, 0.0), (3, float("inf"))], "frame 3 its time is inf"),
+        ([(1, 0.0), (2, 0.05)], "frame 2 POSITION place is inf; allowed is -1e\\+12 to 1e\\+12"),
     ],
 )
 def test_what_cannot_be_replayed_is_refused(

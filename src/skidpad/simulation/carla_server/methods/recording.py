@@ -21,8 +21,9 @@ def start_recorder(served: Served, name: Any, additional: Any = False) -> str:
     """
     more = wire.flag(additional, "additional_data")
     file = wire.text(name, "file name")
+    started = served.recorder.start(file, served.episode.map.name, more)
     served.replayer.release()
-    return served.recorder.start(file, served.episode.map.name, more)
+    return started
 
 
 @TABLE.method("stop_recorder", Shape.VOID)

@@ -220,6 +220,8 @@ def _frames(source: _Source) -> Iterator[LogFrame]:
         packet, size = source.take(_HEAD)
         body = source.part(size)
         if packet == Packet.FRAME_START:
+            if frame is not None:
+                raise source.fault(f"frame {frame.number} has no end")
             frame = LogFrame(*body.take(_FRAME))
         elif frame is None:
             raise source.fault(f"packet {packet} stands outside of a frame")

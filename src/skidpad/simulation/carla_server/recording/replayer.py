@@ -12,6 +12,7 @@ from collections.abc import Container, Iterable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import dist
+from typing import Any
 
 import numpy as np
 
@@ -94,17 +95,15 @@ def _between(a: Pose, b: Pose, share: float, span: float) -> tuple[Pose, Vector]
 
 
 def recording(name: str, head: LogHead, frames: Iterable[LogFrame]) -> CarlaRecording:
-    """Returns what can be replayed of a file; CallError when its times do not grow or no place is finite."""
+    """Returns what can be replayed of a file; CallError for times that do not grow or absurd numbers."""
     read = list(frames)
     if not read:
         raise CallError(f"{name} holds no frames that can be replayed")
+    for frame in read:
+        _require_sensible(name, frame)
     times = [frame.elapsed - read[0].elapsed for frame in read]
     if not all(b > a for a, b in pairwise(times)):
         raise CallError(f"{name} cannot be replayed: its times do not grow")
-    for frame in read:
-        for packet in (Packet.POSITION, Packet.WEATHER, Packet.VEHICLE, Packet.TRAFFIC_LIGHT):
-            if not _is_finite(frame, packet):
-                raise CallError(f"{name} cannot be replayed: frame {frame.number} is not finite")
     kinds = {actor.id: actor for frame in read for actor in frame.added}
     return CarlaRecording(head.map, times, read, _weathers(read), kinds)
 
@@ -118,13 +117,21 @@ def _weathers(frames: list[LogFrame]) -> list[list[float] | None]:
     return found
 
 
-def _is_finite(frame: LogFrame, packet: Packet) -> bool:
-    """Returns whether all numbers of a packet are finite and of sensible size."""
-    records = frame.records.get(packet)
-    if records is None:
-        return True
-    names = records.dtype.names or ()
-    return all(bool(np.all(np.abs(records[n]) < wire.FLOAT_MAX)) for n in names)
+def _require_sensible(name: str, frame: LogFrame) -> None:
+    """Raises CallError for a number of a frame that is not finite, or too large for any place or time."""
+    numbers: list[tuple[str, Any]] = [("its time", frame.elapsed)]
+    for packet in (Packet.POSITION, Packet.WEATHER, Packet.VEHICLE, Packet.TRAFFIC_LIGHT):
+        records = frame.records.get(packet)
+        if records is not None:
+            names = records.dtype.names or ()
+            numbers += [(f"{packet.name} {each}", records[each]) for each in names]
+    for what, values in numbers:
+        wrong = np.ravel(values)[~(np.abs(np.ravel(values)) < wire.FLOAT_MAX)]
+        if wrong.size:
+            raise CallError(
+                f"{name} cannot be replayed: in frame {frame.number} {what} is {wrong[0]:g}; "
+                f"allowed is -{wire.FLOAT_MAX:g} to {wire.FLOAT_MAX:g}"
+            )
 
 
 class Replayer:
@@ -148,8 +155,9 @@ class Replayer:
         begin = max(source.total + begin, 0.0) if begin < 0.0 else min(begin, source.total)
         end = min(begin + duration, source.total) if duration > 0.0 else source.total
         lights = _match_lights(episode, source)
-        self._run = _Run(episode, source, begin, end, follow, lights)
-        self._place(self._run)
+        run = _Run(episode, source, begin, end, follow, lights)
+        self._place(run)
+        self._run = run
         return begin, end
 
     def tick(self, dt: float) -> None:
@@ -205,6 +213,11 @@ class _Run:
     actors: dict[int, int] = field(default_factory=dict)  # actor ids by recorded ids
     refused: set[int] = field(default_factory=set)
     weather: list[float] | None = None  # as last set
+    frozen: dict[int, bool] = field(init=False)  # by groups of lights, before the replay
+
+    def __post_init__(self) -> None:
+        groups = self.episode.moving.lights.groups
+        self.frozen = {light.group: groups[light.group].frozen for light in self.lights.values()}
 
     def is_spectator(self, recorded: int) -> bool:
         """Returns whether a recorded actor is the free camera."""
@@ -240,7 +253,9 @@ class _Run:
                 self.episode.destroy(id)
 
     def free(self) -> None:
-        """Hands the actors of the recording back to physics; vehicles are left without a control."""
+        """Hands actors back to physics, vehicles without a control; groups of lights are frozen as before."""
+        for group, frozen in self.frozen.items():
+            self.episode.moving.lights.groups[group].frozen = frozen
         for id in self.actors.values():
             actor = self.episode.actors.alive.get(id)
             if actor is not None:
@@ -284,7 +299,7 @@ class _Run:
             return living
         try:
             return self.episode.spawn(Wanted(blueprint, attributes), pose)
-        except CallError:  # something stands there
+        except (CallError, wire.WireError):  # something stands there, or foreign attributes
             return None
 
 

@@ -70,7 +70,7 @@ def test_a_record_comes_back_in_its_resolution():
     worlds = worlds_of(6)
     again = decode_record(encode_record(record(worlds)))
     original = record(worlds)
-    for name in HazardRecord.__dataclass_fields__:
+    for name in HazardRecord.__struct_fields__:
         if name != "worlds":
             assert getattr(again, name) == getattr(original, name), name
     for k, (a, b) in enumerate(zip(worlds, again.worlds, strict=True)):

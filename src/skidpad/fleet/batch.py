@@ -18,6 +18,7 @@ from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.fleet.identity import digest
 from skidpad.fleet.words import Limits, Refused
+from skidpad.recording.hazards.records import HazardHead
 from skidpad.recording.hazards.text import HEADER
 
 END = b"\nZ\n"
@@ -25,31 +26,9 @@ NUMBER_MAX = 1.0e9  # m or s, of any number in a head
 WORDS_MAX = 64
 
 
-class _Object(msgspec.Struct, frozen=True):
-    channel: str
-    id: int | None
-    x: float
-    y: float
-
-
-class Head(msgspec.Struct, frozen=True):
+class Head(HazardHead, frozen=True, kw_only=True):
     """The index row of a record (`recording.hazards.records.index_row`)."""
 
-    id: str
-    type: HazardType
-    profile: str
-    forms: str
-    t_start: float
-    t_end: float
-    t_worst: float
-    count: int
-    extremes: dict[str, float]
-    channels: list[str]
-    driving: str | None
-    involved: list[str]
-    objects: list[_Object]
-    flags: list[str]
-    context: dict[str, str]
     cycles: int
 
 

@@ -8,9 +8,10 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import msgspec
 
 from skidpad.core.channels import Cycle
 from skidpad.core.errors import FileError, OutputError
@@ -28,8 +29,7 @@ FILE_LIMIT = 1024 * 1024 * 1024
 INDEX_LIMIT = 256 * 1024 * 1024
 
 
-@dataclass(frozen=True, slots=True)
-class InvolvedObject:
+class InvolvedObject(msgspec.Struct, frozen=True):
     """An object that a channel reported and that the hazard is about."""
 
     channel: str
@@ -38,9 +38,8 @@ class InvolvedObject:
     y: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HazardRecord:
-    """Record of one hazardous scene, with the worlds around it."""
+class HazardHead(msgspec.Struct, frozen=True, kw_only=True):
+    """What a record says of its hazard, without the worlds around it."""
 
     id: str  # h and its number, as h0001
     type: HazardType  # which hazard
@@ -57,6 +56,11 @@ class HazardRecord:
     objects: tuple[InvolvedObject, ...] = ()  # that it is about, m in the world frame
     flags: tuple[str, ...] = ()  # "assumed": OLSS without a pair; "cut": the world ends early
     context: dict[str, str]  # map and weather of the drive
+
+
+class HazardRecord(HazardHead, frozen=True, kw_only=True):
+    """Record of one hazardous scene, with the worlds around it."""
+
     worlds: tuple[Cycle, ...] = ()  # from 5 s before to 5 s after
 
 
@@ -93,24 +97,14 @@ class HazardWriter(AbstractContextManager["HazardWriter"]):
 
 def index_row(record: HazardRecord) -> dict[str, Any]:
     """Returns the record without its worlds, for JSON."""
-    return {
-        "id": record.id,
-        "type": record.type.value,
-        "profile": record.profile,
-        "forms": record.forms,
-        "t_start": record.t_start,
-        "t_end": record.t_end,
-        "t_worst": record.t_worst,
-        "count": record.count,
-        "extremes": record.extremes,
-        "channels": list(record.channels),
-        "driving": record.driving,
-        "involved": list(record.involved),
-        "objects": [{"channel": o.channel, "id": o.id, "x": o.x, "y": o.y} for o in record.objects],
-        "flags": list(record.flags),
-        "context": record.context,
-        "cycles": len(record.worlds),
-    }
+    return _plain(record) | {"cycles": len(record.worlds)}
+
+
+def _plain(head: HazardHead) -> dict[str, Any]:
+    """Returns what a record says of its hazard as plain values."""
+    said = {name: getattr(head, name) for name in HazardHead.__struct_fields__}
+    plain: dict[str, Any] = msgspec.to_builtins(said, enc_hook=float)  # also of NumPy
+    return plain
 
 
 def encode_record(record: HazardRecord) -> str:
@@ -127,54 +121,22 @@ def decode_record(text: str) -> HazardRecord:
         raise FileError("a hazard record must run from a line H to a line Z")
     try:
         row = json.loads(lines[0][2:])
-        record, expected = _record(row), int(row["cycles"])
+        head, expected = _head(row), int(row["cycles"])
     except UNUSABLE as error:
         raise FileError(f"a hazard record has an unreadable head ({on_a_line(error)})") from error
-    worlds = decode_worlds(lines[1:-2], len(record.channels))
+    worlds = decode_worlds(lines[1:-2], len(head.channels))
     if len(worlds) != expected:
-        raise FileError(f"hazard {record.id}: {len(worlds)} cycles, its head says {expected}")
-    return HazardRecord(**{n: getattr(record, n) for n in _FIELDS if n != "worlds"}, worlds=worlds)
+        raise FileError(f"hazard {head.id}: {len(worlds)} cycles, its head says {expected}")
+    return HazardRecord(**msgspec.structs.asdict(head), worlds=worlds)
 
 
-def _record(row: dict[str, Any]) -> HazardRecord:
-    """Returns the record of a decoded row; raises an error where a field does not fit."""
-    objects = tuple(
-        InvolvedObject(str(o["channel"]), _optional_int(o["id"]), float(o["x"]), float(o["y"]))
-        for o in row["objects"]
-    )
-    return HazardRecord(
-        id=str(row["id"]),
-        type=HazardType(row["type"]),
-        profile=str(row["profile"]),
-        forms=str(row["forms"]),
-        t_start=_time(row, "t_start"),
-        t_end=_time(row, "t_end"),
-        t_worst=_time(row, "t_worst"),
-        count=int(row["count"]),
-        extremes={str(k): float(v) for k, v in row["extremes"].items()},
-        channels=tuple(map(str, row["channels"])),
-        driving=None if row["driving"] is None else str(row["driving"]),
-        involved=tuple(map(str, row["involved"])),
-        objects=objects,
-        flags=tuple(map(str, row["flags"])),
-        context={str(k): str(v) for k, v in row["context"].items()},
-    )
-
-
-def _time(row: dict[str, Any], name: str) -> float:
-    """Returns a time in s of a row; raises FileError outside [0, LATEST]."""
-    t = float(row[name])
-    if not 0.0 <= t <= LATEST:
-        raise FileError(f"{name} must be between 0 and {LATEST:g} s, got {t:g}")
-    return t
-
-
-_FIELDS = tuple(HazardRecord.__dataclass_fields__)
-
-
-def _optional_int(value: Any) -> int | None:
-    """Returns the value as an int; None stays None."""
-    return None if value is None else int(value)
+def _head(row: dict[str, Any]) -> HazardHead:
+    """Returns the head of a decoded row; raises an error where a field does not fit."""
+    head = msgspec.convert(row, HazardHead)
+    for name in ("t_start", "t_end", "t_worst"):
+        if not 0.0 <= (t := getattr(head, name)) <= LATEST:
+            raise FileError(f"{name} must be between 0 and {LATEST:g} s, got {t:g}")
+    return head
 
 
 def read_hazards(folder: Path) -> Iterator[HazardRecord]:
@@ -225,7 +187,7 @@ def read_index(folder: Path) -> list[dict[str, Any]]:
         where = f"{path}, line {number}"
         row = decode_json(line, where, dict[str, Any])
         try:
-            rows.append(row | index_row(_record(row)) | {"cycles": int(row["cycles"])})
+            rows.append(row | _plain(_head(row)) | {"cycles": int(row["cycles"])})
         except UNUSABLE as error:
             raise unusable(where, "a hazard of an index", error) from None
     return rows

@@ -32,12 +32,9 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("drives")
     source = drive(WORLD, EYES, 12.0)
     with ChannelWriter(folder / "one.mcap", source.channels) as writer:
-        writer.write_context(Context(0.0, {"route": "ring"}))
+        writer.add(Context(0.0, {"route": "ring"}))
         for channel, item in source.rows:
-            if channel is None:
-                writer.write_truth(item)
-            else:
-                writer.write(source.channels[channel], item)
+            writer.add(item, channel)
     return folder
 
 

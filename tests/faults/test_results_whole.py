@@ -26,7 +26,7 @@ def record(path, seconds):
     with ChannelWriter(path, listed.channels) as writer:
         for channel, item in listed.rows:
             if channel is not None:
-                writer.write(listed.channels[channel], item)
+                writer.add(item, channel)
     return path
 
 

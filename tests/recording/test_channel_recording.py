@@ -25,10 +25,7 @@ EYES = (Eyes("left", 0.1), Eyes("right", 0.1, blind=(2,)))
 def write(path, recording, channels=None):
     with ChannelWriter(path, channels or recording.channels) as writer:
         for channel, item in recording.rows:
-            if channel is not None:
-                writer.write(recording.channels[channel], item)
-            else:
-                writer.write_truth(item)
+            writer.add(item, channel)
 
 
 def same(a, b):
@@ -55,11 +52,11 @@ def test_a_recording_gives_back_every_number(tmp_path):
 
 def test_decisions_context_and_the_order_of_channels_survive(tmp_path):
     with ChannelWriter(tmp_path / "a.mcap", ["zeta", "alpha"]) as writer:
-        writer.write_context(Context(0.0, {"route": "town"}))
+        writer.add(Context(0.0, {"route": "town"}))
         for t in (0.0, 0.1):
-            writer.write("alpha", frame(t, (0, 0, 0, 1, 0)))
-            writer.write("zeta", frame(t, (0, 0, 0, 1, 0)))
-        writer.write_decision(Decision(0.1, "alpha", "preferred", (0.5, float("nan"))))
+            writer.add(frame(t, (0, 0, 0, 1, 0)), 1)
+            writer.add(frame(t, (0, 0, 0, 1, 0)), 0)
+        writer.add(Decision(0.1, "alpha", "preferred", (0.5, float("nan"))))
     recording = McapRecording(tmp_path / "a.mcap")
     assert recording.channels == ("zeta", "alpha")
     assert [c.driving for c in cycles(recording)] == [None, 1]
@@ -100,7 +97,7 @@ def test_names_and_times_are_checked(tmp_path):
     with pytest.raises(ConfigError, match="different names"):
         ChannelWriter(tmp_path / "a.mcap", ["a", "a"])
     with ChannelWriter(tmp_path / "a.mcap", ["a"]) as writer, pytest.raises(ConfigError):
-        writer.write("a", frame(-1.0, (0, 0, 0, 1, 0)))
+        writer.add(frame(-1.0, (0, 0, 0, 1, 0)), 0)
 
 
 @pytest.mark.parametrize("content", [b"", b"\x89MCAP0\r\n", b"not mcap at all" * 9])

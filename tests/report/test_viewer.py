@@ -17,7 +17,7 @@ def recording(tmp_path):
     source = drive(World(objects=traffic(4)), (Eyes("a"), Eyes("b", blind=(1,))), 1.0, False)
     with ChannelWriter(tmp_path / "d.mcap", source.channels) as writer:
         for channel, item in source.rows:
-            writer.write(source.channels[channel], item)
+            writer.add(item, channel)
     return tmp_path / "d.mcap"
 
 

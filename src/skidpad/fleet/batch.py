@@ -14,7 +14,6 @@ from typing import Annotated, Any
 import msgspec
 
 from skidpad.core.text.told import on_a_line
-from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.fleet.identity import digest
 from skidpad.fleet.words import Limits, Refused

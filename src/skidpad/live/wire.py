@@ -7,42 +7,31 @@ content: the protobuf message of the recording; of a mark k, t and the sender's 
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator
-from typing import Any, BinaryIO
+from collections.abc import Iterator
+from typing import BinaryIO
 
-from google.protobuf.message import DecodeError
-
-from skidpad.core.channels import ChannelFrame, Context, Decision, Due, TruthFrame
-from skidpad.core.errors import FileError
-from skidpad.recording.channels import channels_pb2 as pb
+from skidpad.core.channels import Due, TruthFrame
 from skidpad.recording.channels import codec
-from skidpad.recording.channels.mcap_files import Item, Losses, Message
+from skidpad.recording.channels.mcap_files import Item, Losses, Message, read_item
 
 HEAD = struct.Struct("<BhI")
 MARK = struct.Struct("<qdq")
 NOBODY = -1
 LIMIT = 64 * 1024 * 1024  # bytes; a longer record is damage
-FRAME, DECISION, CONTEXT, CYCLE_OVER, END = range(5)
-
-_KINDS: dict[type, tuple[int, Callable[[Any], Any]]] = {
-    ChannelFrame: (FRAME, codec.message_from_frame),
-    Decision: (DECISION, codec.message_from_decision),
-    Context: (CONTEXT, codec.message_from_context),
-}
-_READERS: dict[int, tuple[Any, Callable[[Any], Item]]] = {
-    FRAME: (pb.Channel, codec.frame_from_message),
-    DECISION: (pb.Decision, codec.decision_from_message),
-    CONTEXT: (pb.Context, codec.context_from_message),
-}
+MESSAGES = ("Channel", "Decision", "Context")  # by kind
+CYCLE_OVER, END = 3, 4  # kinds of marks
 
 
 def pack_item(channel: int | None, item: Item) -> bytes:
     """Returns an item as a record of bytes, b"" for the true world (C-021)."""
     if isinstance(item, TruthFrame):
         return b""
-    kind, message_of = _KINDS[type(item)]
-    content: bytes = message_of(item).SerializeToString()
-    return HEAD.pack(kind, NOBODY if channel is None else channel, len(content)) + content
+    kind = codec.KINDS[type(item)]
+    content: bytes = kind.write(item).SerializeToString()
+    return (
+        HEAD.pack(MESSAGES.index(kind.name), NOBODY if channel is None else channel, len(content))
+        + content
+    )
 
 
 def cycle_mark(k: int, t: float, now_ns: int) -> bytes:
@@ -84,18 +73,7 @@ class WireSource:
                 _, t, self.sent_ns = MARK.unpack(content)
                 yield Message(None, t, Due(t))
                 continue
-            item = self._item(kind, content)
+            name = MESSAGES[kind] if kind < len(MESSAGES) else ""
+            item = read_item(name, content, self.losses)
             if item is not None:
                 yield Message(None if channel == NOBODY else channel, item.t, item)
-
-    def _item(self, kind: int, content: bytes) -> Item | None:
-        """Returns the item in a record; None, counted as a loss, for a foreign or malformed one."""
-        if kind not in _READERS:
-            self.losses.foreign += 1
-            return None
-        message, read = _READERS[kind]
-        try:
-            return read(message.FromString(content))
-        except (FileError, ValueError, OverflowError, DecodeError):
-            self.losses.malformed += 1
-            return None

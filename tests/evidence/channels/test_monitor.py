@@ -286,10 +286,10 @@ def test_truth_and_context_change_nothing_and_neither_does_the_file(tmp_path):
         with ChannelWriter(path, live.channels) as writer:
             for channel, item in live.rows:
                 if channel is not None:
-                    writer.write(live.channels[channel], item)
+                    writer.add(item, channel)
                 elif extra:
-                    writer.write_truth(truth(item.t, rng.normal(size=5), rng.normal(size=(3, 5))))
-                    writer.write_context(Context(item.t, {"route": str(rng.integers(9))}))
+                    writer.add(truth(item.t, rng.normal(size=5), rng.normal(size=(3, 5))))
+                    writer.add(Context(item.t, {"route": str(rng.integers(9))}))
     runs = [monitored(s) for s in (live, McapRecording(bare), McapRecording(scrambled))]
     values = [all_values(evidence) for _, evidence, _ in runs]
     records = [without_context(found) for _, _, found in runs]

@@ -25,10 +25,7 @@ def recording() -> bytes:
         path = Path(folder) / "a.mcap"
         with ChannelWriter(path, listed.channels) as writer:
             for channel, item in listed.rows:
-                if channel is not None:
-                    writer.write(listed.channels[channel], item)
-                else:
-                    writer.write_truth(item)
+                writer.add(item, channel)
         return path.read_bytes()
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,6 +119,22 @@ def message_from_context(context: Context) -> pb.Context:
 def context_from_message(message: pb.Context) -> Context:
     """Returns the context in `message`, sorted: a map on the wire has no order of its own."""
     return Context(message.t, dict(sorted(message.entries.items())))
+
+
+class MessageKind(NamedTuple):
+    """How items of one type are written as protobuf messages and read again."""
+
+    name: str  # of the message
+    write: Callable[[Any], Any]
+    read: Callable[[Any], Any]
+
+
+KINDS: dict[type, MessageKind] = {
+    ChannelFrame: MessageKind("Channel", message_from_frame, frame_from_message),
+    TruthFrame: MessageKind("Truth", message_from_truth, truth_from_message),
+    Decision: MessageKind("Decision", message_from_decision, decision_from_message),
+    Context: MessageKind("Context", message_from_context, context_from_message),
+}
 
 
 def padded_polygons(shapes: Iterable[Floats]) -> tuple[NDArray[np.int64], Floats]:

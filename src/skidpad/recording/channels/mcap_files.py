@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import mcap.records
+from google.protobuf.descriptor_pb2 import FileDescriptorSet
 from google.protobuf.message import DecodeError
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import Writer
@@ -107,63 +108,41 @@ class ChannelWriter(AbstractContextManager["ChannelWriter"]):
         self._writer = Writer(self._file, chunk_size=CHUNK_SIZE)
         self._writer.start(profile="skidpad", library="skidpad")
         self._writer.add_metadata("skidpad", {"channels": json.dumps(list(channels))})
-        schemas = {m: self._schema(m) for m in ("Channel", "Truth", "Decision", "Context")}
-        self._topics = {
+        file = FileDescriptorSet()
+        pb.DESCRIPTOR.CopyToProto(file.file.add())
+        schemas = {
+            kind.name: int(
+                self._writer.register_schema(
+                    f"skidpad.{kind.name}", "protobuf", file.SerializeToString()
+                )
+            )
+            for kind in codec.KINDS.values()
+        }
+        self._topics: dict[object, int] = {
             name: self._topic(CHANNEL_TOPIC + name, schemas["Channel"]) for name in channels
         }
-        self._truth = self._topic(TRUTH_TOPIC, schemas["Truth"])
-        self._decision = self._topic(DECISION_TOPIC, schemas["Decision"])
-        self._context = self._topic(CONTEXT_TOPIC, schemas["Context"])
+        self._topics[TruthFrame] = self._topic(TRUTH_TOPIC, schemas["Truth"])
+        self._topics[Decision] = self._topic(DECISION_TOPIC, schemas["Decision"])
+        self._topics[Context] = self._topic(CONTEXT_TOPIC, schemas["Context"])
         self._flushed_at = -float("inf")
-
-    def _schema(self, message: str) -> int:
-        """Registers the schema of a message and returns its id."""
-        descriptors = pb.DESCRIPTOR.serialized_pb
-        # a FileDescriptorSet with one file: field 1, length-delimited
-        data = b"\x0a" + _varint(len(descriptors)) + descriptors
-        return int(self._writer.register_schema(f"skidpad.{message}", "protobuf", data))
 
     def _topic(self, topic: str, schema: int) -> int:
         """Registers a topic with its schema's id and returns the id of the topic."""
         return int(self._writer.register_channel(topic, "protobuf", schema))
 
     def add(self, item: Item, channel: int | None = None) -> None:
-        """Appends any item; a frame with the index of the channel that said it."""
-        if isinstance(item, ChannelFrame):
-            assert channel is not None
-            self.write(self.channels[channel], item)
-        elif isinstance(item, TruthFrame):
-            self.write_truth(item)
-        elif isinstance(item, Decision):
-            self.write_decision(item)
-        else:
-            self.write_context(item)
+        """Appends any item; a frame with the index of the channel that said it.
 
-    def write(self, channel: str, frame: ChannelFrame) -> None:
-        """Appends the frame of a channel."""
-        self._add(self._topics[channel], frame.t, codec.message_from_frame(frame))
-
-    def write_truth(self, truth: TruthFrame) -> None:
-        """Appends the true world of a cycle."""
-        self._add(self._truth, truth.t, codec.message_from_truth(truth))
-
-    def write_decision(self, decision: Decision) -> None:
-        """Appends a decision of the arbiter."""
-        self._add(self._decision, decision.t, codec.message_from_decision(decision))
-
-    def write_context(self, context: Context) -> None:
-        """Writes names and values that describe the drive."""
-        self._add(self._context, context.t, codec.message_from_context(context))
-
-    def _add(self, topic: int, t: float, message: Any) -> None:
-        """Writes a message at `t` s; raises ConfigError for a time outside [0, 1.8e10) s."""
-        if not 0.0 <= t < 1.8e10:  # MCAP stores unsigned nanoseconds
-            raise ConfigError(f"time of a channel message must be in [0, 1.8e10) s, got {t!r}")
-        stamp = round(t * NS)
+        ConfigError for a time outside [0, 1.8e10) s.
+        """
+        if not 0.0 <= item.t < 1.8e10:  # MCAP stores unsigned nanoseconds
+            raise ConfigError(f"time of a channel message must be in [0, 1.8e10) s, got {item.t!r}")
+        message, stamp = codec.KINDS[type(item)].write(item), round(item.t * NS)
+        topic = self._topics[type(item) if channel is None else self.channels[channel]]
         self._writer.add_message(topic, stamp, message.SerializeToString(), stamp)
-        if t - self._flushed_at >= FLUSH_EVERY:
+        if item.t - self._flushed_at >= FLUSH_EVERY:
             self._file.flush()
-            self._flushed_at = t
+            self._flushed_at = item.t
 
     def close(self) -> None:
         """Finishes the file; safe to call twice."""
@@ -175,12 +154,20 @@ class ChannelWriter(AbstractContextManager["ChannelWriter"]):
         self.close()
 
 
-_READERS: dict[str, Callable[[Any], Item]] = {
-    "skidpad.Channel": codec.frame_from_message,
-    "skidpad.Truth": codec.truth_from_message,
-    "skidpad.Decision": codec.decision_from_message,
-    "skidpad.Context": codec.context_from_message,
-}
+_READERS = {kind.name: kind.read for kind in codec.KINDS.values()}
+
+
+def read_item(name: str, data: bytes, losses: Losses) -> Item | None:
+    """Returns the item in a message of this name; None, counted as a loss, if foreign or malformed."""
+    reader: Callable[[Any], Item] | None = _READERS.get(name)
+    if reader is None:
+        losses.foreign += 1
+        return None
+    try:
+        return reader(getattr(pb, name).FromString(data))
+    except (FileError, ValueError, OverflowError, DecodeError):
+        losses.malformed += 1
+        return None
 
 
 class McapRecording:
@@ -206,23 +193,11 @@ class McapRecording:
         for topic, schema, record in self._records(self.losses):
             if schema == "skidpad.Truth" and not self.truth:
                 continue
-            item = self._item(schema, record.data)
+            item = read_item(schema.partition("skidpad.")[2], record.data, self.losses)
             if item is None:
                 continue
             channel = index.get(topic) if isinstance(item, ChannelFrame) else None
             yield Message(channel, item.t, item)
-
-    def _item(self, schema: str, data: bytes) -> Item | None:
-        """Returns the item in a message's bytes; None, counted as a loss, if foreign or malformed."""
-        reader = _READERS.get(schema)
-        if reader is None:
-            self.losses.foreign += 1
-            return None
-        try:
-            return reader(getattr(pb, schema.removeprefix("skidpad.")).FromString(data))
-        except (FileError, ValueError, OverflowError, DecodeError):
-            self.losses.malformed += 1
-            return None
 
     def _scan(self) -> tuple[TopicInfo, ...]:
         """Returns each topic with its schema, count, first and last time in s; reads the whole file."""
@@ -300,13 +275,3 @@ def _names(text: str) -> list[str]:
     except ValueError:
         return []
     return [str(name) for name in names] if isinstance(names, list) else []
-
-
-def _varint(value: int) -> bytes:
-    """Returns a number as a protobuf varint."""
-    out = bytearray()
-    while value > 0x7F:
-        out.append(value & 0x7F | 0x80)
-        value >>= 7
-    out.append(value)
-    return bytes(out)

@@ -105,5 +105,5 @@ def test_laid_surfaces_are_stored_and_read(tmp_path):
     write_laid_surfaces(tmp_path, laid)
     assert read_laid_surfaces(tmp_path) == laid
     (tmp_path / "surfaces.json").write_text('[{"tick": "x"}]')
-    with pytest.raises(FileError, match=r"surfaces.json: .*tick"):
+    with pytest.raises(FileError, match=r"surfaces.json is damaged: .*tick"):
         read_laid_surfaces(tmp_path)

@@ -9,7 +9,7 @@ import msgspec
 
 from skidpad.core.files.reading import decode_json, read_bytes
 from skidpad.live.settings import Flow
-from skidpad.recording.files import write_bytes
+from skidpad.recording.files import write_json
 
 LINK = "link.json"
 
@@ -32,7 +32,7 @@ class LinkOutcome(msgspec.Struct, frozen=True, kw_only=True):
 
 def write_outcome(folder: Path, outcome: LinkOutcome) -> None:
     """Writes the outcome as link.json into the monitor's folder."""
-    write_bytes(folder / LINK, msgspec.json.format(msgspec.json.encode(outcome), indent=1))
+    write_json(folder / LINK, outcome, indent=1)
 
 
 def read_outcome(folder: Path) -> LinkOutcome:

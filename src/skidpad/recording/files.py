@@ -13,11 +13,19 @@ from itertools import count
 from pathlib import Path
 from typing import Any, TypeVar
 
+import msgspec
 import numpy as np
 import polars as pl
 
 from skidpad.core.errors import FileError, OutputError
-from skidpad.core.files.reading import UNUSABLE, is_file, read_bytes, unusable
+from skidpad.core.files.reading import (
+    TEXT_MAX,
+    UNUSABLE,
+    decode_json,
+    is_file,
+    read_bytes,
+    unusable,
+)
 
 T = TypeVar("T")
 
@@ -49,12 +57,20 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
 
 def write_bytes(path: Path, content: bytes) -> None:
     """Writes `content` to `path` atomically; makes its folder."""
-    write_atomically(path, lambda temporary: _fill(temporary, content))
+    write_atomically(path, lambda temporary: temporary.write_bytes(content))
 
 
-def _fill(path: Path, content: bytes) -> None:
-    """Writes the bytes to the file."""
-    path.write_bytes(content)
+def write_json(path: Path, value: Any, indent: int = 2) -> None:
+    """Writes a value as JSON for people, atomically."""
+    write_bytes(path, msgspec.json.format(msgspec.json.encode(value), indent=indent))
+
+
+def read_json(path: Path, kind: type[T], limit: int = TEXT_MAX) -> T | None:
+    """Returns the value of a JSON file; None where there is no file, FileError where it is damaged."""
+    if not path.is_file():
+        return None
+    found: T = decode_json(read_bytes(path, path.name, limit), str(path), kind)
+    return found
 
 
 def require_free(folder: Path) -> Path:

@@ -27,7 +27,7 @@ from skidpad.recording.campaign.searches import (
     distinct_failures,
     failure_folder,
 )
-from skidpad.recording.files import write_bytes
+from skidpad.recording.files import write_bytes, write_json
 from skidpad.search.files import write_choices
 from skidpad.search.loop import drive_all
 from skidpad.search.space import apply_values, is_parameter
@@ -120,7 +120,7 @@ def kept_trials(groups: Sequence[Group]) -> list[Trial]:
 
 def write_hazard(out: Path, hazard: Hazard) -> None:
     """Writes what a search found about the hazard that it began from into its folder."""
-    write_bytes(out / HAZARD, msgspec.json.format(msgspec.json.encode(hazard)))
+    write_json(out / HAZARD, hazard)
 
 
 def write_findings(out: Path, found: Search, findings: Findings) -> None:

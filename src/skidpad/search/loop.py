@@ -26,7 +26,7 @@ from skidpad.recording.campaign.searches import (
     read_search,
     read_trials,
 )
-from skidpad.recording.files import write_bytes
+from skidpad.recording.files import write_bytes, write_json
 from skidpad.search.margin import NO_CONFLICT
 from skidpad.search.methods import batch_sizes, make_method
 from skidpad.search.trial import Point, drive_point, unit_tuple, with_reference
@@ -59,7 +59,7 @@ def _begin(
             raise OutputError(f"{out} was begun with other options: give another --out")
         return read_trials(out, runs)
     out.mkdir(parents=True, exist_ok=True)
-    write_bytes(out / name, msgspec.json.format(msgspec.json.encode(asked)))
+    write_json(out / name, asked)
     return []
 
 

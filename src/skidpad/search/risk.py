@@ -30,7 +30,7 @@ from skidpad.recording.campaign.risks import (
     read_repetitions,
 )
 from skidpad.recording.campaign.searches import Trial
-from skidpad.recording.files import write_bytes
+from skidpad.recording.files import write_bytes, write_json
 from skidpad.search.branching import SplitTask, split_drives
 from skidpad.search.loop import StoredTrials, drive_all
 from skidpad.search.probability import (
@@ -135,7 +135,7 @@ def estimate_risk(
         faults=sum(bool(t.fault) for t in limit.trials) + sum(r.faults for r in repetitions),
         splitting=repetitions,
     )
-    write_bytes(out / RISK_FOUND, msgspec.json.format(msgspec.json.encode(result)))
+    write_json(out / RISK_FOUND, result)
     return result
 
 

@@ -18,7 +18,7 @@ from skidpad.live.ros2.network import BLOCKING, participant, qos
 from skidpad.live.ros2.types import OBJECTS, ODOMETRY, PATH, Types
 from skidpad.live.settings import Flow
 from skidpad.recording.channels.mcap_files import Item
-from skidpad.recording.files import write_bytes
+from skidpad.recording.files import write_bytes, write_json
 from skidpad.recording.formats.ros_bag import (
     ChannelTopics,
     EgoTopic,
@@ -142,8 +142,7 @@ class RosPublisher:
         del self.participant
         ended = self.ended or "complete"
         outcome = LinkOutcome(flow=self.flow, cycles=self.cycles, missing=self.missing, ended=ended)
-        text = msgspec.json.format(msgspec.json.encode(outcome), indent=1)
-        write_bytes(self.recording.with_suffix(".ros2.json"), text)
+        write_json(self.recording.with_suffix(".ros2.json"), outcome, indent=1)
 
     def _describe(self, frame: ChannelFrame) -> None:
         """Writes NAME.ros2.yaml, the mapping that reads these topics, with the ego's true size."""

@@ -7,11 +7,9 @@ from pathlib import Path
 
 import msgspec
 
-from skidpad.core.files.reading import decode_json, read_bytes
-from skidpad.recording.files import write_bytes
+from skidpad.recording.files import read_json, write_bytes
 
 METRICS_FILE = "added_metrics.json"  # in a run's folder
-SIZE_MAX = 2**20  # bytes
 
 
 class AddedMetric(msgspec.Struct, frozen=True):
@@ -31,10 +29,4 @@ def write_added_metrics(folder: Path, added: Sequence[AddedMetric]) -> None:
 
 def read_added_metrics(folder: Path) -> tuple[AddedMetric, ...]:
     """Returns the metrics that packages added to a run as it was driven; () where there are none."""
-    path = folder / METRICS_FILE
-    if not path.is_file():
-        return ()
-    found: tuple[AddedMetric, ...] = decode_json(
-        read_bytes(path, str(path), SIZE_MAX), str(path), tuple[AddedMetric, ...]
-    )
-    return found
+    return read_json(folder / METRICS_FILE, tuple[AddedMetric, ...]) or ()

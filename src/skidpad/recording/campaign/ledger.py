@@ -19,12 +19,11 @@ import msgspec
 
 from skidpad.core.errors import FileError, OutputError
 from skidpad.core.files.names import inside
-from skidpad.core.files.reading import decode_json, read_bytes
 from skidpad.core.text.told import clean
 from skidpad.core.vocabulary import Outcome
 from skidpad.recording.campaign.added_metrics import AddedMetric
 from skidpad.recording.campaign.results import Timing
-from skidpad.recording.files import output_error, write_bytes
+from skidpad.recording.files import output_error, read_json, write_bytes
 
 LEDGER, CAMPAIGN = "ledger.jsonl", "campaign.json"
 SUM = re.compile(rb',"sum":"([0-9a-f]{8})"}$')
@@ -260,11 +259,7 @@ def _is_rest(file: Path) -> bool:
 
 def read_identity(folder: Path) -> dict[str, Any]:
     """Returns campaign.json of a folder; {} when there is none."""
-    path = folder / CAMPAIGN
-    if not path.is_file():
-        return {}
-    identity: dict[str, Any] = decode_json(read_bytes(path, "campaign"), str(path), dict[str, Any])
-    return identity
+    return read_json(folder / CAMPAIGN, dict[str, Any]) or {}
 
 
 def campaign_command(folder: Path) -> str:

@@ -12,6 +12,7 @@ from skidpad.core.errors import FileError
 from skidpad.core.files.reading import decode_json, read_bytes
 from skidpad.core.maths.space import Space, Value
 from skidpad.core.run import RunSpec, run_from_plain
+from skidpad.recording.files import read_json
 
 SEARCH, TRIALS = "search.json", "trials.jsonl"
 FOUND, FAILURES, CHOICES = "found.json", "failures", "failures.xosc"
@@ -183,10 +184,9 @@ S = TypeVar("S", bound=Struct)
 
 def read_stored(out: Path, name: str, kind: type[S]) -> S:
     """Return the value of a JSON file in a folder; FileError where it is missing or damaged."""
-    path = out / name
-    if not path.is_file():
+    found = read_json(out / name, kind, LARGEST)
+    if found is None:
         raise FileError(f"{out} has no {name}: it is no such folder, or was not driven to its end")
-    found: S = decode_json(read_bytes(path, name, LARGEST), str(path), kind)
     return found
 
 
@@ -218,7 +218,7 @@ def failure_folder(out: Path, number: int) -> Path:
 
 def read_hazard(out: Path) -> Hazard | None:
     """Return the hazard that a search began from; None where it began from a scenario."""
-    return read_stored(out, HAZARD, Hazard) if (out / HAZARD).is_file() else None
+    return read_json(out / HAZARD, Hazard, LARGEST)
 
 
 def read_findings(out: Path) -> Findings:

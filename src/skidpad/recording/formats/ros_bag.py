@@ -138,19 +138,7 @@ class _Assembler:
             if self.topics.objects.frame is Frame.EGO:
                 found = found.to_world(ego)
         self.last = t
-        return ChannelFrame(
-            t=t,
-            ego=ego,
-            ego_polygon=self.shape,
-            plan=self._plan(t, ego),
-            objects=found.states,
-            polygons=found.polygons,
-            polygon_size=found.polygon_size,
-            predictions=found.predictions,
-            prediction_t=found.prediction_t,
-            ids=found.ids,
-            classes=found.classes,
-        )
+        return ChannelFrame(t, ego, self.shape, self._plan(t, ego), *found)
 
     def _plan(self, t: float, ego: Floats) -> Floats:
         """Returns the plan at `t` s in the world, times from now; empty where it is old or absent."""

@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import msgspec
-
-from skidpad.core.files.reading import decode_json, read_bytes
-from skidpad.recording.files import write_bytes
+from skidpad.recording.files import read_json, write_json
 
 SEARCHES = "searches.json"
 Searches = dict[str, tuple[str, ...]]  # sentences by the hazard's id
@@ -20,14 +17,9 @@ def read_searches(folder: Path) -> Searches:
     Raises:
         FileError: the file is damaged.
     """
-    path = folder / SEARCHES
-    if not path.is_file():
-        return {}
-    found: Searches = decode_json(read_bytes(path, SEARCHES), str(path), Searches)
-    return found
+    return read_json(folder / SEARCHES, Searches) or {}
 
 
 def add_search(folder: Path, id: str, sentences: Sequence[str]) -> None:
     """Writes what a search around a hazard came to into the folder's file; it replaces an earlier one."""
-    found = read_searches(folder) | {id: tuple(sentences)}
-    write_bytes(folder / SEARCHES, msgspec.json.format(msgspec.json.encode(found)))
+    write_json(folder / SEARCHES, read_searches(folder) | {id: tuple(sentences)})

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TypeVar
 
-import msgspec
 from msgspec import Struct
 
-from skidpad.core.errors import FileError
-from skidpad.recording.files import write_bytes
+from skidpad.recording.files import read_json, write_json
 
 STAGING, JUDGING = "staging.json", "judging.json"
-S = TypeVar("S", bound=Struct)
 
 
 class StagedEvent(Struct, frozen=True, kw_only=True):
@@ -51,22 +47,12 @@ class Staging(Struct, frozen=True, kw_only=True):
 
 def write_staging(folder: Path, staging: Staging) -> None:
     """Write staging.json into a run's folder."""
-    write_bytes(folder / STAGING, msgspec.json.format(msgspec.json.encode(staging)))
+    write_json(folder / STAGING, staging)
 
 
 def read_staging(folder: Path) -> Staging | None:
     """Return the staging of a run; None where it has none, FileError where it cannot be read."""
-    return _read(folder / STAGING, Staging)
-
-
-def _read(path: Path, kind: type[S]) -> S | None:
-    """Return the decoded file; None where it is absent; raises FileError where it is damaged."""
-    if not path.is_file():
-        return None
-    try:
-        return msgspec.json.decode(path.read_bytes(), type=kind)
-    except (OSError, msgspec.DecodeError) as error:
-        raise FileError(f"{path} cannot be read: {error}") from None
+    return read_json(folder / STAGING, Staging)
 
 
 class LeftOut(Struct, frozen=True):
@@ -85,9 +71,9 @@ class Judging(Struct, frozen=True, kw_only=True):
 
 def write_judging(folder: Path, judging: Judging) -> None:
     """Write judging.json into the folder of a run or a campaign."""
-    write_bytes(folder / JUDGING, msgspec.json.format(msgspec.json.encode(judging)))
+    write_json(folder / JUDGING, judging)
 
 
 def read_judging(folder: Path) -> Judging:
     """Return how the runs of a folder are judged; the default where it does not say."""
-    return _read(folder / JUDGING, Judging) or Judging()
+    return read_json(folder / JUDGING, Judging) or Judging()

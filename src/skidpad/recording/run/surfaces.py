@@ -8,10 +8,9 @@ from pathlib import Path
 import msgspec
 
 from skidpad.core.environment.surface import SurfacePatch, present_patches
-from skidpad.core.errors import FileError
 from skidpad.core.files.reading import convert_plain, decode_yaml, read_bytes
 from skidpad.core.weather import Weather
-from skidpad.recording.files import write_bytes
+from skidpad.recording.files import read_json, write_bytes
 
 CONFIG = "config.yaml"  # of a run's folder
 LAID = "surfaces.json"  # in it, where events have laid any
@@ -54,13 +53,7 @@ def write_laid_surfaces(folder: Path, laid: Sequence[LaidSurface]) -> None:
 
 def read_laid_surfaces(folder: Path) -> tuple[LaidSurface, ...]:
     """Returns what events have laid on the road of a stored run; () for nothing, FileError for nonsense."""
-    path = folder / LAID
-    if not path.is_file():
-        return ()
-    try:
-        return msgspec.json.decode(read_bytes(path, "surfaces"), type=tuple[LaidSurface, ...])
-    except msgspec.DecodeError as error:
-        raise FileError(f"{path}: {error}") from None
+    return read_json(folder / LAID, tuple[LaidSurface, ...]) or ()
 
 
 def surface_at(

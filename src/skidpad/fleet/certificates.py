@@ -13,6 +13,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 
 from skidpad.core.errors import OutputError
+from skidpad.fleet.keys import secret_pem
 from skidpad.recording.files import write_bytes, write_secret
 
 VALID = timedelta(days=365)
@@ -39,7 +40,7 @@ def make_certificates(folder: Path, hosts: Sequence[str]) -> list[Path]:
     ).add_extension(_usage(signs=False), critical=True).add_extension(
         x509.AuthorityKeyIdentifier.from_issuer_public_key(ca_key.public_key()), critical=False
     ), ca_key)  # fmt: skip
-    contents = (_pem(authority), _secret(ca_key), _pem(server), _secret(key))
+    contents = (_pem(authority), secret_pem(ca_key), _pem(server), secret_pem(key))
     for name, content in zip(names, contents, strict=True):
         (write_secret if name.endswith(".key") else write_bytes)(folder / name, content)
     return [folder / name for name in names]
@@ -92,12 +93,3 @@ def _sign(builder: x509.CertificateBuilder, key: ec.EllipticCurvePrivateKey) -> 
 def _pem(certificate: x509.Certificate) -> bytes:
     """Returns the certificate as PEM."""
     return certificate.public_bytes(serialization.Encoding.PEM)
-
-
-def _secret(key: ec.EllipticCurvePrivateKey) -> bytes:
-    """Returns the private key as PEM, not encrypted."""
-    return key.private_bytes(
-        serialization.Encoding.PEM,
-        serialization.PrivateFormat.PKCS8,
-        serialization.NoEncryption(),
-    )

@@ -20,9 +20,11 @@ from skidpad.fleet.alerting.relays import Relay
 from skidpad.fleet.blobs import Blobs
 from skidpad.fleet.store.engine import migrate, open_engine, sqlite_url
 from skidpad.fleet.store.intake import Batch, Intake
+from skidpad.fleet.updates import signing
 from skidpad.fleet.updates.repository import Repository
 from skidpad.fleet.warehouse import Warehouse
 from skidpad.fleet.words import Limits
+from skidpad.recording.files import write_bytes
 from skidpad.recording.hazards.records import HazardRecord
 
 
@@ -92,6 +94,17 @@ class Fleet:
     def online_key(self, tenant: str) -> Path:
         """Returns the path of the key that signs when a manufacturer's updates were current."""
         return self.data / "keys" / f"updates-{tenant}.key"
+
+    def begin_updates(self, tenant: str, out: Path) -> None:
+        """Begins a manufacturer's updates; `out` gets the keys of their maker, and root.json to pin.
+
+        Raises ConfigError for a folder about the data, OutputError where they were begun before.
+        """
+        now, offline = self.clock(), signing.make_offline_keys(out, self.data)
+        root = signing.make_root(offline, signing.new_key(self.online_key(tenant)), now)
+        first = signing.empty_targets(offline["targets"][: signing.THRESHOLD], now)
+        self.repository(tenant).begin(root, first)
+        write_bytes(out / "root.json", root)
 
     def close(self) -> None:
         """Commits what was submitted and closes all threads and stores."""

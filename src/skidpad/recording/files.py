@@ -35,7 +35,7 @@ VALUES_MAX = 1_000_000_000  # of a Parquet file
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # disk, quota, limit on the size of a file
 
 
-def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
+def write_atomically(path: Path, write: Callable[[Path], object]) -> None:
     """Lets `write` fill a temporary file beside `path`, then renames it over `path`.
 
     A reader sees the old file or the new one, never a part. OutputError when the disk is full or

@@ -271,9 +271,7 @@ def enrol_fleet(out: Path, n: int) -> tuple[str, str, list[Car]]:
 
     from skidpad.fleet.service import Places, open_fleet
     from skidpad.fleet.store.accounts import add_person, add_vehicle
-    from skidpad.fleet.updates import signing
     from skidpad.fleet.words import Role
-    from skidpad.recording.files import write_bytes
 
     fleet = open_fleet(Places(data=out / "data"))
     now = time.time()
@@ -284,14 +282,9 @@ def enrol_fleet(out: Path, n: int) -> tuple[str, str, list[Car]]:
             cars = [
                 add_vehicle(connection, OPERATORS[k % 2], MAKER, f"V{k + 1}", now) for k in range(n)
             ]
-        tenant = maker.principal.tenant
-        keys = signing.make_offline_keys(out / "offline", out / "data")
-        online = signing.new_key(fleet.online_key(tenant))
-        root = signing.make_root(keys, online, now)
-        fleet.repository(tenant).begin(root, signing.empty_targets(keys["targets"][:2], now))
+        fleet.begin_updates(maker.principal.tenant, out / "offline")
     finally:
         fleet.close()
-    write_bytes(out / "offline" / "root.json", root)
     made = [Car(c.principal.name, c.token, out / "vehicles" / c.principal.name) for c in cars]
     return maker.token, operator.token, made
 

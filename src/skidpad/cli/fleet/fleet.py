@@ -292,26 +292,17 @@ def keys(
 
     Writes the keys and root.json, which vehicles pin, to --out. A maker can begin only once.
     """
-    import time
-
     with fleet_extra():
         from skidpad.fleet.service import open_fleet
         from skidpad.fleet.store.accounts import tenant_id
-        from skidpad.fleet.updates import signing
-    from skidpad.recording.files import write_bytes
 
     service = open_fleet(_places(data, database, None))
     try:
         with service.engine.begin() as connection:
-            tenant = tenant_id(connection, manufacturer, time.time())
-        signers = signing.make_offline_keys(out, data)
-        online = signing.new_key(service.online_key(tenant))
-        root = signing.make_root(signers, online, time.time())
-        first = signing.empty_targets(signers["targets"][: signing.THRESHOLD], time.time())
-        service.repository(tenant).begin(root, first)
+            tenant = tenant_id(connection, manufacturer, service.clock())
+        service.begin_updates(tenant, out)
     finally:
         service.close()
-    write_bytes(out / "root.json", root)
     typer.echo(f"{out / 'root.json'} is what vehicles pin; keep the keys beside it off line")
 
 

@@ -7,21 +7,17 @@ random challenge, the order repeats it, and the vehicle counts the 2 s from its 
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Any
 
-from cryptography.hazmat.primitives import serialization
-from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from sqlalchemy import Connection, select
 from sqlalchemy.exc import IntegrityError
 
-from skidpad.core.errors import FileError
-from skidpad.core.text.told import on_a_line
 from skidpad.fleet.alerting.keeping import alert_of
 from skidpad.fleet.identity import new_id
+from skidpad.fleet.keys import load_key, new_key
 from skidpad.fleet.store.events import add_event, events_of
 from skidpad.fleet.store.rights import visible
 from skidpad.fleet.store.tables import deliveries, orders
@@ -46,34 +42,14 @@ class Signer:
     def __init__(self, folder: Path) -> None:
         """Reads orders.key in the folder, or makes one, and writes orders.pub; FileError for no such key."""
         path = folder / "orders.key"
-        if not path.exists():
-            folder.mkdir(parents=True, exist_ok=True)
-            _write_secret(path, Ed25519PrivateKey.generate())
-        try:
-            key = serialization.load_pem_private_key(path.read_bytes(), None)
-        except (OSError, ValueError, TypeError) as error:
-            raise FileError(f"{path}: is not a private key ({on_a_line(error)})") from error
-        if not isinstance(key, Ed25519PrivateKey):
-            raise FileError(f"{path}: is not an Ed25519 key")
-        self._key = key
-        self.public = key.public_key().public_bytes_raw()
+        self._key = load_key(path) if path.exists() else new_key(path)
+        self.public = self._key.public_key().public_bytes_raw()
         write_bytes(folder / "orders.pub", self.public.hex().encode() + b"\n")
 
     def sign(self, order: dict[str, Any]) -> dict[str, str]:
         """Returns the order as it is sent: its JSON text and the signature of exactly that text, in hex."""
         text = json.dumps(order, sort_keys=True, separators=(",", ":"))
         return {"order": text, "signature": self._key.sign(text.encode()).hex()}
-
-
-def _write_secret(path: Path, key: Ed25519PrivateKey) -> None:
-    """Writes the private key as PEM to a new file that its owner alone may read."""
-    content = key.private_bytes(
-        serialization.Encoding.PEM,
-        serialization.PrivateFormat.PKCS8,
-        serialization.NoEncryption(),
-    )
-    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
-        file.write(content)
 
 
 @dataclass(frozen=True, slots=True)

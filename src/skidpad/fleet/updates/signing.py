@@ -10,14 +10,11 @@ from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any
 
-from cryptography.hazmat.primitives import serialization
-from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from securesystemslib.signer import CryptoSigner
 from tuf.api.metadata import Metadata, Root, TargetFile, Targets
 
-from skidpad.core.errors import ConfigError, FileError, OutputError
-from skidpad.core.text.told import on_a_line
-from skidpad.recording.files import write_secret
+from skidpad.core.errors import ConfigError
+from skidpad.fleet import keys
 
 KEYS, THRESHOLD = 3, 2
 ROOT_VALID = timedelta(days=365)
@@ -31,28 +28,13 @@ def instant(seconds: float) -> datetime:
 
 
 def new_key(path: Path) -> CryptoSigner:
-    """Writes a fresh Ed25519 key to `path` and returns it; OutputError when a file is there already."""
-    if path.exists():
-        raise OutputError(f"{path} exists, and a key is never replaced")
-    key = Ed25519PrivateKey.generate()
-    content = key.private_bytes(
-        serialization.Encoding.PEM,
-        serialization.PrivateFormat.PKCS8,
-        serialization.NoEncryption(),
-    )
-    write_secret(path, content)
-    return CryptoSigner(key)
+    """Writes a fresh key to `path` and returns what signs by it; OutputError as `keys.new_key`."""
+    return CryptoSigner(keys.new_key(path))
 
 
 def load_key(path: Path) -> CryptoSigner:
-    """Returns the Ed25519 key at `path`; FileError when it is none."""
-    try:
-        key = serialization.load_pem_private_key(path.read_bytes(), None)
-    except (OSError, ValueError, TypeError) as error:
-        raise FileError(f"{path}: is not a private key ({on_a_line(error)})") from error
-    if not isinstance(key, Ed25519PrivateKey):
-        raise FileError(f"{path}: is not an Ed25519 key")
-    return CryptoSigner(key)
+    """Returns what signs by the key at `path`; FileError when it is none."""
+    return CryptoSigner(keys.load_key(path))
 
 
 def make_offline_keys(folder: Path, data: Path) -> dict[str, list[CryptoSigner]]:

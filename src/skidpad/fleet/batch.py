@@ -13,10 +13,9 @@ from typing import Annotated, Any
 
 import msgspec
 
-from skidpad.core.text.told import on_a_line
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.fleet.identity import digest
-from skidpad.fleet.words import Limits, Refused
+from skidpad.fleet.words import Limits, Refused, decode_sent
 from skidpad.recording.hazards.records import HazardHead
 from skidpad.recording.hazards.text import HEADER
 
@@ -112,12 +111,7 @@ def _record(text: bytes, start: int, number: int) -> Found:
     line = text[: text.find(b"\n")]
     if not line.startswith(b"H "):
         raise Refused(422, f"record {number} does not begin with a head")
-    try:
-        head = _HEADS.decode(line[2:])
-    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-        raise Refused(
-            422, f"record {number} has an unreadable head ({on_a_line(error)})"
-        ) from error
+    head = decode_sent(_HEADS.decode, line[2:], f"record {number} has an unreadable head")
     _check(head, number)
     x, y = _place(head, text)
     return Found(head, msgspec.json.encode(head).decode(), digest(text), start, len(text), x, y)
@@ -155,10 +149,7 @@ def _place(head: Head, text: bytes) -> tuple[float, float]:
 
 def drive_of(content: bytes) -> BatchDrive:
     """Returns what is read of a drive's summary; Refused (422) when it is none or out of range."""
-    try:
-        drive = _DRIVES.decode(content)
-    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-        raise Refused(422, f"the drive has an unreadable summary ({on_a_line(error)})") from error
+    drive = decode_sent(_DRIVES.decode, content, "the drive has an unreadable summary")
     if not 0.0 <= drive.seconds <= 1.0e6 or len(drive.context) > WORDS_MAX:
         raise Refused(422, f"a drive lasts 0 to 1e6 s, this one {drive.seconds:g}")
     if not _are_words((drive.release, *drive.context, *drive.context.values())):
@@ -173,10 +164,7 @@ def drive_text(drive: BatchDrive) -> str:
 
 def rows_of(content: bytes, limits: Limits) -> list[IndicatorRow]:
     """Returns the rows of a batch of indicators; Refused (413, 422) if one is wrong or they are too many."""
-    try:
-        rows = [_ROWS.decode(line) for line in content.splitlines() if line]
-    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-        raise Refused(422, f"a row of indicators cannot be read ({on_a_line(error)})") from error
+    rows = decode_sent(_ROWS.decode_lines, content, "a row of indicators cannot be read")
     if len(rows) > 100 * limits.records:
         raise Refused(413, f"a batch may hold {100 * limits.records} rows of indicators")
     for row in rows:

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from typing import TypeVar
+
+import msgspec
 
 from skidpad.core.errors import SkidpadError
+from skidpad.core.text.told import on_a_line
+
+T = TypeVar("T")
 
 
 class Role(str, Enum):
@@ -122,3 +129,14 @@ NOT_THERE = "there is no such thing here"  # also of what is another tenant's
 def absent() -> Refused:
     """Returns the refusal of an id that is absent or another tenant's; it does not say which."""
     return Refused(404, NOT_THERE)
+
+
+def decode_sent(decode: Callable[[bytes], T], content: bytes, wrong: str) -> T:
+    """Returns what `decode` makes of JSON that was sent; Refused (422) for what it cannot read.
+
+    wrong: the beginning of the sentence that says so.
+    """
+    try:
+        return decode(content)
+    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
+        raise Refused(422, f"{wrong} ({on_a_line(error)})") from error

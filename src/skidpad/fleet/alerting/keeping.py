@@ -11,12 +11,11 @@ import msgspec
 from msgspec import Meta
 from sqlalchemy import Connection, select
 
-from skidpad.core.text.told import on_a_line
 from skidpad.fleet.identity import digest, new_id
 from skidpad.fleet.store.events import Event, add_event, events_of
-from skidpad.fleet.store.rights import visible
+from skidpad.fleet.store.rights import one_row, visible
 from skidpad.fleet.store.tables import alerts
-from skidpad.fleet.words import Principal, Refused, absent
+from skidpad.fleet.words import Principal, Refused, decode_sent
 
 ESCALATE_AFTER_S = 30.0  # without an acknowledgement; assumption
 LEVELS = 3  # escalations at most
@@ -71,6 +70,9 @@ class AlertText(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     scene: Scene
 
 
+_ALERT = msgspec.json.Decoder(AlertText)
+
+
 @dataclass(frozen=True, slots=True)
 class Alert:
     """An alert and what became of it."""
@@ -101,10 +103,7 @@ class Alert:
             "text": r.text, "scene": json.loads(r.scene), "vehicle_time": r.vehicle_time,
             "at": r.at, "level": self.level, "acknowledged_by": self.acknowledged_by,
             "closed": self.is_closed,
-            "events": [
-                {"what": e.what, "actor": e.actor, "at": e.at, "detail": e.detail}
-                for e in self.events
-            ],
+            "events": [e.plain() for e in self.events],
         }  # fmt: skip
 
 
@@ -112,10 +111,7 @@ def parse_alert(body: bytes) -> AlertText:
     """Returns the alert in a request's body; Refused (413, 422) when it is too long or none."""
     if len(body) > 65536:
         raise Refused(413, "an alert may have 65536 bytes")
-    try:
-        return msgspec.json.decode(body, type=AlertText)
-    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-        raise Refused(422, f"the alert cannot be read ({on_a_line(error)})") from error
+    return decode_sent(_ALERT.decode, body, "the alert cannot be read")
 
 
 def keep_alert(
@@ -150,11 +146,7 @@ def keep_alert(
 
 def alert_of(connection: Connection, who: Principal, alert: str) -> Alert:
     """Returns one alert; Refused (404) when there is none that `who` may see."""
-    row = connection.execute(
-        select(alerts).where(alerts.c.id == alert, visible(who, alerts))
-    ).first()
-    if row is None:
-        raise absent()
+    row = one_row(connection, select(alerts).where(alerts.c.id == alert, visible(who, alerts)))
     return Alert(row, tuple(events_of(connection, [alert])))
 
 
@@ -171,12 +163,10 @@ def alerts_since(connection: Connection, at: float) -> list[Alert]:
 
 
 def _with_events(connection: Connection, rows: Any) -> list[Alert]:
-    """Returns an alert with all its events per row, asked for in chunks of 500 ids."""
+    """Returns an alert with all its events per row."""
     found: dict[str, list[Event]] = {row.id: [] for row in rows}
-    ids = list(found)
-    for first in range(0, len(ids), 500):
-        for event in events_of(connection, ids[first : first + 500]):
-            found[event.subject].append(event)
+    for event in events_of(connection, list(found)):
+        found[event.subject].append(event)
     return [Alert(row, tuple(found[row.id])) for row in rows]
 
 

@@ -19,9 +19,9 @@ from skidpad.fleet.alerting.keeping import alert_of
 from skidpad.fleet.identity import new_id
 from skidpad.fleet.keys import load_key, new_key
 from skidpad.fleet.store.events import add_event, events_of
-from skidpad.fleet.store.rights import visible
+from skidpad.fleet.store.rights import one_row, visible
 from skidpad.fleet.store.tables import deliveries, orders
-from skidpad.fleet.words import Principal, Refused, absent
+from skidpad.fleet.words import Principal, Refused
 from skidpad.recording.files import write_bytes
 
 VALID_S = 2.0
@@ -130,11 +130,7 @@ def note_answer(connection: Connection, who: Principal, order: str, what: str, a
 
     Refused (404) for an order out of sight, (409) when this was told before.
     """
-    row = connection.execute(
-        select(orders).where(orders.c.id == order, visible(who, orders))
-    ).first()
-    if row is None:
-        raise absent()
+    row = one_row(connection, select(orders).where(orders.c.id == order, visible(who, orders)))
     if events_of(connection, [order]):
         raise Refused(409, "what became of this order was told already")
     add_event(connection, (SUBJECT, order), what, (who.id, at))

@@ -11,9 +11,8 @@ from fastapi import APIRouter, Depends, Request, Response
 from msgspec import Meta
 from starlette.concurrency import run_in_threadpool
 
-from skidpad.core.text.told import on_a_line
 from skidpad.fleet.api.guard import Needs, fleet_of
-from skidpad.fleet.api.vehicle import read_body
+from skidpad.fleet.api.vehicle import read_value
 from skidpad.fleet.loop.changes import Proposal, payload_of, propose, re_evaluate
 from skidpad.fleet.loop.plan import Plan
 from skidpad.fleet.loop.rollout import look_at, release, rollout_of, rollouts, trace
@@ -59,19 +58,11 @@ def _bytes(text: str) -> bytes:
         raise Refused(422, "a payload must be base64") from error
 
 
-def _parse_body(body: bytes, type: Any) -> Any:
-    """Returns a JSON body as a value of the type; refuses with 422 what cannot be read as one."""
-    try:
-        return msgspec.json.decode(body, type=type)
-    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
-        raise Refused(422, f"the request cannot be read ({on_a_line(error)})") from error
-
-
 @router.post("/changes")
 async def new_change(request: Request, who: Changer) -> dict[str, str]:
     """Keeps a proposed change with the hazards that led to it, checks its payload; answers its id."""
     fleet = fleet_of(request)
-    text = _parse_body(await read_body(request, fleet.limits), ProposalText)
+    text = await read_value(request, fleet.limits, ProposalText)
     proposal = Proposal(
         kind=text.kind,
         content=_bytes(text.payload),
@@ -102,7 +93,7 @@ async def evaluate(request: Request, who: Changer, change: str) -> list[dict[str
     fleet = fleet_of(request)
     with fleet.engine.connect() as connection:
         trace(connection, who, change)
-    before = _parse_body(await read_body(request, fleet.limits), Before)
+    before = await read_value(request, fleet.limits, Before)
     told = (before.kind, _bytes(before.payload))
     return await run_in_threadpool(re_evaluate, fleet, who, change, told)
 
@@ -118,7 +109,7 @@ def update_list(request: Request, who: Changer) -> Response:
 async def new_release(request: Request, who: Changer) -> dict[str, str]:
     """Publishes a change that was signed off line and starts stage one of its plan; answers the id."""
     fleet = fleet_of(request)
-    text = _parse_body(await read_body(request, fleet.limits), ReleaseText)
+    text = await read_value(request, fleet.limits, ReleaseText)
     targets = _bytes(text.targets)
     id = await run_in_threadpool(release, fleet, who, text.change, targets, text.plan)
     return {"release": id}

@@ -9,15 +9,14 @@ from fastapi import APIRouter, Depends, Query, Request
 from starlette.concurrency import run_in_threadpool
 
 from skidpad.core.environment.localities import RoadKind
-from skidpad.core.text.told import on_a_line
 from skidpad.fleet.api.guard import Needs, fleet_of
-from skidpad.fleet.api.vehicle import read_body
+from skidpad.fleet.api.vehicle import read_value
 from skidpad.fleet.insight.triage import Standing, State, set_standing, subject_key
 from skidpad.fleet.insight.worklist import Severity, Work, WorkFilter, rank_work
 from skidpad.fleet.patterns.analysis import newest_clusters
 from skidpad.fleet.service import CAME, Fleet
 from skidpad.fleet.store.events import events_of
-from skidpad.fleet.words import Action, Principal, Refused, absent
+from skidpad.fleet.words import Action, Principal, absent
 
 Reader = Annotated[Principal, Depends(Needs(Action.READ_TRENDS))]
 Triager = Annotated[Principal, Depends(Needs(Action.TRIAGE))]
@@ -84,10 +83,7 @@ async def set_state(request: Request, who: Triager, subject: str) -> dict[str, A
     """Sets the state of a recurring hazard and keeps the change as an event; 404, 422 when refused."""
     fleet = fleet_of(request)
     await run_in_threadpool(require_subject, fleet, who, subject)
-    try:
-        text = msgspec.json.decode(await read_body(request, fleet.limits), type=TriageText)
-    except (msgspec.MsgspecError, ValueError) as error:
-        raise Refused(422, f"the request cannot be read ({on_a_line(error)})") from error
+    text = await read_value(request, fleet.limits, TriageText)
     return await run_in_threadpool(triage, fleet, who, subject, text)
 
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
+import msgspec
 from fastapi import APIRouter, Depends, Header, Request
 from starlette.concurrency import run_in_threadpool
 
 from skidpad.fleet.api.guard import Needs, fleet_of
 from skidpad.fleet.checking import DRIVE, KEY, TIME_MAX, MessageHead, check_batch
 from skidpad.fleet.store.intake import plain
-from skidpad.fleet.words import Action, Kind, Limits, Principal, Refused
+from skidpad.fleet.words import Action, Kind, Limits, Principal, Refused, decode_sent
+
+T = TypeVar("T")
 
 INLINE = 65536  # bytes of a body that is unpacked at once, without a thread
 Reporter = Annotated[Principal, Depends(Needs(Action.REPORT))]
@@ -60,3 +63,11 @@ async def read_body(request: Request, limits: Limits) -> bytes:
             raise Refused(413, f"a body may have {limits.body} bytes")
         parts.append(part)
     return b"".join(parts)
+
+
+async def read_value(request: Request, limits: Limits, kind: type[T]) -> T:
+    """Returns the request's JSON body as a value of type `kind`; Refused (413, 422) for anything else."""
+    decoder = msgspec.json.Decoder(kind)
+    return decode_sent(
+        decoder.decode, await read_body(request, limits), "the request cannot be read"
+    )

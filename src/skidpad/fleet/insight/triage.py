@@ -13,7 +13,6 @@ from skidpad.fleet.words import Principal, Refused
 
 KIND = "recurring hazard"
 TEXT_MAX = 200  # characters of an owner, a release or a note
-CHUNK = 500  # subjects of one query
 
 
 class State(str, Enum):
@@ -50,13 +49,11 @@ def read_standings(
 ) -> dict[str, Standing]:
     """Returns the standing of each subject that has events of this organisation; others are new."""
     by_key, found = {subject_key(who, s): s for s in subjects}, {}
-    keys = list(by_key)
-    for start in range(0, len(keys), CHUNK):
-        for event in events_of(connection, keys[start : start + CHUNK]):
-            d = event.detail
-            found[by_key[event.subject]] = Standing(
-                State(event.what), d["owner"], d["release"], event.at, event.actor
-            )
+    for event in events_of(connection, list(by_key)):
+        d = event.detail
+        found[by_key[event.subject]] = Standing(
+            State(event.what), d["owner"], d["release"], event.at, event.actor
+        )
     return found
 
 

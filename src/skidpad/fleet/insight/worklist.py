@@ -6,7 +6,6 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
-from itertools import islice
 from typing import Any
 
 from sqlalchemy import Connection, func, select
@@ -14,11 +13,10 @@ from sqlalchemy import Connection, func, select
 from skidpad.core.environment.localities import Locality, Locate, RoadKind
 from skidpad.fleet.insight.precision import Precision, measured_precision
 from skidpad.fleet.insight.triage import Standing, State, read_standings, reopen
-from skidpad.fleet.store.rights import visible
+from skidpad.fleet.store.rights import in_chunks, visible
 from skidpad.fleet.store.tables import drives, hazards
 from skidpad.fleet.words import Principal
 
-CHUNK = 500  # ids of one query
 SEVERE_FROM, NOTABLE_FROM = 0.5, 0.2  # risk; assumption
 
 
@@ -218,8 +216,8 @@ def _read_alarms(connection: Connection, who: Principal, ids: Sequence[str]) -> 
     query = select(
         hazards.c.id, hazards.c.at, hazards.c.head, hazards.c.weather, drives.c.release
     ).outerjoin(drives, there & (hazards.c.drive != ""))
-    found, rest = {}, iter(ids)
-    while some := list(islice(rest, CHUNK)):
+    found = {}
+    for some in in_chunks(ids):
         for row in connection.execute(query.where(visible(who, hazards), hazards.c.id.in_(some))):
             head = json.loads(row.head)
             score = head["extremes"].get("safety_score")

@@ -14,9 +14,10 @@ from skidpad.fleet.patterns.analysis import cluster_row
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.events import add_event
 from skidpad.fleet.store.reading import hazard_row, record_of
+from skidpad.fleet.store.rights import one_row
 from skidpad.fleet.store.tables import changes, evaluations
 from skidpad.fleet.updates.payloads import PayloadKind, payload_name, read_payload_content
-from skidpad.fleet.words import Principal, Refused, absent
+from skidpad.fleet.words import Principal, Refused
 
 SCENES_MAX = 200
 
@@ -60,12 +61,8 @@ def propose(fleet: Fleet, who: Principal, proposal: Proposal) -> str:
 
 def change_row(connection: Connection, who: Principal, change: str) -> Any:
     """Returns the row of a change of the caller's own tenant; Refused (404) where there is none."""
-    row = connection.execute(
-        select(changes).where(changes.c.id == change, changes.c.tenant == who.tenant)
-    ).first()
-    if row is None:
-        raise absent()
-    return row
+    query = select(changes).where(changes.c.id == change, changes.c.tenant == who.tenant)
+    return one_row(connection, query)
 
 
 def payload_of(fleet: Fleet, who: Principal, change: str) -> tuple[PayloadKind, str, bytes]:

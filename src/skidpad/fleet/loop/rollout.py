@@ -52,10 +52,7 @@ class Rollout:
             "release": self.row.id, "change": self.row.change, "payload": self.name,
             "before": self.row.before, "plan": msgspec.to_builtins(self.plan), "at": self.row.at,
             "stage": self.stage, "share": self.share, "ended": self.outcome,
-            "events": [
-                {"what": e.what, "actor": e.actor, "at": e.at, "detail": e.detail}
-                for e in self.events
-            ],
+            "events": [e.plain() for e in self.events],
         }  # fmt: skip
 
 
@@ -225,8 +222,5 @@ def trace(connection: Connection, who: Principal, change: str) -> dict[str, Any]
         "change": row.id, "hazards": hazards, "cluster": row.cluster, "kind": row.kind,
         "payload": row.name, "digest": row.payload, "reason": row.reason, "actor": row.actor,
         "at": row.at, "evaluations": evaluations_of(connection, change), "releases": released,
-        "events": [
-            {"what": e.what, "actor": e.actor, "at": e.at, "detail": e.detail}
-            for e in events_of(connection, [change])
-        ],
+        "events": [e.plain() for e in events_of(connection, [change])],
     }  # fmt: skip

@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
-from itertools import islice
 from typing import Any
 
 import msgspec
@@ -31,12 +30,11 @@ from skidpad.fleet.patterns.clusters import (
 from skidpad.fleet.service import CAME, Fleet
 from skidpad.fleet.store.events import add_event
 from skidpad.fleet.store.reading import record_of
-from skidpad.fleet.store.rights import visible
+from skidpad.fleet.store.rights import in_chunks, one_row, visible
 from skidpad.fleet.store.tables import analyses, clusters, hazards, recurrences, series
-from skidpad.fleet.words import Principal, absent
+from skidpad.fleet.words import Principal
 from skidpad.recording.hazards.records import HazardRecord
 
-CHUNK = 500  # ids of one query
 HAZARDS_MAX = 20_000  # newest hazards that one analysis looks at
 SERVICE = "analysis"  # actor of what nobody asked for
 
@@ -183,13 +181,8 @@ def newest_clusters(connection: Connection, who: Principal) -> list[dict[str, An
 
 def cluster_row(connection: Connection, who: Principal, cluster: str) -> dict[str, Any]:
     """Returns one cluster of an analysis by the same rights; Refused (404) otherwise."""
-    row = connection.execute(
-        select(clusters)
-        .join(analyses, analyses.c.id == clusters.c.analysis)
-        .where(clusters.c.id == cluster, own(who))
-    ).first()
-    if row is None:
-        raise absent()
+    query = select(clusters).join(analyses, analyses.c.id == clusters.c.analysis)
+    row = one_row(connection, query.where(clusters.c.id == cluster, own(who)))
     content: dict[str, Any] = json.loads(row.content)
     return {"id": row.id, "analysis": row.analysis} | content
 
@@ -277,8 +270,7 @@ def read_subjects(connection: Connection, who: Principal, ids: Sequence[str]) ->
         .order_by(recurrences.c.at, recurrences.c.analysis)
     )
     found: dict[str, str] = {}
-    rest = iter(ids)
-    while some := list(islice(rest, CHUNK)):
+    for some in in_chunks(ids):
         rows = connection.execute(query.where(recurrences.c.hazard.in_(some)))
         found |= {row.hazard: row.subject for row in rows}
     return found

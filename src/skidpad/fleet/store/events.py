@@ -9,6 +9,7 @@ from typing import Any
 
 from sqlalchemy import Connection, select
 
+from skidpad.fleet.store.rights import in_chunks
 from skidpad.fleet.store.tables import events
 
 
@@ -23,6 +24,10 @@ class Event:
     actor: str
     at: float  # s, server
     detail: dict[str, Any]
+
+    def plain(self) -> dict[str, Any]:
+        """Returns what became of the fact as plain values for JSON."""
+        return {"what": self.what, "actor": self.actor, "at": self.at, "detail": self.detail}
 
 
 def add_event(
@@ -46,11 +51,10 @@ def add_event(
 
 
 def events_of(connection: Connection, subjects: Sequence[str]) -> list[Event]:
-    """Returns the events of these subjects (ids) in the order in which they were kept."""
-    rows = connection.execute(
-        select(events).where(events.c.subject.in_(list(subjects))).order_by(events.c.number)
-    )
+    """Returns the events of these subjects (ids), those of each in the order in which they were kept."""
+    query = select(events).order_by(events.c.number)
     return [
         Event(r.number, r.subject, r.kind, r.what, r.actor, r.at, json.loads(r.detail))
-        for r in rows
+        for some in in_chunks(subjects)
+        for r in connection.execute(query.where(events.c.subject.in_(some)))
     ]

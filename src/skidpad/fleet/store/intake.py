@@ -18,6 +18,7 @@ from sqlalchemy.exc import DataError, IntegrityError
 from skidpad.fleet.batch import BatchDrive, Found, drive_text, weather_class
 from skidpad.fleet.blobs import Blobs
 from skidpad.fleet.identity import digest, new_id
+from skidpad.fleet.store.rights import in_chunks
 from skidpad.fleet.store.tables import batches, drives, hazards
 from skidpad.fleet.words import MEANWHILE, UNKEPT, Kind, Refused
 
@@ -210,10 +211,9 @@ def _hazard_row(found: Found) -> dict[str, Any]:
 
 def _known_records(connection: Connection, batch: Batch) -> dict[str, str]:
     """Returns the id by digest of those records of the batch that are kept already."""
-    asked = [found.digest for found in batch.found]
     known: dict[str, str] = {}
-    for first in range(0, len(asked), 500):
-        about = {"vehicle": batch.vehicle, "digests": asked[first : first + 500]}
+    for some in in_chunks([found.digest for found in batch.found]):
+        about = {"vehicle": batch.vehicle, "digests": some}
         known.update((kept, id) for kept, id in connection.execute(BY_DIGEST, about))
     return known
 

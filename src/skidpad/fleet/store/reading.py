@@ -11,10 +11,10 @@ from sqlalchemy import Connection, select
 from skidpad.core.errors import FileError
 from skidpad.fleet.blobs import Blobs
 from skidpad.fleet.identity import digest
-from skidpad.fleet.store.rights import visible
+from skidpad.fleet.store.rights import one_row, visible
 from skidpad.fleet.store.tables import batches, hazards
 from skidpad.fleet.unpacking import unpack
-from skidpad.fleet.words import Limits, Principal, absent
+from skidpad.fleet.words import Limits, Principal
 from skidpad.recording.hazards.records import HazardRecord, decode_record
 
 PAGE = 200  # rows of one answer
@@ -46,12 +46,8 @@ def hazard_rows(connection: Connection, who: Principal, wanted: Wanted) -> list[
 
 def hazard_row(connection: Connection, who: Principal, hazard: str) -> dict[str, Any]:
     """Returns one hazard as plain values; Refused (404) when there is none that `who` may see."""
-    row = connection.execute(
-        select(hazards).where(hazards.c.id == hazard, visible(who, hazards))
-    ).first()
-    if row is None:
-        raise absent()
-    return _plain(row)
+    query = select(hazards).where(hazards.c.id == hazard, visible(who, hazards))
+    return _plain(one_row(connection, query))
 
 
 def _plain(row: Any) -> dict[str, Any]:

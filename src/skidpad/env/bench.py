@@ -146,17 +146,7 @@ def main() -> None:
 
 def _episode(make: Callable[[RunSpec], E]) -> E:
     """Returns a long episode of seed 1 at its first tick."""
-    return Episodes(
-        make,
-        map="figure8",
-        weather="icy_30",
-        grip="physical",
-        vehicles=20,
-        traffic="fixed",
-        duration=1000.0,
-        seeds=None,
-        profile="recommended",
-    ).begin(1, None, None)
+    return Episodes(make, weather="icy_30", duration=1000.0).begin(1, None, None)
 
 
 def _us(call: Callable[[], object]) -> float:

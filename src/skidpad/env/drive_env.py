@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any, ClassVar
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import gymnasium
 import numpy as np
@@ -13,13 +12,15 @@ from numpy.typing import NDArray
 
 from skidpad.campaign.runs.run import Run
 from skidpad.core.errors import ConfigError
-from skidpad.core.weather import Weather
 from skidpad.env.ego import EgoEpisode
-from skidpad.env.episodes import Episodes
+from skidpad.env.episodes import Course, Episodes
 from skidpad.env.observation import HIGH, LOW
 from skidpad.env.reward import TERMS, WEIGHTS, weigh
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.world.world import World
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
 class DriveEnv(gymnasium.Env):  # type: ignore[misc]
@@ -55,32 +56,15 @@ class DriveEnv(gymnasium.Env):  # type: ignore[misc]
     def __init__(
         self,
         *,
-        map: str | Path = "figure8",
-        weather: str | Weather = "clear-noon",
-        grip: str = "physical",
-        vehicles: int = 20,
-        traffic: str = "fixed",
-        duration: float = 60.0,
         steers: bool = False,
         rewards: Mapping[str, float] = WEIGHTS,
-        seeds: Sequence[int] | None = None,
-        profile: str = "recommended",
         render_mode: None = None,
+        **course: Unpack[Course],
     ) -> None:
         self.render_mode, self._rewards = render_mode, weigh(rewards)
         self.observation_space = spaces.Box(LOW, HIGH, dtype=np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (2 if steers else 1,), np.float32)
-        self.episodes = Episodes(
-            EgoEpisode,
-            map=map,
-            weather=weather,
-            grip=grip,
-            vehicles=vehicles,
-            traffic=traffic,
-            duration=duration,
-            seeds=seeds,
-            profile=profile,
-        )
+        self.episodes = Episodes(EgoEpisode, **course)
         self._episode: EgoEpisode | None = None
 
     def reset(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypedDict, TypeVar
 
 import numpy as np
 from msgspec import structs
@@ -20,6 +20,19 @@ from skidpad.physics.presets import find_weather
 
 OPTIONS = ("weather", "grip")  # of `reset`
 LONGEST = 2**31 - 1  # of a seed
+
+
+class Course(TypedDict, total=False):
+    """What all environments take; `DriveEnv` says what each is, `Episodes` what it is by default."""
+
+    map: str | Path
+    weather: str | Weather
+    grip: str
+    vehicles: int
+    traffic: str
+    duration: float
+    seeds: Sequence[int] | None
+    profile: str
 
 
 class Episode(Protocol):
@@ -47,14 +60,14 @@ class Episodes(Generic[E]):
         self,
         make: Callable[[RunSpec], E],
         *,
-        map: str | Path,
-        weather: str | Weather,
-        grip: str,
-        vehicles: int,
-        traffic: str,
-        duration: float,
-        seeds: Sequence[int] | None,
-        profile: str,
+        map: str | Path = "figure8",
+        weather: str | Weather = "clear-noon",
+        grip: str = "physical",
+        vehicles: int = 20,
+        traffic: str = "fixed",
+        duration: float = 60.0,
+        seeds: Sequence[int] | None = None,
+        profile: str = "recommended",
     ) -> None:
         if seeds is not None and not len(seeds):
             raise ConfigError("seeds: at least one is needed, or None for any")

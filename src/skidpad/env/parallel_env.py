@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any, ClassVar
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
@@ -12,11 +11,13 @@ from numpy.typing import NDArray
 
 from skidpad.campaign.runs.run import Run
 from skidpad.core.errors import ConfigError, MissingExtra, require_choice
-from skidpad.core.weather import Weather
 from skidpad.env.all_agents import AllAgentsEpisode
-from skidpad.env.episodes import OPTIONS, Episodes
+from skidpad.env.episodes import OPTIONS, Course, Episodes
 from skidpad.env.observation import HIGH, LOW
 from skidpad.env.reward import STUCK, TERMS, WEIGHTS, weigh
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 try:
     from pettingzoo import ParallelEnv
@@ -59,36 +60,19 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
     def __init__(
         self,
         *,
-        map: str | Path = "figure8",
-        weather: str | Weather = "clear-noon",
-        grip: str = "physical",
-        vehicles: int = 20,
-        traffic: str = "fixed",
-        duration: float = 60.0,
         rewards: Mapping[str, float] | None = None,
-        seeds: Sequence[int] | None = None,
-        profile: str = "recommended",
         render_mode: None = None,
+        **course: Unpack[Course],
     ) -> None:
         self.render_mode = render_mode
-        require_choice("traffic", traffic, ("fixed", "pack"))
+        require_choice("traffic", course.get("traffic", "fixed"), ("fixed", "pack"))
         asked = {name: WEIGHTS[name] for name in DRIVEN} if rewards is None else rewards
         for name in asked:
             require_choice("reward term of all agents", name, DRIVEN)
         self._rewards = np.zeros(len(TERMS))
         for k, weight in weigh(asked).items():
             self._rewards[k] = weight
-        self.episodes = Episodes(
-            AllAgentsEpisode,
-            map=map,
-            weather=weather,
-            grip=grip,
-            vehicles=vehicles,
-            traffic=traffic,
-            duration=duration,
-            seeds=seeds,
-            profile=profile,
-        )
+        self.episodes = Episodes(AllAgentsEpisode, **course)
         self._draws = np.random.default_rng()
         self._observed = spaces.Box(LOW, HIGH, dtype=np.float32)
         self._acts = spaces.Box(-1.0, 1.0, (2,), np.float32)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from gymnasium import spaces
@@ -15,11 +14,13 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Flags, Floats
 from skidpad.core.errors import ConfigError
-from skidpad.core.weather import Weather
 from skidpad.env.ego import EgoEpisode
-from skidpad.env.episodes import Episodes
+from skidpad.env.episodes import Course, Episodes
 from skidpad.env.observation import HIGH, LOW, Observations
 from skidpad.env.reward import TERMS, WEIGHTS, weigh
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
 class DriveVectorEnv(VectorEnv):  # type: ignore[misc]
@@ -43,17 +44,10 @@ class DriveVectorEnv(VectorEnv):  # type: ignore[misc]
         self,
         num_envs: int = 1,
         *,
-        map: str | Path = "figure8",
-        weather: str | Weather = "clear-noon",
-        grip: str = "physical",
-        vehicles: int = 20,
-        traffic: str = "fixed",
-        duration: float = 60.0,
         steers: bool = False,
         rewards: Mapping[str, float] = WEIGHTS,
-        seeds: Sequence[int] | None = None,
-        profile: str = "recommended",
         render_mode: None = None,
+        **course: Unpack[Course],
     ) -> None:
         if num_envs < 1:
             raise ConfigError(f"num_envs must be at least 1, got {num_envs}")
@@ -62,17 +56,7 @@ class DriveVectorEnv(VectorEnv):  # type: ignore[misc]
         self.single_action_space = spaces.Box(-1.0, 1.0, (2 if steers else 1,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self.episodes = Episodes(
-            EgoEpisode,
-            map=map,
-            weather=weather,
-            grip=grip,
-            vehicles=vehicles,
-            traffic=traffic,
-            duration=duration,
-            seeds=seeds,
-            profile=profile,
-        )
+        self.episodes = Episodes(EgoEpisode, **course)
         self._rngs = [np.random.default_rng() for _ in range(num_envs)]
         self._present: list[EgoEpisode | None] = [None] * num_envs
         self._over = np.zeros(num_envs, dtype=np.bool_)

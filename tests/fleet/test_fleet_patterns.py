@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec import structs
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import HazardType
@@ -131,7 +132,7 @@ def test_a_series_tells_closing_in_from_nothing():
     assert (close >= 0.0).all()
     assert (close <= 1.0).all()
     assert np.array_equal(from_plain(to_plain(close)), np.round(close, 4))
-    nothing = series_of(replace(record(1), worlds=()))
+    nothing = series_of(structs.replace(record(1), worlds=()))
     assert (nothing[0] == [neutral for _, _, neutral in SIGNALS]).all()
     assert close[:, 0].min() < nothing[:, 0].min()  # time to collision ahead
 

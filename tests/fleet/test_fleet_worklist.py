@@ -6,6 +6,7 @@ import gzip
 import json
 
 import pytest
+from msgspec.structs import replace
 
 from skidpad.cli.fleet.links import open_maps, place_finder
 from skidpad.core.vocabulary import HazardType
@@ -13,7 +14,7 @@ from skidpad.fleet.insight.worklist import rank_work
 from skidpad.fleet.patterns import analysis
 from skidpad.fleet.patterns.analysis import name_subjects, newest_clusters
 from skidpad.fleet.site.work import work_text, work_title
-from support.fleet_world import packed, record, replace
+from support.fleet_world import packed, record
 
 
 def test_many_alarms_that_are_rarely_true_stand_below_few_that_often_are(world):

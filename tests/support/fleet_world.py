@@ -12,7 +12,7 @@ import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
@@ -177,7 +177,6 @@ __all__ = [
     "packed",
     "postgresql_server",
     "record",
-    "replace",
 ]
 
 

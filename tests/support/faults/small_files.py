@@ -215,7 +215,7 @@ CYCLES = 6
 
 def short_record(text: bytes) -> bytes:
     """The first record of a file of hazards with its first cycles only."""
-    from dataclasses import replace
+    from msgspec.structs import replace
 
     from skidpad.recording.hazards.records import decode_record, encode_record
 

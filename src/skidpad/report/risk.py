@@ -22,7 +22,7 @@ from skidpad.recording.campaign.risks import (
     read_risk_found,
 )
 from skidpad.recording.campaign.searches import Trial, read_trials
-from skidpad.report.elements.figures import INK, PALETTE, canvas, svg_of
+from skidpad.report.elements.figures import INK, PALETTE, Chart, Curve, canvas, curves, svg_of
 from skidpad.report.elements.page import (
     REPORT,
     Answer,
@@ -36,6 +36,7 @@ from skidpad.report.elements.page import (
     Text,
     write_report_page,
 )
+from skidpad.report.elements.tables import Column, Format, table
 from skidpad.report.search import law_text
 from skidpad.report.search_sentences import driver_text
 
@@ -89,7 +90,7 @@ def answer(asked: Risk, found: RiskFound) -> str:
             f"No crash of {who} was reached; counting bounds it at {found.high:.2g} per encounter"
         )
         return f"{text}, {given}."
-    ends = f"[{found.low:.2g}, {'no end' if found.high is None else f'{found.high:.2g}'}]"
+    ends = _ends(found.low, found.high)
     if found.why_not:
         return (
             f"Not determined, as {found.why_not}. The best guess for a crash of {who} is {found.p:.2g} "
@@ -119,11 +120,14 @@ def rate_lines(asked: Risk, found: RiskFound) -> list[str]:
 
 def _rate_text(unit: str, rate: Rate, found: RiskFound) -> str:
     """Returns a sentence with the crashes per `unit` and their interval, at the rate of encounters."""
-    high = "no end" if found.high is None else f"{found.high * rate.value:.2g}"
-    return (
-        f"Per {unit}, with {rate.value:g} encounters: {found.p * rate.value:.2g} crashes "
-        f"[{found.low * rate.value:.2g}, {high}]."
-    )
+    times = rate.value
+    ends = _ends(found.low * times, None if found.high is None else found.high * times)
+    return f"Per {unit}, with {times:g} encounters: {found.p * times:.2g} crashes {ends}."
+
+
+def _ends(low: float, high: float | None) -> str:
+    """Returns an interval as text; high: None where there is no upper end."""
+    return f"[{low:.2g}, {'no end' if high is None else f'{high:.2g}'}]"
 
 
 def _answers(asked: Risk, found: RiskFound, trials: Sequence[Trial]) -> Answers:
@@ -177,16 +181,7 @@ def _estimates(found: RiskFound) -> Figure | None:
 
 def _methods(found: RiskFound) -> list[Block]:
     """Returns the table of methods, and a text on subset simulation where it has levels."""
-    columns = [
-        ("method", ""),
-        ("probability", "per encounter"),
-        ("95 % interval", INTERVALS),
-        ("half-width", "upper end over the estimate, less 1"),
-        ("runs", "what the method builds on included"),
-        ("simulated h", ""),
-    ]  # fmt: skip
-    rows = [_method_row(e) for e in found.probabilities]
-    blocks: list[Block] = [Table(columns, rows, caption="by each method")]
+    blocks: list[Block] = [table(METHODS, found.probabilities, "by each method")]
     if found.levels:
         events = ", ".join(f"{level:.2f}" for level in found.levels)
         least = min(found.ancestors)
@@ -203,43 +198,22 @@ def _methods(found: RiskFound) -> list[Block]:
 
 def _branches(repetitions: Sequence[Repetition]) -> list[Block]:
     """Returns how far branches diverge, and what each repetition of splitting went through."""
-    columns = [
-        ("repetition", ""),
-        ("probability", "its own, unbiased estimate"),
-        ("levels", "margins under which its rounds went on"),
-        ("failing", "drives of its end that fail"),
-        ("ancestors", "different first drives from which these stem"),
-        ("runs", ""),
-    ]
-    rows = [
-        [
-            Cell(str(r.number + 1), r.number),
-            Cell(f"{r.p:.2g}", r.p),
-            Cell(", ".join(f"{level:.2f}" for level in r.levels) or "-", len(r.levels)),
-            Cell(str(r.failing), r.failing),
-            Cell(str(r.ancestors), r.ancestors),
-            Cell(str(r.runs), r.runs),
-        ]
-        for r in repetitions
-    ]
     note = (
         "Few ancestors mean that the failures of a repetition have one past in common. The interval "
         "comes from the repetitions, which are independent of each other."
     )
-    table = Table(columns, rows, caption="repetitions of splitting", note=note)
+    rows = table(REPETITIONS, repetitions, "repetitions of splitting", note)
     apart = mean_distances(repetitions)
     if not apart:
-        return [table]
-    with canvas(height=2.6) as (figure, (axes,)):
-        axes.plot([s for s, _ in apart], [d for _, d in apart], "o-", color=PALETTE[0])
-        axes.set_xlabel("s since the branch")
-        axes.set_ylabel("distance, m")
-        picture = Figure(
-            svg_of(figure),
-            "How far the disturbed vehicle of a branch is from where it was in the drive that was left, "
-            "mean over all branches that were still driven.",
-        )
-    return [picture, table]
+        return [rows]
+    seconds, metres = zip(*apart, strict=True)
+    line = Curve("distance", seconds, metres, style={"marker": "o"})
+    picture = Figure(
+        curves([Chart([line], "s since the branch", "distance, m")], height=2.6),
+        "How far the disturbed vehicle of a branch is from where it was in the drive that was left, "
+        "mean over all branches that were still driven.",
+    )
+    return [picture, rows]
 
 
 def mean_distances(repetitions: Sequence[Repetition]) -> list[tuple[int, float]]:
@@ -252,18 +226,36 @@ def mean_distances(repetitions: Sequence[Repetition]) -> list[tuple[int, float]]
     return found
 
 
-def _method_row(e: Probability) -> list[Cell]:
-    """Returns the cells of a method's row; the half-width is a dash without estimate or upper end."""
-    high = "no end" if e.high is None else f"{e.high:.2g}"
-    width = None if e.p == 0.0 or e.high is None else e.high / e.p - 1.0
-    return [
-        Cell(e.method),
-        Cell(f"{e.p:.2g}", e.p),
-        Cell(f"[{e.low:.2g}, {high}]"),
-        Cell("-") if width is None else Cell(f"{width:.0%}", width),
-        Cell(str(e.runs), e.runs),
-        Cell(f"{e.simulated_s / 3600.0:.1f}", e.simulated_s),
-    ]
+def _levels(r: Repetition) -> Cell:
+    """Returns a cell with the levels of a repetition; a dash without any."""
+    return Cell(", ".join(f"{level:.2f}" for level in r.levels) or "-", len(r.levels))
+
+
+def _half_width(e: Probability) -> float | None:
+    """Returns the relative half-width of an estimate; None for 0 or without an upper end."""
+    return None if e.p == 0.0 or e.high is None else e.high / e.p - 1.0
+
+
+TWO_DIGITS = Format(".2g")
+METHODS: tuple[Column[Probability], ...] = (
+    Column("method", lambda e: e.method),
+    Column("probability", lambda e: e.p, "per encounter", format=TWO_DIGITS),
+    Column("95 % interval", lambda e: _ends(e.low, e.high), INTERVALS),
+    Column(
+        "half-width", _half_width, "upper end over the estimate, less 1",
+        format=Format(".0%", absent="-"),
+    ),
+    Column("runs", lambda e: e.runs, "what the method builds on included"),
+    Column("simulated h", lambda e: e.simulated_s / 3600.0, format=Format(".1f")),
+)  # fmt: skip
+REPETITIONS: tuple[Column[Repetition], ...] = (
+    Column("repetition", lambda r: r.number + 1),
+    Column("probability", lambda r: r.p, "its own, unbiased estimate", format=TWO_DIGITS),
+    Column("levels", _levels, "margins under which its rounds went on"),
+    Column("failing", lambda r: r.failing, "drives of its end that fail"),
+    Column("ancestors", lambda r: r.ancestors, "different first drives from which these stem"),
+    Column("runs", lambda r: r.runs),
+)
 
 
 def _inputs(asked: Risk, found: RiskFound) -> Table:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,7 @@ from skidpad.report.elements.page import (
     Text,
     write_report_page,
 )
+from skidpad.report.elements.tables import Column, Format, table
 from skidpad.report.search_sentences import (
     driver_text,
     group_sentence,
@@ -154,55 +156,61 @@ def _failures(
 
 def _failure_table(out: Path, search: Search, failures: Sequence[Trial], caption: str) -> Table:
     """Returns the table of the LISTED likeliest failures; out: folder of the search, for links."""
-    columns = [
-        ("run", "number in the search; a link where the run is kept"),
-        ("contact, km/h", "larger delta-v of the two, else closing speed"),
-        ("at, s", "of the contact, or of the departure"),
-        ("reference", "what the reference driver came to with the same values: least gap, m"),
-        (
-            "bound",
+    likelihood = {t.number: search.space.likelihood(t.values) for t in failures}
+    columns: list[Column[Trial]] = [
+        Column("run", partial(_run, out), "number in the search; a link where the run is kept"),
+        Column(
+            "contact", lambda t: t.contact_kmh, "larger delta-v of the two, else closing speed", "km/h",
+            Format(".1f", absent="-"),
+        ),
+        Column("at", _when, "of the contact, or of the departure", "s", Format(".2f", absent="-")),
+        Column(
+            "reference", _reference_cell,
+            "what the reference driver came to with the same values: least gap, m",
+        ),
+        Column(
+            "bound", lambda t: t.bound or "nothing",
             "what avoids it from the state in which it could be known first: see docs/search.md",
         ),
-        ("likelihood", "density of the values beside that of the likeliest ones"),
-        ("values", "of what varied"),
-    ]
-    likelihood = {t.number: search.space.likelihood(t.values) for t in failures}
+        Column(
+            "likelihood", lambda t: likelihood[t.number],
+            "density of the values beside that of the likeliest ones", format=Format(".3g"),
+        ),
+        Column("values", _values, "of what varied"),
+    ]  # fmt: skip
     ranked = sorted(failures, key=lambda t: -likelihood[t.number])[:LISTED]
-    rows = [_failure_row(out, t, likelihood[t.number]) for t in ranked]
     rest = f"{len(failures)} failures; the likeliest {LISTED} are listed, all in trials.jsonl."
-    return Table(columns, rows, caption=caption, note=rest if len(failures) > LISTED else "")
+    return table(columns, ranked, caption, rest if len(failures) > LISTED else "")
 
 
-def _failure_row(out: Path, trial: Trial, likelihood: float) -> list[Cell]:
-    """Returns the cells of a failure's row, with a link to its report where its folder is kept."""
+def _run(out: Path, trial: Trial) -> Cell:
+    """Returns a cell with a run's number, and a link to its report where its folder is kept."""
     folder = failure_folder(out, trial.number)
     href = folder.relative_to(out).as_posix() + f"/{REPORT}" if folder.is_dir() else ""
-    values = ", ".join(f"{name} {_value(v)}" for name, v in trial.values.items())
-    return [
-        Cell(str(trial.number + 1), trial.number, href=href),
-        _number(trial.contact_kmh, ".1f"),
-        _number(trial.contact_s if trial.departed_s is None else trial.departed_s, ".2f"),
-        _reference_cell(trial.reference),
-        Cell(trial.bound or "nothing"),
-        _number(likelihood, ".3g"),
-        Cell(values),
-    ]
+    return Cell(str(trial.number + 1), trial.number, href=href)
 
 
-def _reference_cell(reference: Trial | None) -> Cell:
+def _when(trial: Trial) -> float | None:
+    """Returns when a run failed, s."""
+    return trial.contact_s if trial.departed_s is None else trial.departed_s
+
+
+def _values(trial: Trial) -> str:
+    """Returns the values of a run as text."""
+    return ", ".join(f"{name} {_value(v)}" for name, v in trial.values.items())
+
+
+def _reference_cell(trial: Trial) -> Cell:
     """Returns a cell on what the reference driver came to with a failure's values: event or gap in m."""
+    reference = trial.reference
     if reference is None or reference.fault:
         return Cell("not driven", -2.0)
     if reference.departed_s is not None:
         return Cell("leaves the road", -1.5)
     if reference.contact_kmh is not None:
         return Cell(f"contact, {reference.contact_kmh:.1f} km/h", -1.0)
-    return _number(reference.min_gap_m, ".2f")
-
-
-def _number(value: float | None, spec: str) -> Cell:
-    """Returns a cell with the number in the format `spec`, a dash for None."""
-    return Cell("-") if value is None else Cell(f"{value:{spec}}", value)
+    gap = reference.min_gap_m
+    return Cell("-") if gap is None else Cell(f"{gap:.2f}", gap)
 
 
 def _progress(trials: Sequence[Trial]) -> Figure:
@@ -292,22 +300,17 @@ def _place(search: Search, name: str, trial: Trial) -> float:
 def _variables(search: Search, trials: Sequence[Trial]) -> Table:
     """Returns the table of variables with distribution, source and influence from 0 to 1."""
     shares = influence(search, trials)
-    columns = [
-        ("variable", "parameter of the scenario, weather, or a field of the weather"),
-        ("distribution", "values are drawn as likely as it says"),
-        ("source", "where it was read"),
-        ("influence", "largest difference of the distributions of failures and other runs, 0 to 1"),
-    ]
-    rows = [
-        [
-            Cell(v.name),
-            Cell(law_text(v)),
-            Cell(v.source or "assumption"),
-            Cell(f"{shares[v.name]:.2f}", shares[v.name]),
-        ]
-        for v in search.space.variables
-    ]
-    return Table(columns, rows, caption="what varied")
+    columns: list[Column[Variable]] = [
+        Column("variable", lambda v: v.name, "parameter of the scenario, weather, or a field of the weather"),
+        Column("distribution", law_text, "values are drawn as likely as it says"),
+        Column("source", lambda v: v.source or "assumption", "where it was read"),
+        Column(
+            "influence", lambda v: shares[v.name],
+            "largest difference of the distributions of failures and other runs, 0 to 1",
+            format=Format(".2f"),
+        ),
+    ]  # fmt: skip
+    return table(columns, search.space.variables, "what varied")
 
 
 def law_text(variable: Variable) -> str:

@@ -32,7 +32,6 @@ from skidpad.cockpit.words import Link
 from skidpad.core.run import AdasDriver, Roads, RunSpec
 from skidpad.pages.server import Server
 from skidpad.physics.presets import preset
-from skidpad.simulation.world.world import BRAKING
 from skidpad.stack.configurations import functions_of
 
 FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run")
@@ -54,9 +53,7 @@ def views(recording: RecordedRun, moments: range) -> dict[str, float]:
         for k in moments:
             truth = recording.moment(k).truth
             begin = time.process_time()
-            images = studio.look(
-                truth.tick, truth.states, truth.lights, truth.commands[:, 1] > BRAKING
-            )
+            images = studio.look(truth)
             plane(images[view.value])
             took.append(1000.0 * (time.process_time() - begin))
         found[view.value] = median(took[2:])

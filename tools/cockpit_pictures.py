@@ -29,7 +29,6 @@ from skidpad.core.run import AdasDriver, Roads, RunSpec
 from skidpad.core.vocabulary import GripModel, RangeModel, SensorLevel
 from skidpad.physics.presets import preset
 from skidpad.sensors.finish.extras import ALL_EXTRAS, NO_EXTRAS, Extra
-from skidpad.simulation.world.world import BRAKING
 from skidpad.stack.configurations import functions_of
 
 WEATHERS = (
@@ -46,8 +45,7 @@ def picture(recording: RecordedRun, weather: str, view: View, extras: frozenset[
     outside = replace(recording.seat(TICK).outside, weather=preset(weather))
     studio = Studio(recording.map, recording.table, outside, recording.spec.seed, extras)
     truth = recording.moment(TICK).truth
-    braking = truth.commands[:, 1] > BRAKING
-    images = studio.look(truth.tick, truth.states, truth.lights, braking)
+    images = studio.look(truth)
     shown = colours(plane(images[view.value]))
     return np.asarray(cv2.resize(shown, SIZE, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 

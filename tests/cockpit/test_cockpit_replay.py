@@ -133,12 +133,13 @@ def test_pictures_are_drawn_again_from_the_poses(driven):
     folder, moments = driven
     recording = RecordedRun(folder)
     studio = Studio(recording.map, recording.table, recording.seat(20).outside, 4)
-    nobody = np.zeros(len(recording.table), dtype=np.bool_)
     tick, states, lights, *_ = moments[20]
+    logged = recording.moment(20).truth
+    logged = replace(logged, tick=tick, commands=np.zeros_like(logged.commands))  # nobody brakes
+    driven_then = replace(logged, states=states, lights=lights)
     for view in (View.SEMANTIC, View.TOP, View.FOLLOW):
-        live = plane(studio.look(tick, states, lights, nobody)[view.value]).copy()
-        logged = recording.moment(20).truth
-        again = plane(studio.look(tick, logged.states, logged.lights, nobody)[view.value])
+        live = plane(studio.look(driven_then)[view.value]).copy()
+        again = plane(studio.look(logged)[view.value])
         # the bodies' pitch is told from what is logged, their roll is not there
         if view is View.SEMANTIC:
             assert np.mean(live == again) > 0.99

@@ -18,12 +18,11 @@ from skidpad.campaign.runs.stored import read_segment
 from skidpad.campaign.user_files import with_kept_map
 from skidpad.cockpit.indicators import every, least_of, ttc_ahead
 from skidpad.cockpit.marks import RADAR_MOUNT
-from skidpad.cockpit.source import Curves, Said, Seat
+from skidpad.cockpit.source import Curves, Said, Seat, Source
 from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame, Context, Decision, TruthFrame
 from skidpad.core.errors import FileError, InputError
 from skidpad.core.frames import RadarPoints, SensorFrame
-from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Outside
 from skidpad.core.run import Route
 from skidpad.core.setup import DT
@@ -80,7 +79,7 @@ class World(NamedTuple):
     mu: float
 
 
-class ChannelSource:
+class ChannelSource(Source):
     """Gives the moments of a recording of channels in any order."""
 
     def __init__(self, path: Path) -> None:
@@ -145,21 +144,6 @@ class ChannelSource:
         """Returns a seat without a person; the weather is that of the recording."""
         del k
         return self._seat
-
-    def crash(self, k: int) -> Pose | None:
-        """Returns None, as contacts are not recorded by moments."""
-        del k
-        return None
-
-    def collisions(self, k: int) -> int:
-        """Returns 0, as channels record no contacts."""
-        del k
-        return 0
-
-    def readings(self, k: int) -> list[tuple[str, str]]:
-        """Returns nothing, as a recording of channels holds no further sensors."""
-        del k
-        return []
 
     def curves(self) -> Curves:
         """Returns speed, time to collision and what the monitor found along the time; tiers are None."""

@@ -15,7 +15,6 @@ from skidpad.cockpit.studio import FOR_PEOPLE, Looks, Studio, View, plane
 from skidpad.cockpit.turn_signals import TurnSignals
 from skidpad.core.setup import DT
 from skidpad.sensors.finish.extras import ALL_EXTRAS, Extra
-from skidpad.simulation.world.world import BRAKING
 
 
 class Companion:
@@ -37,9 +36,7 @@ class Companion:
         mine = source.moment(k)
         truth = mine.truth
         self.studio.change(source.seat(k).outside, extras)
-        braking = truth.commands[:, 1] > BRAKING
-        turns, crash = self._signals.at(truth.tick), source.crash(k)
-        images = self.studio.look(truth.tick, truth.states, truth.lights, braking, crash, turns)
+        images = self.studio.look(truth, source.crash(k), self._signals.at(truth.tick))
         said = {
             "t": round(truth.tick * DT, 2),
             "speed_kmh": hud.motion(mine)["speed_kmh"],

@@ -52,7 +52,10 @@ def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
         told = {
             "kind": "drive",
             "seat": {
-                **hud.seat(desk),
+                **hud.seat(desk.outside, desk.manual, desk.pedals.method.value, desk.switch),
+                "pressed_s": hud.round_value(desk.hands.pressed),
+                "sky": desk.outside.weather.values(),
+                "range": desk.outside.range_model.value,
                 "functions": functions_on(spec, desk),
                 "crowd": crowd(spec, desk),
             },

@@ -22,7 +22,6 @@ from skidpad.cockpit.turn_signals import TurnSignals
 from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.setup import DT
 from skidpad.recording.run.surfaces import read_laid_surfaces, read_run_surface
-from skidpad.simulation.world.world import BRAKING
 
 SHADOW = (0, 0, 0)
 INK, DIM, ACCENT = (240, 240, 240), (190, 180, 170), (82, 133, 255)  # blue, green, red
@@ -88,10 +87,7 @@ def frames(
         moment = source.moment(k)
         studio.change(source.seat(k).outside)
         truth = moment.truth
-        braking = truth.commands[:, 1] > BRAKING
-        crash = source.crash(k)
-        turns = signals.at(truth.tick)
-        images = studio.look(truth.tick, truth.states, truth.lights, braking, crash, turns)
+        images = studio.look(truth, source.crash(k), signals.at(truth.tick))
         picture = colours(plane(images[view.value]))
         seen = marks_of(camera, moment.frame.radar, moment.report, light.mark(camera, moment))
         patches = patch_marks(camera, lying.outlines(truth.tick), truth.states.pose(0))

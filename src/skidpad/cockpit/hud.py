@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.campaign.driving.loop import Moment
-from skidpad.campaign.takeover.desk import Desk
 from skidpad.core.geometry import kmh_from_mps
-from skidpad.core.inputs import Beam
+from skidpad.core.inputs import Beam, LampSwitch, Outside
 from skidpad.core.maths.constants import G
 from skidpad.core.vocabulary import Supervision, Tier
 from skidpad.stack.perception.radar import velocity_limit
@@ -93,20 +92,15 @@ def radar(moment: Moment) -> list[list[float]]:
     return points
 
 
-def seat(desk: Desk) -> dict[str, Any]:
-    """Returns what the person at the desk has set, by the names that the page uses."""
-    beam = desk.outside.beam
+def seat(outside: Outside, manual: bool, method: str, lamps: LampSwitch | None) -> dict[str, Any]:
+    """Returns how the desk stands, by the names that the page uses."""
     return {
-        "manual": desk.manual,
-        "method": desk.pedals.method.value,
-        "pressed_s": round_value(desk.hands.pressed),
-        "functions": None if desk.functions is None else sorted(f.value for f in desk.functions),
-        "lamps": "sun" if desk.switch is None else desk.switch.value,
-        "beam": None if beam is None else Beam(beam).name.lower(),
-        "weather": desk.outside.weather.name,
-        "sky": desk.outside.weather.values(),
-        "grip": desk.outside.grip.value,
-        "range": desk.outside.range_model.value,
+        "manual": manual,
+        "method": method,
+        "lamps": "sun" if lamps is None else lamps.value,
+        "beam": None if outside.beam is None else Beam(outside.beam).name.lower(),
+        "weather": outside.weather.name,
+        "grip": outside.grip.value,
     }
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from skidpad.cockpit import hud
 from skidpad.cockpit.again import drive_again
 from skidpad.cockpit.companion import Companion
 from skidpad.cockpit.feed import Feed
@@ -19,7 +20,6 @@ from skidpad.cockpit.studio import FOR_PEOPLE, MAIN, Looks, View
 from skidpad.cockpit.turn_signals import TurnSignals
 from skidpad.cockpit.words import Link
 from skidpad.core.errors import OutputError, SkidpadError
-from skidpad.core.inputs import Beam
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Bodywork, Scenery
 from skidpad.recording.run.surfaces import read_laid_surfaces, read_run_surface
@@ -161,19 +161,13 @@ class Replayer:
     def _describe_moment(self) -> Shown:
         """Returns what is outside at the present moment and what the page is told of it."""
         seat, link = self.source.seat(self.k), self.link
-        beam = seat.outside.beam
         told = {
             "kind": "replay",
             "seat": {
-                "manual": seat.manual,
-                "method": seat.method,
+                **hud.seat(seat.outside, seat.manual, seat.method, seat.lamps),
                 "functions": None
                 if seat.functions is None
                 else sorted(f.value for f in seat.functions),
-                "lamps": "sun" if seat.lamps is None else seat.lamps.value,
-                "beam": None if beam is None else Beam(beam).name.lower(),
-                "weather": seat.outside.weather.name,
-                "grip": seat.outside.grip.value,
             },
             "rate": link.rate,
             "paused": link.paused,

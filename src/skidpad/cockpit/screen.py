@@ -25,7 +25,6 @@ from skidpad.core.states import ActorTable
 from skidpad.recording.run.surfaces import LaidSurface
 from skidpad.roads.queries import RoadMap
 from skidpad.sensors.finish.extras import Extra
-from skidpad.simulation.world.world import BRAKING
 
 MOST_PER_SECOND = 30.0  # pictures, of wall time
 TOLD_EVENTS = 40
@@ -104,11 +103,8 @@ class Screen(Sink):
         """Draws the views of a moment and writes them to the feed."""
         shown, truth = self.ask(), moment.truth
         self.studio.change(shown.outside, self.link.extras)
-        braking = truth.commands[:, 1] > BRAKING
         turns = None if self.signals is None else self.signals(truth.tick)
-        images = self.studio.look(
-            truth.tick, truth.states, truth.lights, braking, self.crash, turns
-        )
+        images = self.studio.look(truth, self.crash, turns)
         views = [v for v in View if self._is_wanted(v)]
         planes: dict[str, Any] = {v.value: plane(images[v.value]) for v in views}
         if self.beside is not None:

@@ -19,7 +19,6 @@ from skidpad.core.setup import DT
 from skidpad.core.weather import Weather
 from skidpad.sensors.pictures.encodings import cityscapes_colours
 from skidpad.sensors.pictures.overlay import Lens
-from skidpad.simulation.world.world import BRAKING
 
 WIDTH, HEIGHT = 640, 480  # px of one picture in the sheet
 COLUMNS = 3  # of a sheet of one view
@@ -71,11 +70,10 @@ def _pictures(source: Source, k: int, shots: Shots, looks: Looks) -> Iterator[Pi
     outside = source.seat(k).outside
     studio = Studio(source.map, source.table, outside, source.seed, looks=looks)
     truth = source.moment(k).truth
-    braking = truth.commands[:, 1] > BRAKING
     for view in shots.views:
         for weather in shots.weathers or (outside.weather,):
             studio.change(replace(outside, weather=weather))
-            images = studio.look(truth.tick, truth.states, truth.lights, braking, source.crash(k))
+            images = studio.look(truth, source.crash(k))
             title = f"{view.value}, {weather.name}, {truth.tick * DT:.2f} s"
             lens = Lens(weather, source.seed)
             seen = [(images, "")] + [(lens.add_drops(images), ", drops")] * shots.drops

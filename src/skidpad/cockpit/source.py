@@ -58,7 +58,7 @@ class Curves(NamedTuple):
 
 
 class Source(Protocol):
-    """Gives the moments of a run that was driven."""
+    """Gives the moments of a run that was driven; one that logs no contacts or sensors had none."""
 
     folder: Path  # beside which films are written
     map: RoadMap
@@ -90,15 +90,18 @@ class Source(Protocol):
 
     def crash(self, k: int) -> Pose | None:
         """Returns the ego's pose at its contact that is nearest in time; None: there was none."""
-        ...
+        del k
+        return None
 
     def collisions(self, k: int) -> int:
         """Returns how many contacts of the ego there were up to moment k."""
-        ...
+        del k
+        return 0
 
     def readings(self, k: int) -> list[tuple[str, str]]:
         """Returns what further sensors and functions said in moment k: names and numbers as text."""
-        ...
+        del k
+        return []
 
     def curves(self) -> Curves:
         """Returns what is drawn along the time, at about CURVE moments."""

@@ -19,13 +19,14 @@ from skidpad.core.frames import CameraImage
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Outside
 from skidpad.core.specs import CameraSpec, Modality, SensorSpec
-from skidpad.core.states import ActorStates, ActorTable
-from skidpad.core.vocabulary import Bodywork, LightState, Scenery
+from skidpad.core.states import ActorTable, WorldTruth
+from skidpad.core.vocabulary import Bodywork, Scenery
 from skidpad.roads.queries import RoadMap
 from skidpad.scenery.dressing import dress_map
 from skidpad.sensors.finish.extras import ALL_EXTRAS, Extra
 from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.sensors.suite import PixelSettings, PixelSuite
+from skidpad.simulation.world.world import BRAKING
 
 THINNED = 2  # depth and classes are shown at every second pixel
 LOOKED_AT = 0.8  # m, height of what the crash camera looks at
@@ -121,25 +122,24 @@ class Studio:
 
     def look(
         self,
-        tick: int,
-        states: ActorStates,
-        lights: Mapping[int, LightState],
-        braking: NDArray[np.bool_],
+        truth: WorldTruth,
         crash: Pose | None = None,
         indicating: NDArray[np.bool_] | None = None,
     ) -> Mapping[str, CameraImage]:
-        """Returns the images of this moment by word of the view, each drawn when it is read.
+        """Returns the images of a moment by word of the view, each drawn when it is read.
 
         crash: what the crash camera looks at; None: at the ego. indicating: (n, 2) whose left and
         right indicators are lit. Valid until the next call.
         """
-        ego = states.pose(0)
+        ego, braking = truth.states.pose(0), truth.commands[:, 1] > BRAKING
         mount = mount_in(
             ego, watching(Pose(ego.x, ego.y, ego.z, yaw=ego.yaw) if crash is None else crash)
         )
         cameras = self.suite.cameras
         cameras[View.CRASH.value] = replace(cameras[View.CRASH.value], mount=mount)
-        return self.suite.observe(tick, states, lights, braking, indicating).images
+        return self.suite.observe(
+            truth.tick, truth.states, truth.lights, braking, indicating
+        ).images
 
 
 def watching(place: Pose) -> Pose:

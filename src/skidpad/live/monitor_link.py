@@ -16,9 +16,9 @@ import sys
 import tempfile
 import threading
 import time
-from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from queue import Queue
 from typing import Any
 
 import skidpad
@@ -49,9 +49,10 @@ class MonitorLink:
         self._pipe = self.process.stdin.fileno()
         os.set_blocking(self._pipe, False)
         self._await_ready()
-        self._queue = _Queue(self._deliver, settings.capacity)
+        self._waiting: Queue[tuple[int, bytes] | None] = Queue(settings.capacity)  # None: the end
+        self._feeder = threading.Thread(target=self._feed, name="monitor link", daemon=True)
         if settings.flow is Flow.LIVE:
-            self._queue.start()
+            self._feeder.start()
 
     def hear(self, channel: int | None, item: Item) -> None:
         """Gathers an item for the cycle that is under way."""
@@ -65,12 +66,16 @@ class MonitorLink:
         self.cycles += 1
         if self.settings.flow is Flow.LOSSLESS:
             self._deliver(k, content)
-        elif self.ended or not self._queue.offer(k, content):
+        elif self.ended or self._waiting.full():
             self.missing.append(k)
+        else:
+            self._waiting.put_nowait((k, content))
 
     def close(self) -> None:
         """Ends the monitor, waits for it, and writes what became of the link."""
-        self._queue.close()
+        if self.settings.flow is Flow.LIVE:
+            self._waiting.put(None)
+            self._feeder.join()
         self._push(end_mark())
         assert self.process.stdin is not None
         assert self.process.stdout is not None
@@ -90,6 +95,11 @@ class MonitorLink:
             ended=self.ended or "complete",
             isolation=self.isolation,
         )
+
+    def _feed(self) -> None:
+        """Delivers the waiting cycles in order until the end is one of them; in a thread."""
+        for k, content in iter(self._waiting.get, None):
+            self._deliver(k, content)
 
     def _deliver(self, k: int, content: bytes) -> None:
         """Sends the bytes of cycle `k` to the child; notes `k` as missing when they did not arrive."""
@@ -153,49 +163,6 @@ class MonitorLink:
             return
         if code:
             self._on_loss(self._last_words())
-
-
-class _Queue:
-    """Holds cycles that wait for the pipe; a thread takes them there, so that `offer` never waits."""
-
-    def __init__(self, deliver: Callable[[int, bytes], None], capacity: int) -> None:
-        self.deliver, self.capacity = deliver, capacity
-        self.waiting: deque[tuple[int, bytes]] = deque()
-        self.changed = threading.Condition()
-        self.closing = False
-        self.thread: threading.Thread | None = None
-
-    def start(self) -> None:
-        """Starts the thread that takes cycles to the pipe."""
-        self.thread = threading.Thread(target=self._run, name="monitor link", daemon=True)
-        self.thread.start()
-
-    def offer(self, k: int, content: bytes) -> bool:
-        """Queues cycle k; returns False, and keeps nothing, when there is no room."""
-        with self.changed:
-            if len(self.waiting) >= self.capacity:
-                return False
-            self.waiting.append((k, content))
-            self.changed.notify()
-        return True
-
-    def close(self) -> None:
-        """Ends the queue; on return everything that waited has been taken."""
-        with self.changed:
-            self.closing = True
-            self.changed.notify()
-        if self.thread is not None:
-            self.thread.join()
-
-    def _run(self) -> None:
-        """Delivers the waiting cycles in order until the queue is closing and empty; in a thread."""
-        while True:
-            with self.changed:
-                self.changed.wait_for(lambda: bool(self.waiting) or self.closing)
-                if not self.waiting:
-                    return
-                k, content = self.waiting.popleft()
-            self.deliver(k, content)
 
 
 def _start(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from math import cos, sin
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame, Decision
 from skidpad.core.errors import ConfigError, MissingExtra
+from skidpad.live.alarm_tail import AlarmTail
 from skidpad.live.child import ALARMS
 from skidpad.recording.channels.mcap_files import Item
 
@@ -38,8 +38,7 @@ class ScenePublisher:
 
     def __init__(self, channels: Sequence[str], recording: Path, port: int) -> None:
         self.channels = tuple(channels)
-        self.alarms = recording.with_suffix(MONITORED) / ALARMS
-        self.told = 0  # alarms so far
+        self.alarms = AlarmTail(recording.with_suffix(MONITORED) / ALARMS)
         self.context = foxglove.Context()
         self.scene = SceneUpdateChannel(SCENE, context=self.context)
         self.words = {
@@ -68,16 +67,8 @@ class ScenePublisher:
         del k
         self.scene.log(fg.SceneUpdate(entities=self.entities), log_time=round(t * NS))
         self.entities = []
-        for row in self._new_alarms():
+        for row in self.alarms.read():
             self.words[ALARM].log(row, log_time=round(t * NS))
-
-    def _new_alarms(self) -> list[dict[str, Any]]:
-        """Returns the alarms that were written in whole lines to the alarm file since the last call."""
-        if not self.alarms.exists():
-            return []
-        lines = self.alarms.read_text(encoding="utf-8").split("\n")[:-1]  # whole ones
-        new, self.told = lines[self.told :], len(lines)
-        return [json.loads(line) for line in new]
 
     def close(self) -> None:
         """Stops the WebSocket server of the scene."""

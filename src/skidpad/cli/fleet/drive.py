@@ -6,7 +6,6 @@ what came, and asks how fast orders let it go. Neither waits for the network.
 
 from __future__ import annotations
 
-import json
 import secrets
 from collections import deque
 from math import hypot
@@ -20,6 +19,7 @@ from skidpad.core.channels import ChannelFrame, Context
 from skidpad.core.run import RunSpec
 from skidpad.fleet.aboard import Aboard
 from skidpad.fleet.alerting.keeping import AlertText, Body, Kind, Scene
+from skidpad.live.alarm_tail import AlarmTail
 from skidpad.live.child import ALARMS
 from skidpad.live.links import MONITORED
 from skidpad.live.outcome import LinkOutcome, read_outcome
@@ -37,11 +37,10 @@ class Watch:
     """Keeps what the first channel saw of a drive, and raises an alert for each alarm of the monitor."""
 
     def __init__(self, aboard: Aboard, alarms: Path) -> None:
-        self.aboard, self.alarms = aboard, alarms
+        self.aboard, self.alarms = aboard, AlarmTail(alarms)
         self.drive = secrets.token_hex(8)  # names this drive in the keys of its alerts
         self.map = ""
         self._seen: deque[ChannelFrame] = deque(maxlen=KEPT)
-        self._read = 0  # bytes of the alarms
         self._stood = False
 
     def hear(self, channel: int | None, item: Item) -> None:
@@ -65,15 +64,7 @@ class Watch:
 
     def look(self) -> None:
         """Raises an alert for each alarm that was written in full since the last look."""
-        try:
-            with self.alarms.open("rb") as file:
-                file.seek(self._read)
-                content = file.read()
-        except FileNotFoundError:
-            return  # the monitor has not begun
-        lines = content[: content.rfind(b"\n") + 1]
-        self._read += len(lines)
-        for row in map(json.loads, lines.splitlines()):
+        for row in self.alarms.read():
             self._raise(row["cycle"], row["t"], Kind.HAZARD, row["hazard"].replace("_", " "))
 
     def _raise(self, k: int, t: float, kind: Kind, what: str) -> None:

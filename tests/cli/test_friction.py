@@ -6,7 +6,7 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from skidpad.cli.lookup.friction_figure import draw_surface, friction_figure
+from skidpad.cli.lookup.friction_figure import draw_figure, draw_surface
 from skidpad.cli.main import app, main
 from skidpad.core.vocabulary import GripModel
 from skidpad.physics.presets import find_weather
@@ -99,7 +99,8 @@ def panels():
     mpl.use("Agg")
     from matplotlib import pyplot as plt
 
-    figure = friction_figure(0.9)
+    figure = plt.figure()
+    draw_figure(figure, 0.9)
     yield figure.axes
     plt.close(figure)
 

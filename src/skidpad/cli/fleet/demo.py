@@ -21,11 +21,14 @@ from dataclasses import dataclass, field
 from functools import partial
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from msgspec import structs
 
 from skidpad.core.errors import BackendError
+
+if TYPE_CHECKING:
+    from httpx import Client
 
 OPERATORS = ("Red Cabs", "Blue Vans")
 MAKER = "Axle"
@@ -119,14 +122,18 @@ class Demo:
     next_seed: int = SEED
     payloads: dict[str, bytes] = field(default_factory=dict)  # by name, "": what cars come with
 
-    def call(self, token: str, method: str, path: str, body: Any = None) -> Any:
-        """Sends one request with a credential and returns the answer; BackendError unless it is 200."""
+    def client(self, token: str) -> Client:
+        """Returns a connection to the service with a credential."""
         import httpx
 
-        answer = httpx.request(
-            method, self.address + path, headers={"Authorization": f"Bearer {token}"},
-            content=None if body is None else json.dumps(body), timeout=600.0, trust_env=False,
-        )  # fmt: skip
+        headers = {"Authorization": f"Bearer {token}"}
+        return httpx.Client(base_url=self.address, headers=headers, timeout=600.0, trust_env=False)
+
+    def call(self, token: str, method: str, path: str, body: Any = None) -> Any:
+        """Sends one request with a credential and returns the answer; BackendError unless it is 200."""
+        content = None if body is None else json.dumps(body)
+        with self.client(token) as client:
+            answer = client.request(method, path, content=content)
         if answer.status_code != 200:
             raise BackendError(f"{method} {path}: {answer.status_code} {answer.text}")
         return answer
@@ -156,33 +163,24 @@ class Demo:
 
     def install(self, car: Car, name: str) -> None:
         """Fetches an update as a vehicle does, checked by the pinned root; BackendError for another one."""
-        import httpx
-
         from skidpad.fleet.updates.client import UpdateClient
 
-        headers = {"Authorization": f"Bearer {car.token}"}
         root = (self.out / "offline" / "root.json").read_bytes()
-        with httpx.Client(base_url=self.address, headers=headers, trust_env=False) as client:
-            path = UpdateClient(car.folder / "updates", root, partial(client.stream, "GET")).fetch(
-                name
-            )
+        with self.client(car.token) as client:
+            updates = UpdateClient(car.folder / "updates", root, partial(client.stream, "GET"))
+            path = updates.fetch(name)
         if path.read_bytes() != self.payloads[name]:
             raise BackendError(f"{car.name} fetched another update than was signed")
 
     def report(self, car: Car, folder: Path, release: str, judged: tuple[int, int] | None) -> None:
         """Spools and sends what the monitor wrote; BackendError when a batch waits or is refused."""
-        import httpx
-
         from skidpad.fleet.monitored import spool_folder
         from skidpad.fleet.spool import Spool
-        from skidpad.fleet.uploader import TIMEOUT_S, poster, send
+        from skidpad.fleet.uploader import poster, send
 
         spool = Spool(car.folder / "spool")
         spool_folder(spool, folder, release, judged)
-        headers = {"Authorization": f"Bearer {car.token}"}
-        with httpx.Client(
-            base_url=self.address, headers=headers, trust_env=False, timeout=TIMEOUT_S
-        ) as client:
+        with self.client(car.token) as client:
             sent = send(spool, poster(client))
         if sent.waiting or sent.refused:
             raise BackendError(f"{car.name}: {sent.waiting} batches wait, {sent.refused} refused")

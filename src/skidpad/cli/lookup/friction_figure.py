@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 
-from skidpad.cli.output.pictures import format_of, write_picture
+from skidpad.cli.output.pictures import write_figure
 from skidpad.core.geometry import mps_from_kmh
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
@@ -71,26 +70,14 @@ def _speeds(axes: Any, mu_ref: float) -> None:
     axes.grid(alpha=0.3)
 
 
-def friction_figure(mu_ref: float) -> Any:
-    """Returns the figure of four panels; the caller closes it. mu_ref: friction of the dry road."""
-    from matplotlib import pyplot as plt
-
-    figure = plt.figure(figsize=(14.0, 8.6), layout="constrained")
+def draw_figure(figure: Any, mu_ref: float) -> None:
+    """Draws the four panels of both models. mu_ref: friction of the dry road."""
     _curves(figure.add_subplot(2, 2, 1))
     _over_deposits(figure.add_subplot(2, 2, 2))
     draw_surface(figure.add_subplot(2, 2, 3, projection="3d"))
     _speeds(figure.add_subplot(2, 2, 4), mu_ref)
-    return figure
 
 
 def draw(path: Path, mu_ref: float) -> None:
     """Writes the figure of both models; the suffix of `path` chooses the format."""
-    format_of(path)
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt
-
-    figure = friction_figure(mu_ref)
-    try:
-        write_picture(path, lambda part, kind: figure.savefig(part, dpi=80, format=kind))
-    finally:
-        plt.close(figure)
+    write_figure(path, lambda figure: draw_figure(figure, mu_ref), (14.0, 8.6), dpi=80)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from skidpad.core.text.wording import count_text
+
 if TYPE_CHECKING:
     from skidpad.roads.queries import RoadMap
     from skidpad.roads.summary import MapSummary
@@ -146,11 +148,6 @@ def _dead_ends(summary: MapSummary, labels: dict[int, str]) -> str:
     return f"warning: {lanes} nowhere: {ends}"
 
 
-def _count(number: int, noun: str) -> str:
-    """Returns a number of things, one of them in the singular."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
-
-
 def _facts(map: RoadMap, summary: MapSummary) -> list[str]:
     """Returns the facts on a map as lines of text."""
     lengths = ", ".join(
@@ -167,9 +164,9 @@ def _facts(map: RoadMap, summary: MapSummary) -> list[str]:
         f"content hash {map.content_hash}",
         ", ".join(
             (
-                _count(summary.roads, "road"),
-                _count(summary.lanes, "lane"),
-                _count(summary.junctions, "junction"),
+                count_text(summary.roads, "road"),
+                count_text(summary.lanes, "lane"),
+                count_text(summary.junctions, "junction"),
             )
         ),
         f"lanes: {lengths}",

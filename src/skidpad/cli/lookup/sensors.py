@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from skidpad.cli.output.pictures import format_of, write_picture
+from skidpad.cli.output.pictures import write_figure
 from skidpad.core.specs import CameraSpec, RadarSpec
 from skidpad.sensors.published_sensors import twelve_sensors
 
@@ -95,15 +95,4 @@ def _names_by_place() -> dict[tuple[float, float], list[str]]:
 
 def write_layout(path: Path) -> None:
     """Writes the picture of the layout; the suffix of `path` chooses the format."""
-    format_of(path)
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    from matplotlib import pyplot as plt
-
-    figure = plt.figure(figsize=(8.0, 6.0), layout="constrained")
-    draw_layout(figure.add_subplot())
-    try:
-        write_picture(path, lambda part, kind: figure.savefig(part, dpi=100, format=kind))
-    finally:
-        plt.close(figure)
+    write_figure(path, lambda figure: draw_layout(figure.add_subplot()), (8.0, 6.0), dpi=100)

@@ -9,8 +9,10 @@ import typer
 from msgspec import Meta, Struct
 
 from skidpad.cli.options.asked import EgoStack, PlayCross, Tuned
+from skidpad.cli.scenarios.play import play_template
 from skidpad.cli.scenarios.varied import Batches, VariedFile, Vary, scenario_options, vary_scenario
 from skidpad.core.run import RunSpec, Scenario
+from skidpad.core.simulator import BackendChoice
 
 
 class Encounters(Struct, frozen=True):
@@ -55,9 +57,8 @@ def risk(
     from skidpad.search.risk import estimate_risk
 
     exposure = NO_EXPOSURE if encounters.exposure is None else read_exposure(encounters.exposure)
-    template, space = vary_scenario(
-        file, encounters.vary, exposure.variables, cross, ego, run, scenario, tuned
-    )
+    template = play_template(cross, ego, run, scenario, tuned, BackendChoice())
+    template, space = vary_scenario(file, encounters.vary, exposure.variables, template, cross)
     asked = Risk(
         run=template.to_plain(), space=space, per_hour=exposure.per_hour,
         per_100km=exposure.per_100km, repetitions=encounters.repetitions,

@@ -10,8 +10,10 @@ import typer
 from msgspec import Meta, Struct
 
 from skidpad.cli.options.asked import EgoStack, PlayCross, Tuned
+from skidpad.cli.scenarios.play import play_template
 from skidpad.cli.scenarios.varied import Batches, Vary, scenario_options, vary_scenario
 from skidpad.core.run import RunSpec, Scenario
+from skidpad.core.simulator import BackendChoice
 
 if TYPE_CHECKING:
     from skidpad.recording.campaign.searches import Search, Trial
@@ -99,7 +101,8 @@ def search(
         scene = prepare_scene(source, hazard, how.out)
         file, below = scene.varied, (*scene.variables, *below)
     assert file is not None
-    template, space = vary_scenario(file, varied.vary, below, cross, ego, run, scenario, tuned)
+    template = play_template(cross, ego, run, scenario, tuned, BackendChoice())
+    template, space = vary_scenario(file, varied.vary, below, template, cross)
     found = Search(
         run=template.to_plain(), space=space, method=varied.method, objective=varied.objective,
         budget=varied.budget, seed=varied.search_seed,

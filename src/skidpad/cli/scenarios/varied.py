@@ -12,15 +12,14 @@ from msgspec import Meta, Struct
 
 from skidpad.cli.options.campaigns import CORES, Workers
 from skidpad.cli.options.spread import spread_fields
-from skidpad.core.run import RunSpec, Scenario
-from skidpad.core.simulator import BackendChoice
+from skidpad.core.run import RunSpec
 from skidpad.core.vocabulary import SensorLevel
 
 if TYPE_CHECKING:
     from rich.progress import Progress
 
     from skidpad.campaign.workers.worker import Runner
-    from skidpad.cli.options.asked import EgoStack, PlayCross, Tuned
+    from skidpad.cli.options.asked import PlayCross
     from skidpad.core.maths.space import Space, Variable
 
 VariedFile = Annotated[
@@ -68,13 +67,10 @@ def vary_scenario(
     file: Path,
     vary: Sequence[str],
     below: Sequence[Variable],
+    template: RunSpec,
     cross: PlayCross,
-    ego: EgoStack,
-    run: RunSpec,
-    scenario: Scenario,
-    tuned: Tuned,
 ) -> tuple[RunSpec, Space]:
-    """Returns the run that a scenario makes with these options, and what varies in it.
+    """Returns the run that a scenario makes of a template, and what varies in it.
 
     Disturbances vary as well, by their draws.
 
@@ -84,6 +80,8 @@ def vary_scenario(
         ConfigError: nothing varies, a law cannot be read, or several weathers or grips are asked for.
         FileError: the file is missing, cannot be played, or declares no parameter of a name that varies.
     """
+    from skidpad.cli.scenarios.play import play_runs
+    from skidpad.core.errors import ConfigError
     from skidpad.core.maths.space import Space
     from skidpad.search.space import check_space, disturbance_variables, parse_variable
 
@@ -91,7 +89,11 @@ def vary_scenario(
     given = [parse_variable(text) for text in vary]
     names = {v.name for v in given}
     kept = {v.name: v for v in (*of_file, *below) if v.name not in names}
-    template = _template(file, cross, ego, run, scenario, tuned)
+    if len(cross.frictions()[0]) > 1 or "," in cross.weather:
+        raise ConfigError(
+            "a search has one weather and one grip; --vary weather=one|other varies it"
+        )
+    (template,) = play_runs(template, cross, [file], seeds=1)
     named = (*kept.values(), *given)
     if named:
         check_space(Space(named))
@@ -117,27 +119,6 @@ def _read_varied(file: Path) -> tuple[Path, tuple[Variable, ...]]:
         return file, ()
     scenario, space = read_space(file)
     return scenario, space.variables
-
-
-def _template(
-    file: Path,
-    cross: PlayCross,
-    ego: EgoStack,
-    run: RunSpec,
-    scenario: Scenario,
-    tuned: Tuned,
-) -> RunSpec:
-    """Returns the one run that a search varies; raises ConfigError for several weathers or grips."""
-    from skidpad.cli.scenarios.play import play_runs, play_template
-    from skidpad.core.errors import ConfigError
-
-    if len(cross.frictions()[0]) > 1 or "," in cross.weather:
-        raise ConfigError(
-            "a search has one weather and one grip; --vary weather=one|other varies it"
-        )
-    template = play_template(cross, ego, run, scenario, tuned, BackendChoice())
-    (found,) = play_runs(template, cross, [file], seeds=1)
-    return found
 
 
 def _require_parameters(template: RunSpec, space: Space) -> None:

@@ -135,14 +135,14 @@ class Panel:
         made = ui.button(text, icon=icon, on_click=lambda: self.say(word, value))
         self.elements.append(made.props("dense no-caps unelevated").classes(f"say-{word}"))
 
-    def follow(self, name: str, element: Any, read: Callable[[dict[str, Any]], Any]) -> Any:
-        """Lets an element show what `read` finds in the seat, unless it was just moved by hand; returns it.
+    def follow(self, name: str, element: Any) -> None:
+        """Lets an element show what is the case for its control, unless it was just moved by hand.
 
-        name: of the control. A value of None leaves the element as it is.
+        name: of the control. What is not known leaves the element as it is.
         """
 
         def sync(seat: dict[str, Any]) -> None:
-            value = read(seat)
+            value = self._real(name, seat)
             if time.monotonic() - self.touched.get(name, -SETTLES) < SETTLES or value is None:
                 return
             if element.value != value:
@@ -150,7 +150,33 @@ class Panel:
 
         self.syncing.append(sync)
         self.elements.append(element)
-        return element
+
+    def switch(self, name: str, title: str, word: str, value: str) -> None:
+        """Adds a switch that says a word with this value."""
+        made = ui.switch(title, on_change=lambda e: self.apply_change(name, e.value, word, value))
+        self.follow(name, made.props("dense"))
+
+    def select(self, name: str, options: Any, label: str) -> None:
+        """Adds a choice, whose word is its name."""
+        made = ui.select(
+            options,
+            label=label,
+            on_change=lambda e: self.apply_change(name, e.value, name, e.value),
+        )
+        self.follow(name, made.props("dense outlined options-dense"))
+
+    def slider(self, name: str, title: str, low: float, high: float) -> None:
+        """Adds a slider, which acts while it is moved: on a field of the weather, or by its own word."""
+        ui.label(title)
+        slider = ui.slider(min=low, max=high, step=1).props("label dense")
+
+        def on_moved(event: GenericEventArguments) -> None:
+            now = event.args
+            said = ("sky", {name: now}) if name in SLIDERS else (name, now)
+            self.apply_change(name, now, *said)
+
+        slider.on("update:model-value", on_moved, throttle=0.15)
+        self.follow(name, slider)
 
     def apply_change(self, name: str, now: Any, word: str, value: Any) -> None:
         """Says the word of a control that was moved, unless it already shows what is the case.
@@ -168,9 +194,11 @@ class Panel:
         if name in SLIDERS:
             return seat.get("sky", {}).get(name)
         if name.startswith(PICTURE):
-            return name.removeprefix(PICTURE) in self.bridge.told.get("extras", ())
+            return _has(self.bridge.told.get("extras"), name.removeprefix(PICTURE))
         if name in {f.value for f in Function}:
-            return name in (seat.get("functions") or ())
+            return _has(seat.get("functions"), name)
+        if name == "weather":  # one of no name cannot be shown
+            return seat.get(name) if seat.get(name) in all_presets() else None
         return seat.get(name)
 
     def sync(self) -> None:
@@ -236,16 +264,7 @@ def picture_controls(panel: Panel) -> None:
     """Adds switches of what is added to the pictures for people; they do not change the run."""
     with ui.expansion("pictures (G)").props("dense"), ui.element("div").classes("switches"):
         for extra in Extra:
-            extra_switch(panel, extra)
-
-
-def extra_switch(panel: Panel, extra: Extra) -> None:
-    """Draws the switch of one addition to the picture."""
-    name, word = PICTURE + extra.value, extra.value
-    switch = ui.switch(
-        EXTRAS[extra], on_change=lambda e: panel.apply_change(name, e.value, "extra", word)
-    )
-    panel.follow(name, switch.props("dense"), lambda _: _has(panel.bridge.told.get("extras"), word))
+            panel.switch(PICTURE + extra.value, EXTRAS[extra], "extra", extra.value)
 
 
 def part_lines(parts: Sequence[tuple[str, str]]) -> None:
@@ -262,18 +281,12 @@ def drive_controls(panel: Panel) -> None:
     with ui.element("div").classes("switches"):
         own = [FUNCTIONS.get(n) for n, s in FUNCTIONS.sources().items() if s.package == "skidpad"]
         for key, kind in enumerate(own, start=1):
-            function_switch(panel, kind.name, f"{kind.title} ({key})")
+            panel.switch(kind.name, f"{kind.title} ({key})", "toggle", kind.name)
     lamps = ui.toggle(
         [switch.value for switch in LAMP_ORDER],
         on_change=lambda e: panel.apply_change("lamps", e.value, "lamps", e.value),
     ).props("dense no-caps unelevated")
-    panel.follow("lamps", lamps, lambda seat: seat.get("lamps"))
-
-
-def function_switch(panel: Panel, name: str, title: str) -> None:
-    """Draws the switch of one function of our stack."""
-    switch = ui.switch(title, on_change=lambda e: panel.apply_change(name, e.value, "toggle", name))
-    panel.follow(name, switch.props("dense"), lambda seat: _has(seat.get("functions"), name))
+    panel.follow("lamps", lamps)
 
 
 def _has(names: list[str] | None, name: str) -> bool | None:
@@ -285,30 +298,20 @@ def weather_controls(panel: Panel) -> None:
     """Adds the choices of weather and how it acts, and sliders of its fields."""
     titles = {name: one.title or name for name, one in all_presets().items()}
     with ui.element("div").classes("selects"):
-        weather = ui.select(
-            titles,
-            label="weather (N)",
-            on_change=lambda e: panel.apply_change("weather", e.value, "weather", e.value),
-        ).props("dense outlined options-dense")
-        panel.follow("weather", weather, lambda seat: _known_name(seat.get("weather"), titles))
+        panel.select("weather", titles, "weather (N)")
         meaning_line(panel, meaning_of_weather)
         acting_select(panel, "grip", GripModel)
         acting_select(panel, "range", RangeModel)
     with ui.element("div").classes("sliders"):
         if panel.vehicles:
-            crowd_slider(panel)
+            panel.slider("crowd", "vehicles", 0, panel.vehicles)
         for field, title in SLIDERS.items():
-            weather_slider(panel, field, title)
+            panel.slider(field, title, *SHOWN_RANGES.get(field, RANGES[field]))
 
 
 def acting_select(panel: Panel, word: str, kinds: type[Enum]) -> None:
     """Adds the choice of a model by which weather acts: `grip` on tyres, `range` on sight."""
-    select = ui.select(
-        [k.value for k in kinds],
-        label=word,
-        on_change=lambda e: panel.apply_change(word, e.value, word, e.value),
-    )
-    panel.follow(word, select.props("dense outlined options-dense"), lambda seat: seat.get(word))
+    panel.select(word, [k.value for k in kinds], word)
     meaning_line(panel, lambda seat: MEANINGS[word].get(seat.get(word, ""), ""))
 
 
@@ -338,33 +341,3 @@ def describe_weather(weather: Weather, model: GripModel) -> str:
     lies = [f"{depth:.1f} mm of {name}" for name, depth in depths if depth >= 0.05]
     grip = float(mu_at(grip_params(weather, model), SHOWN_SPEED))
     return f"{', '.join(lies) or 'dry road'}; grip {grip:.2f} at 80 km/h"
-
-
-def weather_slider(panel: Panel, field: str, title: str) -> None:
-    """Draws the slider of one field of the weather, which acts while it is moved."""
-    low, high = SHOWN_RANGES.get(field, RANGES[field])
-    ui.label(title)
-    slider = ui.slider(min=low, max=high, step=1).props("label dense")
-
-    def on_moved(event: GenericEventArguments) -> None:
-        panel.apply_change(field, event.args, "sky", {field: event.args})
-
-    slider.on("update:model-value", on_moved, throttle=0.15)
-    panel.follow(field, slider, lambda seat: seat.get("sky", {}).get(field))
-
-
-def crowd_slider(panel: Panel) -> None:
-    """Draws the slider for the number of background vehicles."""
-    ui.label("vehicles")
-    slider = ui.slider(min=0, max=panel.vehicles, step=1).props("label dense")
-
-    def on_moved(event: GenericEventArguments) -> None:
-        panel.apply_change("crowd", event.args, "crowd", event.args)
-
-    slider.on("update:model-value", on_moved, throttle=0.15)
-    panel.follow("crowd", slider, lambda seat: seat.get("crowd"))
-
-
-def _known_name(name: str | None, names: Mapping[str, str]) -> str | None:
-    """Returns the name where it is one of the names, else None."""
-    return name if name in names else None

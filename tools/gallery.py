@@ -92,13 +92,13 @@ def cut_above(entry: Entry, run: Path) -> dict[str, Any]:
     """Returns the stretch of a run from above."""
     from skidpad.campaign.runs.road import load_road
     from skidpad.recording.run.log_files import read_log
-    from skidpad.recording.run.surfaces import read_run_surface
+    from skidpad.recording.run.surfaces import read_surfaces
     from skidpad.report.elements.replay import replay_stretch
 
     log = read_log(run)
     road = load_road(run, log.header)
     mark = entry.begin if entry.mark is None else entry.mark
-    cut = replay_stretch(log, road, entry.begin, entry.end, mark, read_run_surface(run))
+    cut = replay_stretch(log, road, entry.begin, entry.end, mark, read_surfaces(run))
     points = {"points": lidar_points(entry, run)} if entry.lidar else {}
     return {**cut, **points, "label": entry.label}
 

@@ -65,7 +65,8 @@ def test_what_events_lay_is_outlined_from_their_tick_on():
     place = road.at(0, 300.0)
     puddle = SurfacePatch(water_mm=2.0, circle=(place.x, place.y, 4.0))
     ice = SurfacePatch(ice_mm=2.0, circle=(place.x + 20.0, place.y, 4.0))
-    lying = Lying(road, [puddle], (LaidSurface(4, (puddle, ice)), LaidSurface(10, ())))
+    laid = (LaidSurface(0, (puddle,)), LaidSurface(4, (puddle, ice)), LaidSurface(10, ()))
+    lying = Lying(road, laid)
     kinds = [[outline.kind for outline in lying.outlines(tick)] for tick in (0, 3, 4, 9, 10, 2)]
     assert kinds == [["water"], ["water"], ["water", "ice"], ["water", "ice"], [], ["water"]]
 

@@ -54,12 +54,12 @@ def test_a_road_without_a_lane_is_drawn_lane_by_lane():
     assert {o.kind for o in found} == {"snow"}
 
 
-@pytest.mark.parametrize("cut", [lambda log, s: replay(log, ROAD, 5, surface=s),
-                                 lambda log, s: replay_run(log, ROAD, surface=s)])  # fmt: skip
+@pytest.mark.parametrize("cut", [lambda log, s: replay(log, ROAD, 5, laid=s),
+                                 lambda log, s: replay_run(log, ROAD, laid=s)])  # fmt: skip
 def test_a_replay_holds_the_patches_near_the_way(cut):
     log = drive()
     assert "patches" not in cut(log, ())
-    shown = cut(log, [PUDDLE, ICE, FAR])["patches"]
+    shown = cut(log, [LaidSurface(0, (PUDDLE, ICE, FAR))])["patches"]
     assert [kind for kind, _ in shown] == ["water", "ice"]
     corners = np.array(shown[0][1]).reshape(-1, 2) * UNIT
     assert corners.mean(axis=0) == pytest.approx((20.0, 0.0), abs=0.1)
@@ -83,10 +83,11 @@ def test_a_folder_says_its_surface_and_one_without_says_none(tmp_path):
     assert read_run_surface(tmp_path) == ()
 
 
-@pytest.mark.parametrize("cut", [lambda log, laid: replay(log, ROAD, 5, surface=[PUDDLE], laid=laid),
-                                 lambda log, laid: replay_run(log, ROAD, None, [PUDDLE], laid)])  # fmt: skip
+@pytest.mark.parametrize("cut", [lambda log, laid: replay(log, ROAD, 5, laid=laid),
+                                 lambda log, laid: replay_run(log, ROAD, None, laid)])  # fmt: skip
 def test_what_events_lay_is_drawn_while_it_lies_there(cut):
-    laid = (LaidSurface(4, (PUDDLE, ICE)), LaidSurface(10, (ICE,)))
+    later = (LaidSurface(4, (PUDDLE, ICE)), LaidSurface(10, (ICE,)))
+    laid = (LaidSurface(0, (PUDDLE,)), *later)
     shown = cut(drive(), laid)["patches"]
     dt = drive().header.dt
     times = [round(4 * dt, 3), round(10 * dt, 3)]

@@ -23,7 +23,7 @@ from skidpad.core.errors import FileError
 from skidpad.core.run import Scenario
 from skidpad.core.simulator import BackendKind
 from skidpad.recording.run.log_files import log_hash, read_log
-from skidpad.recording.run.surfaces import read_laid_surfaces, read_run_surface, surface_at
+from skidpad.recording.run.surfaces import read_laid_surfaces, read_run_surface, read_surfaces
 from skidpad.scenarios.reading.environment import Environment
 from support.cut_runs import go_on
 from support.scenarios.files import at, event, story, time, write
@@ -89,7 +89,7 @@ def test_an_event_lays_a_surface_and_another_takes_it_away(tmp_path):
     ]
     felt = log.mu[:, 0].max(axis=-1) < 0.2
     for tick in (laid[0].tick - 1, laid[0].tick + 1, laid[1].tick - 1, laid[1].tick + 1):
-        there = surface_at(read_run_surface(out), laid, tick)
+        there = [one.surface for one in read_surfaces(out) if one.tick <= tick][-1]
         assert (there == (ICE,)) == felt[np.searchsorted(log.tick, tick)]
     ego = log.mu[:, 0].max(axis=-1)
     assert run.surface == ()

@@ -22,6 +22,7 @@ from skidpad.core.environment.surface import present_patches
 from skidpad.core.run import AdasDriver, Roads, RunSpec, run_from_plain
 from skidpad.core.setup import DT
 from skidpad.core.states import ActorTable
+from skidpad.recording.run.surfaces import LaidSurface
 from skidpad.simulation.pacing import Pacer
 
 
@@ -68,8 +69,8 @@ def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
 
     stage = stage_of(spec)
     looks = Looks(spec.scenery, spec.bodywork)
-    surface = present_patches(stage.setup.patches, spec.weather.air_temperature_c)
-    screen = Screen(feed, link, stage.map, describe, spec.seed, surface, looks)
+    laid = [LaidSurface(0, present_patches(stage.setup.patches, spec.weather.air_temperature_c))]
+    screen = Screen(feed, link, stage.map, describe, spec.seed, laid, looks)
     time = CockpitPacer(link, screen.show, own_gc=about["own_gc"])
     try:
         driven = drive_at_desk(spec, desk, folder, (screen, time))

@@ -21,7 +21,7 @@ from skidpad.cockpit.studio import FOR_PEOPLE, Looks, Studio, View, plane
 from skidpad.cockpit.turn_signals import TurnSignals
 from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.setup import DT
-from skidpad.recording.run.surfaces import read_laid_surfaces, read_run_surface
+from skidpad.recording.run.surfaces import read_surfaces
 
 SHADOW = (0, 0, 0)
 INK, DIM, ACCENT = (240, 240, 240), (190, 180, 170), (82, 133, 255)  # blue, green, red
@@ -81,7 +81,7 @@ def frames(
     studio = Studio(source.map, source.table, first, source.seed, looks=looks)
     companion = None if other is None else Companion(other, source.tick(0), looks)
     camera, light = studio.suite.cameras[view.value], LightAhead(source.map)
-    lying = Lying(source.map, read_run_surface(source.folder), read_laid_surfaces(source.folder))
+    lying = Lying(source.map, read_surfaces(source.folder))
     signals = TurnSignals(source)
     for k in moments:
         moment = source.moment(k)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -9,12 +10,11 @@ import numpy as np
 
 from skidpad.campaign.driving.loop import Moment
 from skidpad.core.arrays import Floats
-from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.frames import RadarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import CameraSpec, RadarSpec
 from skidpad.core.states import StackReport
-from skidpad.recording.run.surfaces import LaidSurface, surface_at
+from skidpad.recording.run.surfaces import LaidSurface
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.roadside import SignalHead
 from skidpad.roads.surface_outlines import PatchOutline, outline_patches
@@ -75,20 +75,17 @@ def project(camera: CameraSpec, points: Floats, body: Pose = BODY) -> Floats:
 class Lying:
     """Outlines of what lies on a run's road, tick by tick."""
 
-    def __init__(
-        self, map: RoadMap, begin: Sequence[SurfacePatch], laid: Sequence[LaidSurface] = ()
-    ) -> None:
-        """begin: patches before any event; laid: what events lay later."""
-        self.map, self.begin, self.laid = map, begin, laid
+    def __init__(self, map: RoadMap, laid: Sequence[LaidSurface]) -> None:
+        self.map, self.laid = map, laid
         self._outlines: dict[int, Sequence[PatchOutline]] = {}
 
     def outlines(self, tick: int) -> Sequence[PatchOutline]:
         """Returns the outlines of a tick."""
-        since = sum(one.tick <= tick for one in self.laid)
-        if since not in self._outlines:
-            there = surface_at(self.begin, self.laid, tick)
-            self._outlines[since] = outline_patches(self.map, there)
-        return self._outlines[since]
+        n = bisect_right(self.laid, tick, key=lambda one: one.tick)
+        if n not in self._outlines:
+            there = self.laid[n - 1].surface if n else ()
+            self._outlines[n] = outline_patches(self.map, there)
+        return self._outlines[n]
 
 
 def patch_marks(camera: CameraSpec, outlines: Sequence[PatchOutline], ego: Pose) -> list[PatchMark]:

@@ -22,7 +22,7 @@ from skidpad.cockpit.words import Link
 from skidpad.core.errors import OutputError, SkidpadError
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Bodywork, Scenery
-from skidpad.recording.run.surfaces import read_laid_surfaces, read_run_surface
+from skidpad.recording.run.surfaces import read_surfaces
 
 PATIENCE = 0.02  # s between two looks at the words
 FILMS = "films"  # folder within the run's
@@ -67,11 +67,10 @@ class Replayer:
         self.k = 0
         self.note = ""  # what the page is told beside everything else
         self.dt = source.step * DT
-        surface = read_run_surface(source.folder)
+        laid = read_surfaces(source.folder)
         self.screen = Screen(
-            feed, link, source.map, self._describe_moment, source.seed, surface, looks,
-            read_laid_surfaces(source.folder),
-        )  # fmt: skip
+            feed, link, source.map, self._describe_moment, source.seed, laid, looks
+        )
         self.screen.signals = TurnSignals(source).at
         self.screen.begin(source.table)
         if other is not None:

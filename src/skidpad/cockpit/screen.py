@@ -17,7 +17,6 @@ from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.marks import LightAhead, Lying, Marks, marks_of, patch_marks
 from skidpad.cockpit.studio import FOR_PEOPLE, MAIN, Looks, Studio, View, plane
 from skidpad.cockpit.words import Link
-from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Outside
 from skidpad.core.setup import DT
@@ -52,15 +51,11 @@ class Screen(Sink):
         map: RoadMap,
         ask: Callable[[], Shown],
         seed: int = 0,
-        surface: Sequence[SurfacePatch] = (),
-        looks: Looks = FOR_PEOPLE,
         laid: Sequence[LaidSurface] = (),
+        looks: Looks = FOR_PEOPLE,
     ) -> None:
-        """surface: what lies on parts of the road; laid: what events lay there later.
-
-        looks: of the world in the pictures.
-        """
-        self.lying = Lying(map, surface, laid)
+        """laid: on parts of the road; looks: of the world in the pictures."""
+        self.lying = Lying(map, laid)
         self.feed, self.link, self.map, self.ask, self.seed = feed, link, map, ask, seed
         self.looks = looks
         self.shown = self.dropped = self.collisions = 0

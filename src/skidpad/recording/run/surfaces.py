@@ -56,12 +56,6 @@ def read_laid_surfaces(folder: Path) -> tuple[LaidSurface, ...]:
     return read_json(folder / LAID, tuple[LaidSurface, ...]) or ()
 
 
-def surface_at(
-    begin: Sequence[SurfacePatch], laid: Sequence[LaidSurface], tick: int
-) -> Sequence[SurfacePatch]:
-    """Returns what lies on the road in a tick. begin: before the first event; laid: in order."""
-    there = begin
-    for one in laid:
-        if one.tick <= tick:
-            there = one.surface
-    return there
+def read_surfaces(folder: Path) -> tuple[LaidSurface, ...]:
+    """Returns all that lay on the road of a stored run, that of its begin first."""
+    return (LaidSurface(0, read_run_surface(folder)), *read_laid_surfaces(folder))

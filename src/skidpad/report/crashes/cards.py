@@ -15,7 +15,7 @@ from skidpad.evidence.drive.prepared import Drive
 from skidpad.evidence.drive.severity import Contact
 from skidpad.evidence.drive.story import Arrival, Sighting, Story, tell_story
 from skidpad.recording.campaign.folder import snapshot
-from skidpad.recording.run.surfaces import read_laid_surfaces, read_run_surface
+from skidpad.recording.run.surfaces import read_surfaces
 from skidpad.report.crashes.causes import (
     format_gap,
     format_metres,
@@ -79,13 +79,7 @@ def crash_card(crash: Crash, drive: Drive, road_map: RoadMap, run: Path) -> Card
         cause=" ".join(filter(None, (write_cause(story), sentence))),
         events=timeline(story),
         images=pictures(run, crash.t),
-        replay=replay(
-            drive.log,
-            road_map,
-            drive.row(crash.tick),
-            surface=read_run_surface(run),
-            laid=read_laid_surfaces(run),
-        ),
+        replay=replay(drive.log, road_map, drive.row(crash.tick), laid=read_surfaces(run)),
         charts=[] if allowed is None else draw_allowed(allowed, crash.t),
     )
 

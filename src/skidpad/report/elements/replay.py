@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
-from skidpad.core.environment.surface import SurfacePatch
-from skidpad.core.setup import DT
 from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.surfaces import LaidSurface
 from skidpad.roads.lanes import LaneKind
@@ -33,7 +31,6 @@ def replay(
     row: int,
     before_s: float = BEFORE_S,
     after_s: float = AFTER_S,
-    surface: Sequence[SurfacePatch] = (),
     laid: Sequence[LaidSurface] = (),
 ) -> dict[str, Any]:
     """Returns the s around tick row `row` for the page's script, centred on the ego's place there.
@@ -44,14 +41,13 @@ def replay(
     stride = max(round(STEP_S / dt), 1)
     first = max(row - round(before_s / dt) // stride * stride, row % stride)
     rows = np.arange(first, min(row + round(after_s / dt), len(log) - 1) + 1, stride)
-    return _cut_log(log, road_map, rows, row, np.array([row]), surface, laid)
+    return _cut_log(log, road_map, rows, row, np.array([row]), laid)
 
 
 def replay_run(
     log: RunLog,
     road_map: RoadMap,
     mark: int | None = None,
-    surface: Sequence[SurfacePatch] = (),
     laid: Sequence[LaidSurface] = (),
 ) -> dict[str, Any]:
     """Returns a whole run for the page's script, with FRAMES frames at most, lanes along its way.
@@ -60,7 +56,7 @@ def replay_run(
     """
     stride = max(round(STEP_S / log.header.dt), -(-len(log) // FRAMES))
     rows = np.arange(0, len(log), stride)
-    return _cut_log(log, road_map, rows, mark, rows, surface, laid)
+    return _cut_log(log, road_map, rows, mark, rows, laid)
 
 
 def replay_stretch(
@@ -69,14 +65,14 @@ def replay_stretch(
     begin_s: float,
     end_s: float,
     mark_s: float,
-    surface: Sequence[SurfacePatch] = (),
+    laid: Sequence[LaidSurface] = (),
 ) -> dict[str, Any]:
     """Returns the part of a run between two times in s for the page's script; mark_s: shown first."""
     stride = max(round(STEP_S / log.header.dt), 1)
     first, last = np.searchsorted(log.t, (begin_s - 1e-9, end_s + 1e-9))
     rows = np.arange(first, last, stride)
     mark = int(np.argmin(np.abs(log.t[rows] - mark_s)))
-    return _cut_log(log, road_map, rows, int(rows[mark]), rows, surface)
+    return _cut_log(log, road_map, rows, int(rows[mark]), rows, laid)
 
 
 def _cut_log(
@@ -85,8 +81,7 @@ def _cut_log(
     rows: NDArray[np.int64],
     mark: int | None,
     stops: NDArray[np.int64],
-    surface: Sequence[SurfacePatch],
-    laid: Sequence[LaidSurface] = (),
+    laid: Sequence[LaidSurface],
 ) -> dict[str, Any]:
     """Returns these rows of a log for the page's script, lanes and barriers near the places in `stops`.
 
@@ -113,7 +108,7 @@ def _cut_log(
         "frames": frames,
         "lanes": lane_borders(road_map, way),
         "walls": barriers(road_map, way),
-        **patches(road_map, surface, way, laid, log.header.dt),
+        **patches(road_map, laid, way, log.header.dt),
     }
 
 
@@ -181,24 +176,20 @@ def barriers(road_map: RoadMap, way: Floats) -> list[list[int]]:
 
 
 def patches(
-    road_map: RoadMap,
-    surface: Sequence[SurfacePatch],
-    way: Floats,
-    laid: Sequence[LaidSurface] = (),
-    dt: float = DT,
+    road_map: RoadMap, laid: Sequence[LaidSurface], way: Floats, dt: float
 ) -> dict[str, Any]:
     """Returns what lies on the road within reach of a way (n, 3); nothing without a surface.
 
     `patches` holds [kind, [x, y, ...]] of each polygon, from the way's first place; where events have
-    `laid` others, also from and to when it lies there, s.
+    laid others, also from and to when it lies there, s.
     """
-    starts = [0.0, *(one.tick * dt for one in laid)]
+    starts = [one.tick * dt for one in laid]
     found: list[list[Any]] = []
-    for k, lying in enumerate([surface, *(one.surface for one in laid)]):
-        times = [round(t, 3) for t in starts[k : k + 2]] if laid else []
+    for k, lying in enumerate(laid):
+        times = [round(t, 3) for t in starts[k : k + 2]] if len(laid) > 1 else []
         found += [
             [outline.kind, _whole(outline.corners[:, :2] - way[0, :2]), *times]
-            for outline in outline_patches(road_map, lying)
+            for outline in outline_patches(road_map, lying.surface)
             if _near(outline.corners, way).any()
             or _near(outline.corners.mean(axis=0)[None], way)[0]
         ]

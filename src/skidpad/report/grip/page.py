@@ -14,7 +14,7 @@ from skidpad.evidence.grip.study import ORIGINAL, REDUCED, Share, completion, co
 from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.recording.campaign.grip import read_stopping
 from skidpad.recording.run.log_files import read_log
-from skidpad.recording.run.surfaces import read_laid_surfaces, read_run_surface
+from skidpad.recording.run.surfaces import read_surfaces
 from skidpad.report.elements.page import (
     Answer,
     Answers,
@@ -219,8 +219,6 @@ def _card(campaign: GripCampaign, run: pl.DataFrame, role: str) -> list[Card]:
             title=f"{row['friction']} friction, {role} run: {row['outcome']}",
             subtitle=f"{name}, around {log.t[at]:.1f} s",
             facts=facts,
-            replay=replay(
-                log, road_map, at, surface=read_run_surface(folder), laid=read_laid_surfaces(folder)
-            ),
+            replay=replay(log, road_map, at, laid=read_surfaces(folder)),
         )
     ]

@@ -17,7 +17,7 @@ from skidpad.evidence.verdicts import Judgement, Verdict
 from skidpad.recording.campaign.folder import CampaignFolder
 from skidpad.recording.campaign.threshold import THRESHOLD, ThresholdEntry
 from skidpad.recording.run.log_files import read_log
-from skidpad.recording.run.surfaces import read_laid_surfaces, read_run_surface
+from skidpad.recording.run.surfaces import read_surfaces
 from skidpad.report.elements.campaign import CampaignView
 from skidpad.report.elements.page import (
     Answer,
@@ -286,5 +286,5 @@ def _card(campaign: ThresholdMap, s: Situation, run: pl.DataFrame) -> list[Card]
     if row["impact_kmh"] is not None:
         facts.append(("closing speed", f"{row['impact_kmh']:.0f} km/h"))
     at = len(log) - 1
-    shown = replay(log, road, at, surface=read_run_surface(folder), laid=read_laid_surfaces(folder))
+    shown = replay(log, road, at, laid=read_surfaces(folder))
     return [Card(title(s), f"{name}, at {log.t[at]:.1f} s", facts=facts, replay=shown)]

@@ -16,7 +16,7 @@ from skidpad.evidence.pairs import EGO, following, together
 from skidpad.evidence.play_verdicts import Counterpart
 from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.log_files import read_log
-from skidpad.recording.run.surfaces import read_laid_surfaces, read_run_surface
+from skidpad.recording.run.surfaces import read_surfaces
 from skidpad.report.elements.page import Card, Figure, anchor
 from skidpad.report.elements.replay import replay_run
 from skidpad.report.elements.timeline import Mark, Strip, timelines
@@ -55,8 +55,7 @@ def run_card(run: PlayRun, out: Path) -> Card:
             log,
             road,
             None if at is None else min(at, len(log) - 1),
-            read_run_surface(run.folder),
-            read_laid_surfaces(run.folder),
+            read_surfaces(run.folder),
         ),
         charts=[chart(run, log)],
         id=run_anchor(run),

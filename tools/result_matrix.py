@@ -16,7 +16,7 @@ from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.recording.campaign.folder import CampaignFolder
 from skidpad.recording.campaign.matrix import MatrixEntry
 from skidpad.recording.campaign.quantities import name_of
-from skidpad.report.matrix.data import Matrix, config_title, rate_by_seed, weather_title
+from skidpad.report.matrix.data import Matrix, config_title, mean_of, rate_by_seed, weather_title
 from skidpad.report.matrix.tables import METRICS
 
 COUNTS = {
@@ -152,5 +152,5 @@ def _per_100_km(runs: pl.DataFrame, column: str) -> Rate | None:
 
 
 def _speed(matrix: Matrix, config: str, weather: str | None = None) -> str:
-    speed = matrix.mean("mean_speed_kmh", config, weather)
+    speed = mean_of(matrix.cell(config, weather), "mean_speed_kmh")
     return "no run" if speed is None else f"{speed:.1f}"

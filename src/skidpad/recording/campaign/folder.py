@@ -66,8 +66,10 @@ class CampaignFolder(Generic[E]):
         """Returns the names of the runs by these columns of their keys."""
         return {tuple(getattr(e.key, c) for c in columns): e.run for e in self.entries}
 
-    def log(self, run: str) -> Path | None:
-        """Returns the folder of the log of the run of this name; None when it was not kept."""
+    def log(self, run: str | None) -> Path | None:
+        """Returns the folder of the log of the run of this name; None without a name or a log."""
+        if run is None:
+            return None
         folder = inside(self.path / RUNS, run)
         return folder if (folder / TICKS).is_file() else None
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any, ClassVar, Generic
 
 import msgspec
@@ -18,7 +19,11 @@ from skidpad.recording.campaign.ledger import E
 from skidpad.recording.campaign.quantities import ENDINGS, NAMES, unit_of
 from skidpad.recording.campaign.results import Columns, definitions_of
 from skidpad.recording.fingerprint import reach_text
+from skidpad.recording.run.log import RunLog
+from skidpad.recording.run.log_files import read_log
 from skidpad.report.elements.page import Block, Code, Definitions, Text, words
+from skidpad.roads.bundled import kept_map
+from skidpad.roads.queries import RoadMap
 
 NAMED = 5  # runs
 CLOCKS = {
@@ -87,6 +92,11 @@ class CampaignView(Generic[E]):
     def names(self, runs: pl.DataFrame) -> list[str | None]:
         """Returns the names of these runs; None for one that the ledger does not know."""
         return [self._run_names.get(key) for key in runs.select(self.columns.sort).rows()]
+
+    def log(self, folder: Path) -> tuple[RunLog, RoadMap]:
+        """Returns the log in a run's folder, and the map on which it was driven."""
+        log = read_log(folder)
+        return log, kept_map(self.folder.path, log.header.map, log.header.map_hash)
 
     def values(self, column: str) -> str:
         """Returns the different values of a column, sorted, as text with commas."""

@@ -13,7 +13,6 @@ from skidpad.evidence.grip.findings import FINDINGS
 from skidpad.evidence.grip.study import ORIGINAL, REDUCED, Share, completion, completion_p
 from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.recording.campaign.grip import read_stopping
-from skidpad.recording.run.log_files import read_log
 from skidpad.recording.run.surfaces import read_surfaces
 from skidpad.report.elements.page import (
     Answer,
@@ -39,7 +38,6 @@ from skidpad.report.grip import figures as grip_figures
 from skidpad.report.grip import tables as grip_tables
 from skidpad.report.grip.data import GripCampaign, load_grip, scenario_title
 from skidpad.report.grip.weathers import rain_tables, weather_blocks
-from skidpad.roads.bundled import kept_map
 
 ALPHA = 0.05
 LEAD = """Every run was driven twice with the same seed: once with the weather only seen, and once with \
@@ -203,11 +201,10 @@ def _card(campaign: GripCampaign, run: pl.DataFrame, role: str) -> list[Card]:
     """Returns the card of a run (one row) with a replay; empty without its log."""
     row = run.row(0, named=True)
     (name,) = campaign.names(run)
-    folder = None if name is None else campaign.folder.log(name)
+    folder = campaign.folder.log(name)
     if folder is None:
         return []
-    log = read_log(folder)
-    road_map = kept_map(campaign.folder.path, log.header.map, log.header.map_hash)
+    log, road_map = campaign.log(folder)
     x, y = log.actors.x, log.actors.y
     gaps = np.hypot(x[:, 1:] - x[:, :1], y[:, 1:] - y[:, :1]).min(axis=1)
     at = len(log) - 1 if log.contacts else int(np.argmin(gaps))

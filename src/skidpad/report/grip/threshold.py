@@ -16,7 +16,6 @@ from skidpad.evidence.grip.threshold import JUDGED, Situation, situations
 from skidpad.evidence.verdicts import Judgement, Verdict
 from skidpad.recording.campaign.folder import CampaignFolder
 from skidpad.recording.campaign.threshold import THRESHOLD, ThresholdEntry
-from skidpad.recording.run.log_files import read_log
 from skidpad.recording.run.surfaces import read_surfaces
 from skidpad.report.elements.campaign import CampaignView
 from skidpad.report.elements.page import (
@@ -39,7 +38,6 @@ from skidpad.report.elements.tables import Column, Format, Quantity, table
 from skidpad.report.elements.verdicts import least_seeds_text, seeds_text
 from skidpad.report.grip.tables import share
 from skidpad.report.grip.threshold_figures import curve_figures, map_figure
-from skidpad.roads.bundled import kept_map
 
 DRIVERS = {"acc": "ACC", "aeb": "AEB alone", "camera": "Camera"}
 SHARE = Format(".0f", ".0f", "no run")
@@ -277,11 +275,10 @@ def _replays(campaign: ThresholdMap) -> list[Block]:
 def _card(campaign: ThresholdMap, s: Situation, run: pl.DataFrame) -> list[Card]:
     """Returns the replay card of a situation's run, of one row; empty where the run or its log is missing."""
     (name,) = campaign.names(run)
-    folder = None if name is None else campaign.folder.log(name)
+    folder = campaign.folder.log(name)
     if folder is None:
         return []
-    row, log = run.row(0, named=True), read_log(folder)
-    road = kept_map(campaign.folder.path, log.header.map, log.header.map_hash)
+    row, (log, road) = run.row(0, named=True), campaign.log(folder)
     facts = [("friction", f"{row['road_mu']:.2g}")]
     if row["impact_kmh"] is not None:
         facts.append(("closing speed", f"{row['impact_kmh']:.0f} km/h"))

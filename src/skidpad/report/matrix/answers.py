@@ -65,7 +65,7 @@ def _next_command(matrix: Matrix) -> str:
     runs = matrix.finished.filter(pl.col("config").is_in(matrix.comparison_configs))
     runs = runs.sort(EVENTS, "config", "weather", "seed", descending=[True, *[False] * 3])
     for name, crashes in zip(matrix.names(runs), runs[EVENTS], strict=True):
-        folder = None if name is None else matrix.folder.log(name)
+        folder = matrix.folder.log(name)
         if folder is not None:
             with_crashes = f"the run with {count_text(crashes or 0, EVENT, EVENTS)}"
             told = with_crashes if crashes else f"a run without a {EVENT}"

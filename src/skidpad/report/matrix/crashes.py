@@ -13,7 +13,6 @@ from skidpad.evidence.contrasts import drive_hash
 from skidpad.evidence.drive.collisions import shown_crashes
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.recording.campaign.folder import snapshot
-from skidpad.recording.run.log_files import read_log
 from skidpad.report.crashes.cards import Found, crash_card, headline, severity, thumbnail_uri
 from skidpad.report.elements.page import (
     Block,
@@ -26,7 +25,6 @@ from skidpad.report.elements.page import (
     write_page,
 )
 from skidpad.report.matrix.data import Matrix, config_title, weather_title
-from skidpad.roads.bundled import kept_map
 
 CARDS = "cards"
 INLINE = 3  # per cell
@@ -144,8 +142,7 @@ def _crashes(matrix: Matrix, name: str) -> Iterator[Found]:
     """Yields the crashes in a run's log with drive, map and folder; nothing without the log."""
     run = matrix.folder.log(name)
     if run is not None:
-        log = read_log(run)
-        road_map = kept_map(matrix.folder.path, log.header.map, log.header.map_hash)
+        log, road_map = matrix.log(run)
         drive = prepare(log, road_map)
         yield from ((crash, drive, road_map, run) for crash in shown_crashes(drive))
 

@@ -246,15 +246,6 @@ class Matrix(CampaignView[MatrixEntry]):
         """Returns the events of `column` per run of a cell; None without finished runs."""
         return rate_by_seed(self.cell(config, weather), column)
 
-    def rate_within(self, column: str, config: str, group: WeatherGroup) -> Rate | None:
-        """Returns the events of `column` per run in a group of weathers, each drive once; or None."""
-        return rate_by_seed(self.within(config, group), column)
-
-    def mean(self, column: str, config: str, weather: str | None = None) -> float | None:
-        """Returns the mean of `column` over the runs of a cell; None without values."""
-        values = self.cell(config, weather)[column].drop_nulls()
-        return float(values.mean()) if len(values) else None  # type: ignore[arg-type]
-
     @cached_property
     def seeds(self) -> int:
         """Returns the number of different seeds over all cells."""
@@ -294,6 +285,12 @@ def rate_by_seed(runs: pl.DataFrame, column: str) -> Rate | None:
         return None
     seeds = known.group_by("seed", maintain_order=True).agg(pl.col(column).sum(), drives=pl.len())
     return event_rate(seeds[column].to_list(), seeds["drives"].cast(pl.Float64).to_list())
+
+
+def mean_of(runs: pl.DataFrame, column: str) -> float | None:
+    """Returns the mean of `column` over runs; None without values."""
+    values = runs[column].drop_nulls()
+    return float(values.mean()) if len(values) else None  # type: ignore[arg-type]
 
 
 def load_matrix(folder: Path) -> Matrix:

@@ -24,6 +24,7 @@ from skidpad.report.matrix.data import (
     Matrix,
     WeatherGroup,
     config_title,
+    mean_of,
     rate_by_seed,
 )
 from skidpad.report.matrix.tables import METRICS
@@ -95,9 +96,8 @@ def speed_figure(matrix: Matrix) -> Figure:
         for group in matrix.weather_groups:
             runs = matrix.within(config, group)
             rate = rate_by_seed(runs, EVENTS)
-            speeds = runs["mean_speed_kmh"].drop_nulls()
-            if rate is not None and len(speeds):
-                mean = float(speeds.mean())  # type: ignore[arg-type]
+            mean = mean_of(runs, "mean_speed_kmh")
+            if rate is not None and mean is not None:
                 points[config, group] = ([mean], [rate.rate])
     caption = (
         f"{EVENTS.capitalize()} against mean speed: the colour is the configuration, the mark the "
@@ -165,8 +165,5 @@ def _rates(name: str, rates: Sequence[Rate | None]) -> Series:
 
 def _means(matrix: Matrix, config: str, column: str, name: str) -> Series:
     """Returns a series of means of `column`, one per group of weathers; None without values."""
-    means: list[float | None] = []
-    for group in matrix.weather_groups:
-        values = matrix.within(config, group)[column].drop_nulls()
-        means.append(float(values.mean()) if len(values) else None)  # type: ignore[arg-type]
-    return Series(name, means)
+    groups = matrix.weather_groups
+    return Series(name, [mean_of(matrix.within(config, group), column) for group in groups])

@@ -20,7 +20,7 @@ def reading_blocks(matrix: Matrix) -> list[Block]:
     first = matrix.results.sort("seed").unique(["config", "weather"], keep="first")
     first = first.sort("config", "weather")
     for run, name in zip(first.iter_rows(named=True), matrix.names(first), strict=True):
-        folder = None if name is None else matrix.folder.log(name)
+        folder = matrix.folder.log(name)
         cell = [Cell(run["config"]), Cell(run["weather"])]
         rows += [[*cell, *row] for row in ([] if folder is None else reading_rows(folder))]
     return [
@@ -39,7 +39,7 @@ def envelope_blocks(matrix: Matrix) -> list[Block]:
     names: dict[int, str] = {}
     runs = matrix.results.sort("config", "weather", "seed")
     for run, name in zip(runs.iter_rows(named=True), matrix.names(runs), strict=True):
-        folder = None if name is None else matrix.folder.log(name)
+        folder = matrix.folder.log(name)
         readings = None if folder is None else read_readings(folder)
         for sensor in () if readings is None else readings.sensors:
             if sensor.type == TYPE and readings is not None:

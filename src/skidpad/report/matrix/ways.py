@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
-from skidpad.recording.run.log_files import read_log
 from skidpad.report.crashes.cards import Found
 from skidpad.report.elements.figures import FRAME, Chart, Curve, curves
 from skidpad.report.elements.page import Block, Figure
@@ -16,7 +15,6 @@ from skidpad.report.matrix.answers import MARKERS
 from skidpad.report.matrix.crashes import Cell
 from skidpad.report.matrix.data import Matrix, config_title
 from skidpad.report.matrix.figures import weather_marks
-from skidpad.roads.bundled import kept_map
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import RoadMap
 
@@ -54,10 +52,9 @@ def _ways(matrix: Matrix, config: str) -> list[tuple[Floats, RoadMap]]:
     """Returns the way of a configuration's first seed in the first weathers, with its map; or nothing."""
     runs = matrix.within(config, matrix.weather_groups[0]).sort("seed").head(1)
     for name in matrix.names(runs):
-        folder = None if name is None else matrix.folder.log(name)
+        folder = matrix.folder.log(name)
         if folder is not None:
-            log = read_log(folder)
-            road_map = kept_map(matrix.folder.path, log.header.map, log.header.map_hash)
+            log, road_map = matrix.log(folder)
             return [(broken_way(log.actors.x[:, 0], log.actors.y[:, 0]), road_map)]
     return []
 

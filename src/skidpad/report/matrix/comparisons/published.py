@@ -14,6 +14,7 @@ from skidpad.report.matrix.data import (
     WEATHERS,
     Matrix,
     config_title,
+    mean_of,
     published_preliminary,
     published_value,
     weather_title,
@@ -86,7 +87,7 @@ def _table(matrix: Matrix, configs: Sequence[str], column: str, caption: str, no
     def of(weather: str, config: str) -> Quantity:
         runs = matrix.cell(config, weather).drop_nulls(column)
         return Quantity(
-            value=float(runs[column].mean()) if len(runs) else None,  # type: ignore[arg-type]
+            value=mean_of(runs, column),
             published=published_value(column, config, weather),
         )
 
@@ -113,7 +114,7 @@ def _figures(matrix: Matrix, configs: Sequence[str]) -> list[Block]:
         series = [
             Series(
                 f"configuration {c}",
-                [_mean(matrix, column, c, w) for w in weathers],
+                [mean_of(matrix.cell(c, w), column) for w in weathers],
                 published=[published_value(column, c, w) for w in weathers],
             )
             for c in configs
@@ -128,9 +129,3 @@ def _figures(matrix: Matrix, configs: Sequence[str]) -> list[Block]:
         "both have. `skidpad study A-278 --figure FILE.svg` drives both here and draws ours beside these."
     )
     return [*figures, Figure(panel(["preliminary", "final"], charts), caption)]
-
-
-def _mean(matrix: Matrix, column: str, config: str, weather: str) -> float | None:
-    """Returns the mean of `column` in a configuration's weather; None without values."""
-    values = matrix.cell(config, weather)[column].drop_nulls()
-    return float(values.mean()) if len(values) else None  # type: ignore[arg-type]

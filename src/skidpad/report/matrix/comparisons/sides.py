@@ -13,7 +13,7 @@ from skidpad.report.elements.figures import Series, grouped_bars
 from skidpad.report.elements.page import Block, Cell, Figure
 from skidpad.report.elements.tables import Column, Format, Quantity, table
 from skidpad.report.matrix.comparisons.contrasts import BY_RUN
-from skidpad.report.matrix.data import EVENTS, INTERVENTIONS, Matrix, config_title
+from skidpad.report.matrix.data import EVENTS, INTERVENTIONS, Matrix, config_title, rate_by_seed
 from skidpad.report.matrix.tables import METRICS, metric_quantity
 
 SIDES = (("1", "2"), ("2", "4"))  # as the source sets them side by side
@@ -88,7 +88,7 @@ def _figure(matrix: Matrix, first: str, second: str) -> Figure:
             [
                 None if rate is None else rate.rate
                 for group in matrix.weather_groups
-                for rate in [matrix.rate_within(EVENTS, config, group)]
+                for rate in [rate_by_seed(matrix.within(config, group), EVENTS)]
             ],
         )
         for config in (first, second)

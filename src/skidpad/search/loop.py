@@ -108,7 +108,7 @@ class StoredTrials:
         self.path, self._drive = path, drive
         self._known = {trial.number: trial for trial in known}
         if known:  # so that a line that was cut off is gone
-            write_bytes(path, _encode(known))
+            write_bytes(path, msgspec.json.Encoder().encode_lines(known))
 
     def drive(self, points: Sequence[Point]) -> list[Trial]:
         """Returns the trials of points, in their order; drives those not stored and appends them to the file.
@@ -118,7 +118,7 @@ class StoredTrials:
         """
         new = self._drive([point for point in points if not self._holds(point)])
         with self.path.open("ab") as file:
-            file.write(_encode(new))
+            file.write(msgspec.json.Encoder().encode_lines(new))
         self._known |= {trial.number: trial for trial in new}
         return [self._known[point.number] for point in points]
 
@@ -131,11 +131,6 @@ class StoredTrials:
                 "begin anew in another folder"
             )
         return trial is not None
-
-
-def _encode(trials: Sequence[Trial]) -> bytes:
-    """Returns the trials as JSON lines in bytes."""
-    return b"".join(msgspec.json.encode(trial) + b"\n" for trial in trials)
 
 
 def _drive_with_reference(points: Sequence[Point], runner: Runner) -> list[Trial]:

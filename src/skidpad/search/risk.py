@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import isfinite
@@ -159,7 +159,7 @@ def split_all(
         BackendError: the process that drove a repetition was lost.
     """
     known = {r.number: r for r in read_repetitions(out)}
-    write_bytes(out / SPLITTING, b"".join(map(_encode_line, known.values())))
+    write_bytes(out / SPLITTING, msgspec.json.Encoder().encode_lines(list(known.values())))
     missing = [k for k in range(asked.repetitions) if k not in known]
     jobs = [
         Job(f"splitting {k}", split_drives, SplitTask(asked, k), SPLIT_DEADLINE_S) for k in missing
@@ -170,14 +170,9 @@ def split_all(
             raise BackendError(f"{done.job.key} was lost ({last}); --resume drives it again")
         known[done.value.number] = done.value
         with (out / SPLITTING).open("ab") as file:
-            file.write(_encode_line(done.value))
+            file.write(msgspec.json.Encoder().encode_lines([done.value]))
         on_run(sum(r.runs for r in known.values()))
     return tuple(known[k] for k in range(asked.repetitions))
-
-
-def _encode_line(one: Repetition) -> bytes:
-    """Returns a repetition as a line of JSON."""
-    return msgspec.json.encode(one) + b"\n"
 
 
 def answer_by_splitting(
@@ -201,12 +196,11 @@ def _independent(margins: Floats) -> Weighted:
 
 def _kinds_of_splits(repetitions: Sequence[Repetition]) -> dict[str, float]:
     """Returns the share of the probability by kind of failure, the largest first."""
-    shares: dict[str, float] = defaultdict(float)
-    for one in repetitions:
-        for kind, count in one.kinds.items():
-            shares[kind] += one.p * count / one.failing
-    total = sum(shares.values())
-    return {k: v / total for k, v in sorted(shares.items(), key=lambda item: -item[1])}
+    return _shares(
+        (kind, one.p * count / one.failing)
+        for one in repetitions
+        for kind, count in one.kinds.items()
+    )
 
 
 def _plain(e: Estimate, simulated_s: float) -> Probability:
@@ -223,10 +217,15 @@ def _end(value: float) -> float | None:
 
 def _kinds(trials: Sequence[Trial], samples: Weighted) -> dict[str, float]:
     """Returns the share of the probability by kind of failure, the largest first; {} without a failure."""
+    weighed = zip(trials, samples.weights, strict=True)
+    return _shares((trial.kind, float(weight)) for trial, weight in weighed if trial.is_failure)
+
+
+def _shares(weights: Iterable[tuple[str, float]]) -> dict[str, float]:
+    """Returns the share of each kind in the sum of all weights, the largest first."""
     shares: dict[str, float] = defaultdict(float)
-    for trial, weight in zip(trials, samples.weights, strict=True):
-        if trial.is_failure:
-            shares[trial.kind] += float(weight)
+    for kind, weight in weights:
+        shares[kind] += weight
     total = sum(shares.values())
     return {k: v / total for k, v in sorted(shares.items(), key=lambda item: -item[1])}
 

@@ -213,19 +213,13 @@ def _series(table: pl.DataFrame, prefix: str, kind: type[S]) -> S:
 
 def _describe_log(log: RunLog) -> dict[str, Any]:
     """Returns the head of a log as plain data: schema, header, weathers and actors."""
-    t = log.table
+    columns = {name: getattr(log.table, name) for name in _Actors.__struct_fields__}
     return {
         "schema": SCHEMA_VERSION,
         "header": log.header,
         "weathers": log.weathers,
         "actors": {
-            "names": t.names,
-            "types": t.types,
-            "kind": t.kind.tolist(),
-            "length": t.length.tolist(),
-            "width": t.width.tolist(),
-            "height": t.height.tolist(),
-            "rgb": t.rgb.tolist(),
+            name: v.tolist() if isinstance(v, np.ndarray) else v for name, v in columns.items()
         },
     }
 

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from skidpad.core.geometry import kmh_from_mps
 from skidpad.core.text.wording import count_text
 from skidpad.evidence.encounters import DISTANCE, TIME
 from skidpad.evidence.play_verdicts import Counterpart, PlayVerdict
@@ -34,6 +33,7 @@ from skidpad.report.play.runs import (
     Played,
     PlayRun,
     find_road,
+    kmh_of,
     load_played,
     write_results_csv,
 )
@@ -262,11 +262,6 @@ def _format_bounded(value: float | None, spec: str) -> Cell:
     return Cell(format(value, spec) if value < LARGE else f">{LARGE}", sort=value)
 
 
-def _contact_speed(run: PlayRun) -> float | None:
-    """Returns the closing speed at the first contact in km/h; None without a contact."""
-    return None if run.contact is None else kmh_from_mps(run.contact[2])
-
-
 MEASURES: list[Column[PlayRun]] = [
     Column("least gap", lambda r: r.least("min_gap_m"), unit="m", format=Format(".1f", absent="-")),
     Column("least TTC", lambda r: _format_bounded(r.least("min_ttc_s"), ".2f"), unit="s"),
@@ -274,7 +269,10 @@ MEASURES: list[Column[PlayRun]] = [
         "required deceleration", lambda r: _format_bounded(r.most("max_required_mps2"), ".1f"),
         unit="m/s²",
     ),
-    Column("speed at contact", _contact_speed, unit="km/h", format=Format(".0f", absent="-")),
+    Column(
+        "speed at contact", lambda r: kmh_of(r.contact and r.contact[2]), unit="km/h",
+        format=Format(".0f", absent="-"),
+    ),
 ]  # fmt: skip
 Of = tuple[PlayRun, Counterpart]
 
@@ -291,12 +289,6 @@ def _counterparts(runs: Sequence[PlayRun]) -> list[Block]:
     return [table(COUNTERPARTS, rows, "The ego and each other actor", note)]
 
 
-def _speed_of_contact(of: Of) -> float | None:
-    """Returns the counterpart's speed at the contact in km/h; None without a contact."""
-    v = of[1].contact_v
-    return None if v is None else kmh_from_mps(v)
-
-
 COUNTERPARTS: list[Column[Of]] = [
     Column("scenario", lambda o: o[0].scenario),
     Column("weather", lambda o: _outside(o[0])),
@@ -311,7 +303,10 @@ COUNTERPARTS: list[Column[Of]] = [
         "required deceleration", lambda o: _format_bounded(o[1].pair.max_required_mps2, ".1f"),
         unit="m/s²",
     ),
-    Column("speed at contact", _speed_of_contact, unit="km/h", format=Format(".0f", absent="-")),
+    Column(
+        "speed at contact", lambda of: kmh_of(of[1].contact_v), unit="km/h",
+        format=Format(".0f", absent="-"),
+    ),
 ]  # fmt: skip
 
 

@@ -247,12 +247,12 @@ def _row(run: PlayRun, other: Counterpart | None) -> dict[str, Any]:
             "min_distance_m": other.encounter.distance,
             "crossed_after_s": other.encounter.crossed_after,
             "contact_t_s": other.contact_t,
-            "contact_kmh": _kmh(other.contact_v),
-            "ego_at_contact_kmh": _kmh(other.contact_v_ego),
+            "contact_kmh": kmh_of(other.contact_v),
+            "ego_at_contact_kmh": kmh_of(other.contact_v_ego),
         }
     return row | {k: v for k, v in run.metrics.items() if k not in row}
 
 
-def _kmh(v: float | None) -> float | None:
+def kmh_of(v: float | None) -> float | None:
     """Returns m/s in km/h; None stays None."""
     return None if v is None else kmh_from_mps(v)

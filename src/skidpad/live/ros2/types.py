@@ -91,31 +91,9 @@ class Types:
         fields = [n for n, _ in self.store.fielddefs[name][1]]
         return self.cls(name)(**dict(zip(fields, values, strict=True)))
 
-    def from_rosbags(self, name: str, message: Any) -> Any:
-        """Returns a message of rosbags as one of the DDS library."""
-        defs = self.store.fielddefs[name][1]
-        return self.cls(name)(**{n: self._value(d, getattr(message, n)) for n, d in defs})
-
-    def _value(self, definition: Any, value: Any) -> Any:
-        """Returns a field's value as DDS takes it: plain as it is, messages converted, arrays as lists."""
-        kind, what = int(definition[0]), definition[1]
-        if kind == BASE:
-            return value
-        if kind == NAME:
-            return self.from_rosbags(what, value)
-        return [
-            self._value(what[0], v) for v in (value.tolist() if hasattr(value, "tolist") else value)
-        ]
-
     def describe_type(self, name: str) -> bytes:
         """Returns what a writer announces of its type, for readers of newer distributions."""
         return f"typehash={self.store.hash_rihs01(name)};".encode()
-
-
-def dds_name(name: str) -> str:
-    """Returns the DDS name of a message's type such as nav_msgs/msg/Odometry."""
-    package, _, kind = name.split("/")
-    return f"{package}::msg::dds_::{kind}_"
 
 
 def ros_name(dds: str) -> str:

@@ -146,10 +146,9 @@ class Link:
 class Live:
     """Gives a person's inputs as they come; of a kind where the last one counts, one per tick."""
 
-    def __init__(self, link: Link, first: Sequence[Input] = (Lamps(LampSwitch.AUTO),)) -> None:
-        """first: what is done in the first tick."""
+    def __init__(self, link: Link) -> None:
         self.link = link
-        link.inputs[:0] = first
+        link.inputs.insert(0, Lamps(LampSwitch.AUTO))
 
     @property
     def ended(self) -> bool:

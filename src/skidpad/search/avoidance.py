@@ -32,9 +32,7 @@ AFTER = 3.0  # s after it, up to which manoeuvres are judged
 STATIC = 0.5  # m, size of the box that stands for what was touched and is no road user
 
 
-def find_run_avoidance(
-    log: RunLog, road: RoadMap, tick: int, actor: int | None, reaction: float = REACTION
-) -> str:
+def find_run_avoidance(log: RunLog, road: RoadMap, tick: int, actor: int | None) -> str:
     """Return what would have avoided a failure from the state it began in; "" where nothing does.
 
     Args:
@@ -42,7 +40,6 @@ def find_run_avoidance(
         road: its map.
         tick: of the contact, or of the departure.
         actor: row of what was touched, -1 for what stands; None for a departure.
-        reaction: s before the ego does anything.
     """
     last = min(int(log.tick.searchsorted(tick)), len(log) - 1) - 1
     dt = log.header.dt
@@ -56,10 +53,10 @@ def find_run_avoidance(
     begin = first + first_known_row(seen)
     mu = float(log.mu[begin : last + 1, 0].mean(axis=1).min())
     n = last + 1 - begin + round(AFTER / dt)
-    start, path = _start(log, road, begin, reaction)
+    start, path = _start(log, road, begin)
     others = _others(log, road, tracks, actor, begin, last)
     others += [replace_places(s, *(np.full(n, c) for c in s[:3])) for s in standing]
-    return find_avoidance(start, path, others, road.edge.beyond, mu, dt, n, reaction)
+    return find_avoidance(start, path, others, road.edge.beyond, mu, dt, n, REACTION)
 
 
 def track_of(log: RunLog, actor: int) -> Track:
@@ -106,12 +103,12 @@ def _foreseen(
     return np.asarray(foreseen)
 
 
-def _start(log: RunLog, road: RoadMap, row: int, reaction: float) -> tuple[Start, Path]:
+def _start(log: RunLog, road: RoadMap, row: int) -> tuple[Start, Path]:
     """Returns the ego's state in a row and the path of its lane from there on; straight on off the lanes."""
     track, motion = track_of(log, 0), motion_of(log, 0)
     x, y, yaw = (float(c[row]) for c in track[:3])
     z, v = float(log.actors.z[row, 0]), max(float(motion.speed[row]), 0.0)
-    far = ceil(v * (BEFORE + AFTER + reaction)) + 20
+    far = ceil(v * (BEFORE + AFTER + REACTION)) + 20
     straight = np.array([[0.0, 0.0], [float(far), 0.0]])
     curvature = float(motion.yaw_rate[row]) / v if v > 0.5 else 0.0
     of = partial(

@@ -179,7 +179,6 @@ class Card:
     worlds: Any = None  # see assets/worlds.js
     charts: Sequence[Figure] = ()
     id: str = ""  # for links to it
-    href: str = ""
     kind: str = "card"
 
     def replay_json(self) -> str:

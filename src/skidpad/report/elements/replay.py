@@ -29,8 +29,6 @@ def replay(
     log: RunLog,
     road_map: RoadMap,
     row: int,
-    before_s: float = BEFORE_S,
-    after_s: float = AFTER_S,
     laid: Sequence[LaidSurface] = (),
 ) -> dict[str, Any]:
     """Returns the s around tick row `row` for the page's script, centred on the ego's place there.
@@ -39,8 +37,8 @@ def replay(
     """
     dt = log.header.dt
     stride = max(round(STEP_S / dt), 1)
-    first = max(row - round(before_s / dt) // stride * stride, row % stride)
-    rows = np.arange(first, min(row + round(after_s / dt), len(log) - 1) + 1, stride)
+    first = max(row - round(BEFORE_S / dt) // stride * stride, row % stride)
+    rows = np.arange(first, min(row + round(AFTER_S / dt), len(log) - 1) + 1, stride)
     return _cut_log(log, road_map, rows, row, np.array([row]), laid)
 
 

@@ -49,18 +49,15 @@ def _with_emergency_braking(run: RunSpec) -> RunSpec:
     return structs.replace(run, driver=structs.replace(run.driver, functions=functions))
 
 
-def _in_envelope(run: RunSpec) -> RunSpec:
-    """Returns the run with the speed envelope over its driver."""
-    return structs.replace(run, govern=Govern.ENVELOPE)
-
-
 CHANGES = {
     "dry": Change("dry", _in_weather(DRY)),
     "wet": Change("wet", _in_weather(WET)),
     "ice": Change("on ice", _in_weather(ICE)),
     "stability": Change("with stability control", _with_stability),
     "braking": Change("with emergency braking", _with_emergency_braking),
-    "envelope": Change("inside the speed envelope", _in_envelope),
+    "envelope": Change(
+        "inside the speed envelope", lambda run: structs.replace(run, govern=Govern.ENVELOPE)
+    ),
 }
 
 

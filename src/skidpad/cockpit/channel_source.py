@@ -113,10 +113,10 @@ class ChannelSource(Source):
         self._table = ActorTable(
             names=tuple("ego" if key == EGO_KEY else f"{key[0]} {key[1]}" for key in keys),
             types=("",) * len(keys),
-            kind=np.array([_kind(label) for label in labels], dtype=np.uint8),
+            kind=np.array([KINDS.get(class_of(v), ActorKind.PROP) for v in labels], dtype=np.uint8),
             length=size[:, 0],
             width=size[:, 1],
-            height=np.array([_height(label) for label in labels]),
+            height=np.array([HEIGHT.get(class_of(v), CAR_HEIGHT) for v in labels]),
             rgb=np.array([_paint(i) for i in range(len(keys))], dtype=np.uint8),
         )
         self._state = np.zeros((len(self.worlds), len(keys), 5))
@@ -288,16 +288,6 @@ def _size(polygon: Floats) -> Floats:
         return np.array(SPARE)
     found: Floats = np.maximum(np.nanmax(polygon, axis=0) - np.nanmin(polygon, axis=0), 0.2)
     return found
-
-
-def _kind(label: int) -> ActorKind:
-    """Returns the kind of actor for a class label, a prop for an unknown one."""
-    return KINDS.get(class_of(label), ActorKind.PROP)
-
-
-def _height(label: int) -> float:
-    """Returns the height in m for a class label, a car's for an unknown one."""
-    return HEIGHT.get(class_of(label), CAR_HEIGHT)
 
 
 def _paint(row: int) -> tuple[int, int, int]:

@@ -163,7 +163,10 @@ def _failure_table(out: Path, search: Search, failures: Sequence[Trial], caption
             "contact", lambda t: t.contact_kmh, "larger delta-v of the two, else closing speed", "km/h",
             Format(".1f", absent="-"),
         ),
-        Column("at", _when, "of the contact, or of the departure", "s", Format(".2f", absent="-")),
+        Column(
+            "at", lambda t: t.contact_s if t.departed_s is None else t.departed_s,
+            "of the contact, or of the departure", "s", Format(".2f", absent="-"),
+        ),
         Column(
             "reference", _reference_cell,
             "what the reference driver came to with the same values: least gap, m",
@@ -188,11 +191,6 @@ def _run(out: Path, trial: Trial) -> Cell:
     folder = failure_folder(out, trial.number)
     href = folder.relative_to(out).as_posix() + f"/{REPORT}" if folder.is_dir() else ""
     return Cell(str(trial.number + 1), trial.number, href=href)
-
-
-def _when(trial: Trial) -> float | None:
-    """Returns when a run failed, s."""
-    return trial.contact_s if trial.departed_s is None else trial.departed_s
 
 
 def _values(trial: Trial) -> str:

@@ -20,7 +20,7 @@ from skidpad.core.traffic.disturbance import (
     name_draw,
     parse_disturbance,
 )
-from skidpad.core.weather import RANGES, Weather
+from skidpad.core.weather import RANGES
 from skidpad.physics.presets import find_weather
 
 SEED = "seed"  # name of the variable that draws sensor noise: whole numbers of a range
@@ -87,7 +87,7 @@ def apply_values(template: RunSpec, values: Mapping[str, Value]) -> RunSpec:
         course=structs.replace(
             course, parameters={**course.parameters, **parameters}, draws={**course.draws, **draws}
         ),
-        weather=_with_fields(weather, fields),
+        weather=replace(weather, **fields),  # type: ignore[arg-type]
         seed=int(values.get(SEED, template.seed)),
     )
 
@@ -106,11 +106,6 @@ def disturbance_variables(template: RunSpec) -> tuple[Variable, ...]:
         for one in map(parse_disturbance, course.disturb)
         for k in range(ceil(template.duration / KNOT_S))
     )
-
-
-def _with_fields(weather: Weather, fields: Mapping[str, Value]) -> Weather:
-    """Returns the weather with these fields replaced."""
-    return replace(weather, **fields) if fields else weather  # type: ignore[arg-type]
 
 
 def _require_own(variable: Variable) -> None:

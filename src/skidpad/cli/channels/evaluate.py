@@ -66,7 +66,11 @@ def evaluate(
             f"{labels}: needs a column `recording`, since {folder} holds {len(paths)} recordings"
         )
     truths = ("sim", "world") if truth is Truth.both else (truth.value,)
-    tasks = [_Task(path, folder, truths, _labels_of(path, marked), varied, model) for path in paths]
+    everywhere = marked.get("", [])
+    tasks = [
+        _Task(path, folder, truths, (*everywhere, *marked.get(path.stem, [])), varied, model)
+        for path in paths
+    ]
     evaluation = Evaluation(_segments(tasks, workers))
     if model is not None:
         _refuse_training_drives(model, evaluation.segments)
@@ -208,11 +212,6 @@ def _report_segments(segments: Iterable[Segment]) -> Iterator[Segment]:
     for segment in segments:
         typer.echo(f"{segment.name}: {segment.t.size} cycles")
         yield segment
-
-
-def _labels_of(path: Path, marked: dict[str, list[Span]]) -> tuple[Span, ...]:
-    """Returns the labels of a recording: those of all, and those of its own file."""
-    return (*marked.get("", []), *marked.get(path.stem, []))
 
 
 def _about_model(path: Path) -> dict[str, object]:

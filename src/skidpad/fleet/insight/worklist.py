@@ -130,7 +130,8 @@ def rank_work(
     """
     found = _read_alarms(connection, who, [id for c in clusters for id in c["members"]])
     groups = [
-        (c, sorted((found[i] for i in c["members"] if i in found), key=_age)) for c in clusters
+        (c, sorted((found[i] for i in c["members"] if i in found), key=lambda a: (a.at, a.id)))
+        for c in clusters
     ]
     subjects = [c.get("subject") or alarms[0].id for c, alarms in groups if alarms]
     standings = read_standings(connection, who, subjects)
@@ -193,11 +194,6 @@ def _matches(one: Work, wanted: WorkFilter) -> bool:
         and wanted.severity in (None, one.severity)
         and (wanted.road is None or (one.place is not None and one.place.kind is wanted.road))
     )
-
-
-def _age(alarm: Alarm) -> tuple[float, str]:
-    """Returns the key that sorts alarms by time, then id."""
-    return alarm.at, alarm.id
 
 
 def _is_wanted(alarm: Alarm, wanted: WorkFilter) -> bool:

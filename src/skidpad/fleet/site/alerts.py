@@ -7,6 +7,7 @@ from typing import Any
 import msgspec
 from starlette.concurrency import run_in_threadpool
 
+from skidpad.core.text.wording import count_text
 from skidpad.fleet.alerting.keeping import Alert, Scene, What, newest_alerts
 from skidpad.fleet.alerting.orders import Order
 from skidpad.fleet.service import Fleet
@@ -47,7 +48,7 @@ def draw_alerts(
 
     @ui.refreshable  # type: ignore[untyped-decorator]
     def cards(now: Principal, known: list[Alert]) -> None:
-        ui.label(open_text(sum(not a.is_closed for a in known)))
+        ui.label(count_text(sum(not a.is_closed for a in known), "open alert"))
         for alert in known[:SHOWN]:
             _card(fleet, lines, ui, now, alert)
 
@@ -65,11 +66,6 @@ def draw_alerts(
 
     cards(who, found)
     timer = ui.timer(LOOK_S, look)
-
-
-def open_text(n: int) -> str:
-    """Returns how many alerts are open, in words."""
-    return f"{n} open alert{'' if n == 1 else 's'}"
 
 
 def _card(fleet: Fleet, lines: MapLines, ui: Any, who: Principal, alert: Alert) -> None:

@@ -48,12 +48,7 @@ def migrate(engine: Engine) -> None:
             command.upgrade(config, "head")
             connection.commit()
     except SQLAlchemyError as error:
-        raise ConfigError(f"the database cannot be used: {_first_line(error)}") from error
-
-
-def _first_line(error: Exception) -> str:
-    """Returns the first line of an error's text."""
-    return str(error).splitlines()[0]
+        raise ConfigError(f"the database cannot be used: {str(error).splitlines()[0]}") from error
 
 
 def _durable(connection: Any, record: Any) -> None:

@@ -97,7 +97,9 @@ class RosTopics:
 
         It ends with the writers, after `silence` s without a sample (a loss), or by Ctrl-C.
         """
-        merge = _Merge(tuple(self.readers), {t: self._rank(t) for t in self.readers})
+        roles = self.frames.roles
+        ranks = {t: min(ROLES.index(role) for _, role in roles[t]) for t in self.readers}
+        merge = _Merge(tuple(self.readers), ranks)
         quiet = time.monotonic()
         try:
             while True:
@@ -117,10 +119,6 @@ class RosTopics:
             pass  # Ctrl-C ends the watch, not what it has found
         for entry in merge.rest():
             yield from self._frames(*entry)
-
-    def _rank(self, topic: str) -> int:
-        """Returns the index in ROLES of the first role that the topic has."""
-        return min(ROLES.index(role) for _, role in self.frames.roles[topic])
 
     def _take(self, merge: _Merge) -> bool:
         """Adds the samples that came to `merge`; returns True when there was any."""

@@ -96,31 +96,6 @@ def truth_from_message(message: pb.Truth) -> TruthFrame:
     )
 
 
-def message_from_decision(decision: Decision) -> pb.Decision:
-    """Returns an arbiter's decision as a protobuf message."""
-    return pb.Decision(
-        t=decision.t,
-        driving=decision.driving,
-        reason=decision.reason,
-        scores=list(decision.scores),
-    )
-
-
-def decision_from_message(message: pb.Decision) -> Decision:
-    """Returns the decision of a protobuf message."""
-    return Decision(message.t, message.driving, message.reason, tuple(message.scores))
-
-
-def message_from_context(context: Context) -> pb.Context:
-    """Returns the context of a drive as a protobuf message."""
-    return pb.Context(t=context.t, entries=context.entries)
-
-
-def context_from_message(message: pb.Context) -> Context:
-    """Returns the context in `message`, sorted: a map on the wire has no order of its own."""
-    return Context(message.t, dict(sorted(message.entries.items())))
-
-
 class MessageKind(NamedTuple):
     """How items of one type are written as protobuf messages and read again."""
 
@@ -132,8 +107,16 @@ class MessageKind(NamedTuple):
 KINDS: dict[type, MessageKind] = {
     ChannelFrame: MessageKind("Channel", message_from_frame, frame_from_message),
     TruthFrame: MessageKind("Truth", message_from_truth, truth_from_message),
-    Decision: MessageKind("Decision", message_from_decision, decision_from_message),
-    Context: MessageKind("Context", message_from_context, context_from_message),
+    Decision: MessageKind(
+        "Decision",
+        lambda d: pb.Decision(t=d.t, driving=d.driving, reason=d.reason, scores=list(d.scores)),
+        lambda m: Decision(m.t, m.driving, m.reason, tuple(m.scores)),
+    ),
+    Context: MessageKind(
+        "Context",
+        lambda c: pb.Context(t=c.t, entries=c.entries),
+        lambda m: Context(m.t, dict(sorted(m.entries.items()))),  # a map on the wire has no order
+    ),
 }
 
 

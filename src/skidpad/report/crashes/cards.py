@@ -31,7 +31,6 @@ from skidpad.roads.queries import RoadMap
 Found = tuple[Crash, Drive, RoadMap, Path]  # Path: of the run
 PICTURE_WIDTH = 480  # px
 PICTURE_BYTES = 60_000  # decision M-17
-THUMBNAIL_WIDTH, THUMBNAIL_BYTES = 240, 10_000  # px, bytes
 QUALITIES = (80, 65, 50, 35, 20)
 TIERS = {
     Tier.NONE: "no rule acted",
@@ -213,20 +212,15 @@ def pictures(run: Path, t: float) -> list[Image]:
     found = snapshot(run, t)
     if found is None:
         return []
-    return [Image(webp_uri(found), "front camera at the contact, top view inset")]
+    return [
+        Image(
+            webp_uri(found, PICTURE_WIDTH, PICTURE_BYTES),
+            "front camera at the contact, top view inset",
+        )
+    ]
 
 
-def webp_uri(path: Path) -> str:
-    """Returns a picture as WebP data URI of PICTURE_WIDTH px, at most PICTURE_BYTES if it can be."""
-    return _webp(path, PICTURE_WIDTH, PICTURE_BYTES)
-
-
-def thumbnail_uri(path: Path) -> str:
-    """Returns a picture as WebP data URI of THUMBNAIL_WIDTH px, at most THUMBNAIL_BYTES if it can be."""
-    return _webp(path, THUMBNAIL_WIDTH, THUMBNAIL_BYTES)
-
-
-def _webp(path: Path, width: int, bytes_max: int) -> str:
+def webp_uri(path: Path, width: int, bytes_max: int) -> str:
     """Returns the picture as a WebP data URL, at most `width` px; if too large, at the least quality."""
     with Picture.open(path) as picture:
         small = picture.convert("RGB")

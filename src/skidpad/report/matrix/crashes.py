@@ -13,7 +13,7 @@ from skidpad.evidence.contrasts import drive_hash
 from skidpad.evidence.drive.collisions import shown_crashes
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.recording.campaign.folder import snapshot
-from skidpad.report.crashes.cards import Found, crash_card, headline, severity, thumbnail_uri
+from skidpad.report.crashes.cards import Found, crash_card, headline, severity, webp_uri
 from skidpad.report.elements.page import (
     Block,
     Cards,
@@ -29,6 +29,7 @@ from skidpad.report.matrix.data import Matrix, config_title, weather_title
 CARDS = "cards"
 INLINE = 3  # per cell
 MONTAGE = 60  # pictures of a configuration
+THUMBNAIL = 240, 10_000  # px, bytes
 RUNS_READ = 10  # per cell, those with the hardest impacts
 Cell = tuple[str, str]  # configuration, weather
 
@@ -115,7 +116,9 @@ def montages(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[Block]:
         cells.sort(key=lambda item: severity(item[1][0]), reverse=True)
         taken = [(w, f, path) for w, f in cells if (path := snapshot(f[3], f[0].t)) is not None]
         images = [
-            Image(thumbnail_uri(path), f"{weather_title(w)}, {f[0].t:.0f} s: {headline(f[0])}")
+            Image(
+                webp_uri(path, *THUMBNAIL), f"{weather_title(w)}, {f[0].t:.0f} s: {headline(f[0])}"
+            )
             for w, f, path in taken[:MONTAGE]
         ]
         if images:

@@ -44,7 +44,8 @@ def envelope_blocks(matrix: Matrix) -> list[Block]:
         for sensor in () if readings is None else readings.sensors:
             if sensor.type == TYPE and readings is not None:
                 names |= name_values(sensor, "binding")
-                table = readings.table.select(pl.col(f"^{sensor.id}\\..*$").name.map(_quantity))
+                own = pl.col(f"^{sensor.id}\\..*$").name.map(lambda name: name.rpartition(".")[2])
+                table = readings.table.select(own)
                 found.setdefault((run["config"], run["weather"]), []).append(table)
     rows = [[*map(Cell, cell), *_row(pl.concat(tables), names)] for cell, tables in found.items()]
     columns = [
@@ -61,11 +62,6 @@ def envelope_blocks(matrix: Matrix) -> list[Block]:
     ]
     title = "What limits the speed of governed stacks, all seeds"
     return [Table(tuple(columns), rows, title)] * bool(rows)
-
-
-def _quantity(column: str) -> str:
-    """Returns a column's name after its last dot."""
-    return column.rpartition(".")[2]
 
 
 def _row(ticks: pl.DataFrame, names: dict[int, str]) -> list[Cell]:

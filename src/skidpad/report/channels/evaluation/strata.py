@@ -66,14 +66,12 @@ def _columns() -> list[Column[Row]]:
         Column("hazard", lambda r: words(r["hazard"])),
         Column("true", lambda r: float(r["tp"] + r["fn"])),
         Column("found", partial(count, "tp")),
-        Column("recall", _recall, "weighted among risky drivers; 95 % interval below", "%"),
+        Column(
+            "recall", partial(ratio, "recall_weighted"),
+            "weighted among risky drivers; 95 % interval below", "%",
+        ),
         Column("effective size", _size, "of the true hazards with their weights"),
     ]  # fmt: skip
-
-
-def _recall(row: Row) -> Cell:
-    """Returns a cell with the weighted recall in %."""
-    return ratio("recall_weighted", row)
 
 
 def _size(row: Row) -> Cell:

@@ -42,7 +42,7 @@ def side_blocks(matrix: Matrix) -> list[Block]:
 def _table(matrix: Matrix, first: str, second: str) -> Block:
     """Returns the table of means over seeds of both configurations, and their paired difference."""
     columns = [
-        Column[Metric]("metric", _name),
+        Column[Metric]("metric", lambda m: Cell(m.heading, note=m.meaning)),
         *(
             Column[Metric](config_title(c), partial(_mean, matrix, c), format=Format())
             for c in (first, second)
@@ -57,11 +57,6 @@ def _table(matrix: Matrix, first: str, second: str) -> Block:
     rows = [METRICS[name] for name in ROWS]
     note = "Means over seeds, every drive once; small: 95 % interval of each number alone."
     return table(columns, rows, f"Configuration {first} and configuration {second}", note, False)
-
-
-def _name(metric: Metric) -> Cell:
-    """Returns a cell with the metric's title and unit, its meaning as note."""
-    return Cell(metric.heading, note=metric.meaning)
 
 
 def _mean(matrix: Matrix, config: str, metric: Metric) -> Quantity:

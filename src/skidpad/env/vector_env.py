@@ -98,14 +98,12 @@ class DriveVectorEnv(VectorEnv):  # type: ignore[misc]
             if begun[i]:
                 seeds[i] = self._begin(i, None, None)
             else:
-                rewards[i], terminated[i], truncated[i] = self._at(i).step(action, self._rewards)
+                rewards[i], terminated[i], truncated[i] = self.episode(i).step(
+                    action, self._rewards
+                )
         self._over = terminated | truncated
         infos = _note("seed", seeds, begun) | self._infos(~begun)
         return self._observe(), rewards, terminated, truncated, infos
-
-    def episode(self, i: int) -> EgoEpisode:
-        """Returns the present episode of an environment: its run, world and sums of terms."""
-        return self._at(i)
 
     def close_extras(self, **kwargs: Any) -> None:
         """Releases all worlds that are kept."""
@@ -122,8 +120,11 @@ class DriveVectorEnv(VectorEnv):  # type: ignore[misc]
         self._present[i] = self.episodes.begin(seed, options, self._present[i])
         return seed
 
-    def _at(self, i: int) -> EgoEpisode:
-        """Returns the present episode of an environment; ConfigError before the first reset."""
+    def episode(self, i: int) -> EgoEpisode:
+        """Returns the present episode of an environment: its run, world and sums of terms.
+
+        ConfigError before the first reset.
+        """
         found = self._present[i]
         if found is None:
             raise ConfigError("there is no episode yet: call reset first")
@@ -131,12 +132,12 @@ class DriveVectorEnv(VectorEnv):  # type: ignore[misc]
 
     def _observe(self) -> Observations:
         """Returns what all egos observe."""
-        found = [self._at(i).observations for i in range(self.num_envs)]
+        found = [self.episode(i).observations for i in range(self.num_envs)]
         return np.concatenate(found)
 
     def _infos(self, driven: Flags) -> dict[str, Any]:
         """Returns the infos of a step, as `DriveEnv` has them, with masks of environments that have them."""
-        episodes = [self._at(i) for i in range(self.num_envs)]
+        episodes = [self.episode(i) for i in range(self.num_envs)]
         infos = _note("t", np.array([one.t for one in episodes]), driven)
         infos |= _note("terms", _by_name([one.terms for one in episodes]), driven)
         return infos | _note("metrics", _by_name([one.sums for one in episodes]), self._over)

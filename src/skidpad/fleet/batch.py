@@ -157,11 +157,6 @@ def drive_of(content: bytes) -> BatchDrive:
     return drive
 
 
-def drive_text(drive: BatchDrive) -> str:
-    """Returns the JSON text that is kept of a drive: the fields that were understood."""
-    return msgspec.json.encode(drive).decode()
-
-
 def rows_of(content: bytes, limits: Limits) -> list[IndicatorRow]:
     """Returns the rows of a batch of indicators; Refused (413, 422) if one is wrong or they are too many."""
     rows = decode_sent(_ROWS.decode_lines, content, "a row of indicators cannot be read")

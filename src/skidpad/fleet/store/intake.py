@@ -12,10 +12,11 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any
 
+import msgspec
 from sqlalchemy import Connection, Engine, bindparam, select
 from sqlalchemy.exc import DataError, IntegrityError
 
-from skidpad.fleet.batch import BatchDrive, Found, drive_text, weather_class
+from skidpad.fleet.batch import BatchDrive, Found, weather_class
 from skidpad.fleet.blobs import Blobs
 from skidpad.fleet.identity import digest, new_id
 from skidpad.fleet.store.rights import in_chunks
@@ -176,7 +177,7 @@ class Intake:
             drive = owned | {
                 "id": new_id(), "seconds": batch.summary.seconds, "map": words.get("map", ""),
                 "weather": weather_class(words), "release": batch.summary.release,
-                "summary": drive_text(batch.summary),
+                "summary": msgspec.json.encode(batch.summary).decode(),
             }  # fmt: skip
             connection.execute(drives.insert(), drive)
             return True, ()

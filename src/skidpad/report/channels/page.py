@@ -30,6 +30,7 @@ from skidpad.report.elements.page import (
     words,
     write_report_page,
 )
+from skidpad.report.elements.tables import table
 
 CARDS = 20  # of one hazard, the worst ones
 REPLAYS = 12  # worlds of the worst hazards are drawn; the others are listed
@@ -177,7 +178,7 @@ def _hazards(drive: MonitoredDrive) -> list[Block]:
     order = sorted(drive.records, key=_severity)
     drawn = {r.id for r in order[:REPLAYS]}
     scored = [r for r in drive.records if not _candidate(r.type.value)]
-    blocks: list[Block] = [tables.hazard_list(scored)] if scored else []
+    blocks: list[Block] = [table(tables.HAZARD_COLUMNS, scored, "All hazards")] if scored else []
     for hazard in HazardType:
         records = [r for r in drive.records if r.type is hazard]
         if records:

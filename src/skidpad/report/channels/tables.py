@@ -18,7 +18,7 @@ from skidpad.evidence.channels.indicators.catalogue import (
 from skidpad.evidence.channels.timing import timing_statistics
 from skidpad.recording.hazards.records import HazardRecord
 from skidpad.report.channels.data import MonitoredDrive
-from skidpad.report.elements.page import Block, Cell, Node, Table, Text, Tree, words
+from skidpad.report.elements.page import Block, Cell, Node, Text, Tree, words
 from skidpad.report.elements.tables import Column, Format, Quantity, table
 from skidpad.report.published import Source, published_rows, read_published
 
@@ -56,11 +56,6 @@ HAZARD_COLUMNS: tuple[Column[HazardRecord], ...] = (
     Column("flags", lambda r: ", ".join(r.flags),
            "assumed: no objects were paired; cut: the record ends early", kind="muted"),
 )  # fmt: skip
-
-
-def hazard_list(records: Sequence[HazardRecord]) -> Table:
-    """Returns a table with one row per record."""
-    return table(HAZARD_COLUMNS, records, "All hazards")
 
 
 def safety_case_tree(drive: MonitoredDrive) -> Tree:

@@ -181,14 +181,6 @@ class Card:
     id: str = ""  # for links to it
     kind: str = "card"
 
-    def replay_json(self) -> str:
-        """Returns the replay as JSON that is safe inside a script element."""
-        return _script_json(self.replay)
-
-    def worlds_json(self) -> str:
-        """Returns the channels' worlds as JSON that is safe inside a script element."""
-        return _script_json(self.worlds)
-
 
 @dataclass(frozen=True, slots=True)
 class Cards:
@@ -320,11 +312,6 @@ def write_page(page: Page, path: Path) -> None:
     write_bytes(path, render(page).encode("utf-8", "backslashreplace"))
 
 
-def _script_json(value: Any) -> str:
-    """Returns JSON that stays inside its <script>, whatever its words are: no "<" is in it."""
-    return msgspec.json.encode(value).decode().replace("<", "\\u003c")
-
-
 def _asset(name: str) -> str:
     """Returns the text of a file in the report's assets."""
     return files("skidpad.report").joinpath("assets").joinpath(name).read_text(encoding="utf-8")
@@ -356,4 +343,7 @@ def _template() -> jinja2.Template:
         finalize=_join_units,
     )
     environment.filters["prose"] = _prose
+    environment.policies["json.dumps_function"] = lambda value, **_: msgspec.json.encode(
+        value
+    ).decode()
     return environment.from_string(_asset("page.html.j2"))

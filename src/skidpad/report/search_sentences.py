@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from skidpad.core.run import AdasDriver, DriverSpec
 from skidpad.core.text.wording import count_text
-from skidpad.recording.campaign.searches import Change, Group, Hazard, Trial
+from skidpad.recording.campaign.searches import Group, Hazard, Trial
 
 
 def hazard_sentences(hazard: Hazard) -> list[str]:
@@ -71,13 +71,12 @@ def group_sentence(group: Group) -> str:
     speed = "" if worst.contact_kmh is None else f", up to {worst.contact_kmh:.0f} km/h"
     text = f"{group.kind}: {count_text(len(group.failures), 'failure')}{speed}"
     if group.changes:
-        text += f"; harmless with {' and '.join(change_text(c) for c in group.changes)}"
+        changes = " and ".join(
+            f"{c.name} {_precise(c.harmless)} instead of {_precise(c.failing)}"
+            for c in group.changes
+        )
+        text += f"; harmless with {changes}"
     return text
-
-
-def change_text(change: Change) -> str:
-    """Returns a change as text, harmless value first: "LeadS 118.2 instead of 117.9"."""
-    return f"{change.name} {_precise(change.harmless)} instead of {_precise(change.failing)}"
 
 
 def _precise(value: float | str) -> str:

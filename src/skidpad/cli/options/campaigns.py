@@ -101,7 +101,7 @@ class CampaignOptions(Driving, frozen=True, kw_only=True):
                 resume=self.resume,
                 csv=self.csv,
                 on_run=shown.note_end,
-                on_total=shown.planned_runs,
+                on_total=lambda total: shown.update(shown.bar, total=total),
             )
         for warning in summary.warnings():
             console.print(f"[yellow]{warning}[/]")

@@ -49,10 +49,6 @@ class Shown(Progress):
         self.runs: dict[str, list[Entry[Any, Any]]] = defaultdict(list)
         self.bar = self.add_task("driving", total=len(campaign.tasks))
 
-    def planned_runs(self, total: int) -> None:
-        """Sets the number of runs, once it is known that some need not be driven."""
-        self.update(self.bar, total=total)
-
     def note_end(self, entry: Entry[Any, Any]) -> None:
         """Adds a run that has ended to the bar; prints a line when its cell is done or looked at."""
         cell = cell_of(entry.run)

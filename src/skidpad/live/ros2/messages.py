@@ -63,13 +63,13 @@ class Messages:
         shape = frame.polygons[i, : frame.polygon_size[i]]
         size = np.ptp(shape, axis=0).tolist() if len(shape) else [0.0, 0.0]
         corners = [self._make("geometry_msgs", "Point32", px, py, 0.0) for px, py in shape.tolist()]
-        own = "autoware_perception_msgs"
+        own, rest = "autoware_perception_msgs", self._vector(0.0, 0.0)
         kinematics = self._make(
             own,
             "PredictedObjectKinematics",
             self._with_covariance("Pose", self._pose(x, y, h)),
             self._with_covariance("Twist", self._twist(vx, vy, h)),
-            self._with_covariance("Accel", self._make("geometry_msgs", "Accel", *self._rest())),
+            self._with_covariance("Accel", self._make("geometry_msgs", "Accel", rest, rest)),
             [self._make(own, "PredictedPath", poses, self._time(step, "Duration"), 1.0)],
         )
         identity = max(int(frame.ids[i]), 0).to_bytes(7, "big") + bytes(9)
@@ -110,10 +110,6 @@ class Messages:
     def _vector(self, x: float, y: float, z: float = 0.0) -> Any:
         """Returns the Vector3 message with these three components."""
         return self._make("geometry_msgs", "Vector3", x, y, z)
-
-    def _rest(self) -> tuple[Any, Any]:
-        """Returns two zero vectors, the linear and the angular part of a state at rest."""
-        return self._vector(0.0, 0.0), self._vector(0.0, 0.0)
 
     def _pose(self, x: float, y: float, h: float) -> Any:
         """Returns the Pose message at (x, y, 0) m with the heading `h` in rad about the z axis."""

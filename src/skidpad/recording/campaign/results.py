@@ -101,7 +101,7 @@ class Columns(Generic[K, M]):
 
         Metrics of versions that did not have them yet are null, factors their default.
         """
-        known = _defaults(self.key)
+        known = {f.name: f.default for f in fields(self.key) if f.default is not MISSING}  # type: ignore[arg-type]
         kinds = {n: k for n, k in schema(self.key).items() if n in known} | schema(self.metrics)
         table = table.with_columns(
             pl.lit(known.get(name), kind).alias(name)
@@ -113,11 +113,6 @@ class Columns(Generic[K, M]):
     def hash(self, table: pl.DataFrame) -> str:
         """Returns the content hash (X-1) of results, whatever the order of rows and where they were run."""
         return content_hash([table.drop(FINGERPRINT, strict=False).sort(self.sort)])
-
-
-def _defaults(kind: type[Any]) -> dict[str, Any]:
-    """Returns a dataclass's plain defaults by field; fields without one, or with a factory, are left out."""
-    return {f.name: f.default for f in fields(kind) if f.default is not MISSING}
 
 
 def _plain(kind: type[Any], row: Any) -> dict[str, Any]:

@@ -85,7 +85,7 @@ def cycles(source: ChannelSource) -> Iterator[Cycle]:
         if t_first is None:
             t_first = message.t
         # a message moves the grid to just before it: everything older is now known
-        due = _last_before(message.t, t_first)
+        due = floor((message.t - t_first - SAME_TIME) / STEP)  # the last grid time before it
         if live or k < due - STRETCH:  # what was said before a stretch is not left out with it
             while t_first + k * STEP <= heard + SAME_TIME:
                 yield state.cycle(k, t_first + k * STEP)
@@ -101,11 +101,6 @@ def cycles(source: ChannelSource) -> Iterator[Cycle]:
         while t_first + k * STEP <= clock.t + SAME_TIME:
             yield state.cycle(k, t_first + k * STEP)
             k += 1
-
-
-def _last_before(t: float, t_first: float) -> int:
-    """Returns the number of the last grid time before `t` s; -1 when there is none."""
-    return floor((t - t_first - SAME_TIME) / STEP)
 
 
 class _State:

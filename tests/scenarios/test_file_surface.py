@@ -163,7 +163,8 @@ def test_who_looks_on_is_told_what_lies_there_in_the_tick_in_which_it_is_felt(tm
             self.laid, self.there, self.felt = laid, [], []
 
         def see(self, moment):
-            self.there.append(surface_at((), self.laid, moment.truth.tick) == (ICE,))
+            there = [one.surface for one in self.laid if one.tick <= moment.truth.tick]
+            self.there.append(there[-1:] == [(ICE,)])
             self.felt.append(moment.truth.mu[0].max() < 0.2)
 
     onlooker = Onlooker()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -77,14 +76,15 @@ class Lying:
 
     def __init__(self, map: RoadMap, laid: Sequence[LaidSurface]) -> None:
         self.map, self.laid = map, laid
+        self.later: Sequence[LaidSurface] = ()  # what events lay while it is driven; grows
         self._outlines: dict[int, Sequence[PatchOutline]] = {}
 
     def outlines(self, tick: int) -> Sequence[PatchOutline]:
         """Returns the outlines of a tick."""
-        n = bisect_right(self.laid, tick, key=lambda one: one.tick)
+        there = [one.surface for one in (*self.laid, *self.later) if one.tick <= tick]
+        n = len(there)
         if n not in self._outlines:
-            there = self.laid[n - 1].surface if n else ()
-            self._outlines[n] = outline_patches(self.map, there)
+            self._outlines[n] = outline_patches(self.map, there[-1] if there else ())
         return self._outlines[n]
 
 

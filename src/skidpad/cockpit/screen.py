@@ -78,7 +78,7 @@ class Screen(Sink):
 
     def follow_surface(self, laid: Sequence[LaidSurface]) -> None:
         """Takes what events lay on the road during a live drive; a replay knows it from the begin."""
-        self.lying.laid = laid
+        self.lying.later = laid
 
     def see(self, moment: Moment) -> None:
         """Notes a tick's events and shows it, or drops it, as a slow or absent page costs nothing."""

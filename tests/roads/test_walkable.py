@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
 
-from skidpad.roads.bundled import load_map
+from skidpad.roads.bundled import FOLDER, bake_file, load_map
 from skidpad.roads.lanes import LaneKind
+from skidpad.roads.queries import RoadMap
 from skidpad.roads.walkable import WalkArea, WalkMesh, _areas_of, _outline, walk_mesh
 
 
@@ -129,6 +131,38 @@ def test_lines_and_points_between_surfaces_are_left_out() -> None:
     kept = _areas_of(mixed)
     assert kept.equals(shapely.union_all([one, two, three]))
     assert shapely.union(kept, one, grid_size=0.01).area == pytest.approx(3.0)
+
+
+def test_under_a_bridge_one_walks_below_it_only() -> None:
+    """town with a copy of one of its roads 6 m above another: the upper lanes are left out."""
+    baked = bake_file(FOLDER / "town.xodr")
+    map, samples = RoadMap(baked), baked.samples
+    plain = walk_mesh(map)
+    assert plain is not None
+    pavement = int(np.flatnonzero(map.lanes.kind == LaneKind.SIDEWALK)[0])
+    first, size = int(map.lanes.first[pavement]), int(map.lanes.size[pavement])
+    over = int(np.flatnonzero(map.lanes.kind == LaneKind.DRIVING)[0])
+    rows = slice(int(map.lanes.first[over]), int(map.lanes.first[over] + map.lanes.size[over]))
+    moved = {c: getattr(samples, c).copy() for c in ("x", "y", "z")}
+    below = np.linspace(first, first + size - 1, rows.stop - rows.start).round().astype(int)
+    moved["x"][rows], moved["y"][rows] = samples.x[below], samples.y[below]
+    moved["z"][rows] = samples.z[below] + 6.0
+    bridged = RoadMap(replace(baked, samples=samples._replace(**moved)))
+    mesh = walk_mesh(bridged)
+    assert mesh is not None
+    assert float(mesh.vertices[:, 2].max()) == pytest.approx(float(plain.vertices[:, 2].max()))
+    walked = [sum(p.area for p in plan(m, WalkArea.SIDEWALK)) for m in (mesh, plain)]
+    assert walked[0] == pytest.approx(walked[1], rel=1e-6)
+
+
+def test_a_town_with_bridges_has_a_walking_surface(towns: Path) -> None:
+    map = load_map(towns / "Town04.xodr")
+    mesh = walk_mesh(map)
+    assert mesh is not None
+    outlines = [_outline(map, int(i)) for i in np.flatnonzero(map.lanes.kind == LaneKind.SIDEWALK)]
+    walked = sum(p.area for p in plan(mesh, WalkArea.SIDEWALK))
+    assert walked > 0.5 * shapely.union_all(outlines).area
+    assert plan(mesh, WalkArea.CROSSWALK)
 
 
 @pytest.mark.parametrize("town", ["Town01", "Town02", "Town07", "Town10HD"])

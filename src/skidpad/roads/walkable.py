@@ -69,10 +69,11 @@ class WalkMesh:
 def walk_mesh(map: RoadMap) -> WalkMesh | None:
     """Returns the map's walking surface; None when it has neither sidewalks nor shoulders to walk on.
 
-    None also for maps whose sidewalks or roads lie above each other: a plane cannot hold them.
+    A plane cannot hold lanes above each other: on maps with sidewalks nobody walks on the upper ones.
     """
     if np.any(map.lanes.kind == LaneKind.SIDEWALK):
-        return None if _storeys(map) else _town(map)
+        kept = _lowest_lanes(map)
+        return _town(map, kept) if np.any(kept & (map.lanes.kind == LaneKind.SIDEWALK)) else None
     lanes = np.flatnonzero(map.lanes.kind == LaneKind.SHOULDER).tolist()
     return _strips(map, lanes) if lanes else None
 
@@ -134,17 +135,29 @@ def _weld_points(points: Floats, rings: list[Ring], areas: list[WalkArea]) -> Wa
 # --- a town
 
 
-def _storeys(map: RoadMap) -> bool:
-    """Returns whether lanes lie above each other anywhere on the map."""
+def _owners(map: RoadMap) -> NDArray[np.int64]:
+    """Returns the lane (n,) of every sample."""
+    owner = np.empty(len(map.samples.x), dtype=np.int64)
+    for lane, (first, size) in enumerate(zip(map.lanes.first, map.lanes.size, strict=True)):
+        owner[first : first + size] = lane
+    return owner
+
+
+def _lowest_lanes(map: RoadMap) -> NDArray[np.bool_]:
+    """Returns which lanes lie above no other one."""
     s = map.samples
     plan = cKDTree(np.column_stack((s.x, s.y)))
     pairs = plan.query_pairs(NEAR, output_type="ndarray")
-    return bool(np.any(np.abs(s.z[pairs[:, 0]] - s.z[pairs[:, 1]]) > STOREY))
+    rise = s.z[pairs[:, 0]] - s.z[pairs[:, 1]]
+    upper = np.where(rise > 0.0, pairs[:, 0], pairs[:, 1])[np.abs(rise) > STOREY]
+    kept = np.ones(len(map.lanes.first), dtype=np.bool_)
+    kept[_owners(map)[upper]] = False
+    return kept
 
 
-def _town(map: RoadMap) -> WalkMesh:
-    """Returns the mesh of sidewalks, crossings and roads as convex polygons without overlap."""
-    surfaces = _surfaces(map)
+def _town(map: RoadMap, kept: NDArray[np.bool_]) -> WalkMesh:
+    """Returns the mesh of the kept lanes and of crossings as convex polygons without overlap."""
+    surfaces = _surfaces(map, kept)
     lines = shapely.unary_union([g.boundary for g in surfaces.values()], grid_size=GRID)
     faces = [f for f in shapely.get_parts(shapely.polygonize([lines])) if f.area > SLIVER]
     kinds = [_kind(surfaces, face) for face in faces]
@@ -159,15 +172,18 @@ def _town(map: RoadMap) -> WalkMesh:
             rings.append(ring)
             owned.append(area)
     plan = np.array(list(corners), dtype=np.float64)
-    return WalkMesh(np.column_stack((plan, _heights(map, plan))), tuple(rings), tuple(owned))
+    return WalkMesh(np.column_stack((plan, _heights(map, plan, kept))), tuple(rings), tuple(owned))
 
 
-def _surfaces(map: RoadMap) -> dict[WalkArea, shapely.Geometry]:
-    """Returns outlines by area, without overlaps: a crossing ends at the pavement, a verge at the road."""
+def _surfaces(map: RoadMap, kept: NDArray[np.bool_]) -> dict[WalkArea, shapely.Geometry]:
+    """Returns outlines of the kept lanes by area, without overlaps.
+
+    A crossing ends at the pavement, a verge at the road.
+    """
     kinds, junction = map.lanes.kind, map.lanes.junction
 
     def union(lanes: NDArray[np.bool_]) -> shapely.Geometry:
-        return shapely.unary_union([_outline(map, int(i)) for i in np.flatnonzero(lanes)])
+        return shapely.unary_union([_outline(map, int(i)) for i in np.flatnonzero(lanes & kept)])
 
     crossings = shapely.unary_union([shapely.Polygon(c[:, :2]) for c in map.roadside.crosswalks])
     pavements = union(kinds == LaneKind.SIDEWALK)
@@ -203,11 +219,11 @@ def _kind(surfaces: dict[WalkArea, shapely.Geometry], face: shapely.Geometry) ->
     return next((area for area, g in surfaces.items() if g.contains(point)), None)
 
 
-def _heights(map: RoadMap, plan: Floats) -> Floats:
-    """Returns the heights (n,) in m of the lane samples nearest to the points (n, 2)."""
-    s = map.samples
-    _, nearest = cKDTree(np.column_stack((s.x, s.y))).query(plan)
-    return np.asarray(s.z[nearest], dtype=np.float64)
+def _heights(map: RoadMap, plan: Floats, kept: NDArray[np.bool_]) -> Floats:
+    """Returns the heights (n,) in m of the samples of kept lanes nearest to the points (n, 2)."""
+    s, rows = map.samples, np.flatnonzero(kept[_owners(map)])
+    _, nearest = cKDTree(np.column_stack((s.x[rows], s.y[rows]))).query(plan)
+    return np.asarray(s.z[rows[nearest]], dtype=np.float64)
 
 
 def _convex_parts(face: shapely.Geometry, corners: dict[tuple[float, float], int]) -> list[Ring]:

@@ -104,7 +104,8 @@ class Guard:
         """
         sentence, wrong = said
         reads = scope["type"] == "http" and scope["method"] == "GET"
-        if self.door.log_in is None or not reads or not _wants_html(scope):
+        html = any("text/html" in value for value in _header(scope, b"accept"))
+        if self.door.log_in is None or not reads or not html:
             await _refuse(scope, receive, send, sentence)
             return
         await _forbid(send, b"text/html; charset=utf-8", self.door.log_in(wrong))
@@ -146,11 +147,6 @@ def _token(scope: Scope) -> str | None:
     if scope["type"] != "http" or scope["method"] != "GET":
         return None
     return dict(_query(scope)).get(TOKEN)
-
-
-def _wants_html(scope: Scope) -> bool:
-    """Returns True when an accept header of the request names text/html."""
-    return any("text/html" in value for value in _header(scope, b"accept"))
 
 
 def _cookie(scope: Scope, name: str) -> str | None:

@@ -124,13 +124,9 @@ def _hardest(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[str]:
     (config, weather), (crash, _, _, run) = max(found, key=lambda f: severity(f[1][0]))
     group = next(g for g in matrix.weather_groups if weather in g.weathers)
     where = f"{config_list([config])} in {group.name}, run {run.name} at {crash.t:.0f} s"
-    what = _as_fragment(headline(crash))
+    title = headline(crash)
+    what = title[:1].lower() + title[1:]
     return [f"The hardest crash with a driving function: {what}, {where}. Its card stands below."]
-
-
-def _as_fragment(headline_text: str) -> str:
-    """Returns a headline as part of a sentence, its first letter small."""
-    return headline_text[:1].lower() + headline_text[1:]
 
 
 # --- the kinds of crashes, which add up to all of them

@@ -14,6 +14,7 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
 from skidpad.core.run import Passenger, Roads, RunSpec, Scenario
 from skidpad.core.setup import ActorSetup, Setup
+from skidpad.core.specs import RadarSpec
 from skidpad.core.states import EgoEstimate, VehicleCommand
 from skidpad.core.vocabulary import Govern, GripModel, Outcome, RangeModel, SensorLevel
 from skidpad.core.weather import Weather
@@ -24,6 +25,7 @@ from skidpad.envelope.govern import (
     V_CREEP,
     Allowed,
     BrakePulses,
+    Envelope,
     EnvelopeSettings,
     GovernedStack,
     govern,
@@ -31,7 +33,6 @@ from skidpad.envelope.govern import (
 )
 from skidpad.envelope.grip import Grip
 from skidpad.envelope.limits import Binding
-from skidpad.envelope.sight import Sight
 from skidpad.physics.presets import preset
 from skidpad.sensors.outside import make_rain_sensor, make_thermometer, wiper_stage
 from skidpad.stack.configurations import numbered_driver
@@ -187,13 +188,17 @@ def test_the_oracle_of_sight_knows_how_far_the_radar_reaches_in_rain():
             map="figure8", specs=(), ego=ActorSetup(name="ego", type="tesla", place=Pose(0.0, 0.0)),
             weather=weather, range_model=range_model,
         )  # fmt: skip
-        true_range = choose_envelope(RunSpec(govern=Govern.ORACLE_SIGHT), setup).oracle_sight
-        return Sight(None, 0.05, true_range(100.0)).reach
+        settings = choose_envelope(RunSpec(govern=Govern.ORACLE_SIGHT), setup)
+        return Envelope(
+            [RadarSpec("radar", Pose(2.0, 0.0, 1.0), range=100.0)], None, settings
+        ).sight.reach
 
     rain = Weather(precipitation=100.0)
     assert reach(Weather()) == pytest.approx(100.0)
     assert reach(rain) < 99.0
     assert reach(rain, RangeModel.NONE) == pytest.approx(100.0)
+    with pytest.raises(ConfigError, match="oracle-sight needs a stack with a radar"):
+        Envelope([], None, EnvelopeSettings(oracle_sight=lambda nominal: nominal))
 
 
 def test_settings_out_of_range_are_told():

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from math import isfinite, nan
 from typing import Any
 
-from skidpad.core.errors import require_range
+from skidpad.core.errors import ConfigError, require_range
 from skidpad.core.frames import SensorFrame
 from skidpad.core.maths.constants import G
 from skidpad.core.sensor_types import read_sensor
@@ -156,6 +156,10 @@ class Envelope:
         self.map, self.settings = map, settings
         radar = next((spec for spec in specs if isinstance(spec, RadarSpec)), None)
         true_range = settings.oracle_sight
+        if true_range is not None and radar is None:
+            raise ConfigError(
+                "--govern oracle-sight needs a stack with a radar, and this one has none"
+            )
         known = None if true_range is None or radar is None else true_range(radar.range)
         self.sight = Sight(radar, settings.dt, known)
         self.grip = GripEstimator(settings.dt, stiffness=settings.stiffness)

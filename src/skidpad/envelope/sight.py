@@ -102,7 +102,7 @@ class Sight:
 
     @property
     def reach(self) -> float:
-        """Distance in m at which leads are first seen: the SEEN_SHARE quantile of those noted.
+        """Distance in m at which leads are first seen: `known`, else the SEEN_SHARE quantile of those noted.
 
         SEEN_PRIOR before SEEN_LEAST were noted, and half of it at least.
         """

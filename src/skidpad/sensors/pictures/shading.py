@@ -75,10 +75,8 @@ STAINED = 0.06  # share of the tints of surfaces that is left on snow
 GLOSSY = (Material.PAINT, Material.GLASS, Material.LAMP_GLASS)
 WET_DARKENING = 0.52  # of asphalt's albedo; Lekner and Dorf (1988) give 0.4 to 0.7
 SNOW = np.array([0.80, 0.83, 0.88], dtype=np.float32)
-TWIGS, BARE = (
-    np.array([98, 86, 76], dtype=np.float32),
-    0.85,
-)  # grey levels of bare crowns, share of it
+TWIGS = np.array([98, 86, 76], dtype=np.float32)  # grey levels of bare crowns
+BARE = 0.85  # share of a crown's colour that twigs make where snow lies
 NO_LEAVES = np.zeros(0, dtype=np.intp)
 BRAKE_LIGHT = np.array([1.5, 0.03, 0.03], dtype=np.float32)  # of lit lamps, linear
 INDICATOR_LIGHT = np.array([1.5, 0.55, 0.03], dtype=np.float32)

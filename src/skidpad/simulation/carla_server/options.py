@@ -49,7 +49,7 @@ class ServerOptions(Struct, frozen=True, kw_only=True):
         Govern,
         Meta(
             description="Keep vehicles with the role_name hero, ego or ego_vehicle inside the speed "
-            "envelope, whatever program drives them; as for skidpad adas, without oracle and full."
+            "envelope, whatever program drives them; as for skidpad adas, without oracle, oracle-sight, full."
         ),
     ] = Govern.NONE
     seed: Annotated[int, Meta(description="Seed of sensor noise.")] = 0

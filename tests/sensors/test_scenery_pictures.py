@@ -15,7 +15,7 @@ from skidpad.roads.roadside import Box, Shape
 from skidpad.scenery.dressing import dress_map
 from skidpad.sensors.finish.extras import ALL_EXTRAS
 from skidpad.sensors.pictures.blocks import BLOCK, COLUMNS, LANES, R, W, gather
-from skidpad.sensors.pictures.lane_wear import soften_strips
+from skidpad.sensors.pictures.lane_wear import soften_border
 from skidpad.sensors.pictures.roughness import COARSE_SIZE, SIZE, make_tiles
 from skidpad.sensors.pictures.settled_snow import NOTHING_SETTLES
 from skidpad.sensors.scene.grain import NO_GRAIN
@@ -145,7 +145,9 @@ def test_strips_of_one_asphalt_run_into_each_other_and_into_nothing_else() -> No
     gather(keys[None], 0, 0, keys.size, table, work)
     work[W : W + keys.size] = 0.1  # 10 m away
     before = work.copy()
-    soften_strips(np.float32(400.0), keys.size, keys, table, work)
+    borders = (0, 40, 70, 100, 120)
+    for begin, middle, end in zip(borders, borders[1:], borders[2:], strict=False):
+        soften_border(np.float32(400.0), begin, middle, end, keys, table, work)
     red, old = work[R : R + keys.size], before[R : R + keys.size]
     assert np.abs(np.diff(red[:90])).max() < 0.3 * np.abs(np.diff(old[:90])).max()
     assert (np.diff(red[:50]) >= 0.0).all()
@@ -154,7 +156,7 @@ def test_strips_of_one_asphalt_run_into_each_other_and_into_nothing_else() -> No
     actors = keys + (1 << 16)
     table[MATERIALS:] = table[:MATERIALS]
     work[:] = before
-    soften_strips(np.float32(400.0), keys.size, actors, table, work)
+    soften_border(np.float32(400.0), 0, 40, 70, actors, table, work)
     assert np.array_equal(work, before), "actors have no strips"
 
 

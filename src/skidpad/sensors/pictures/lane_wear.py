@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats32
 from skidpad.core.kernels.jit import inner_kernel, kernel
-from skidpad.sensors.pictures.blocks import ONE, B, G, R, W, end_of_run
+from skidpad.sensors.pictures.blocks import ONE, B, G, R, W
 from skidpad.sensors.scene.materials import MATERIALS, TRACKS
 
 WIDTH = np.float32(0.28)  # m on either side of a border over which colours run into each other
@@ -31,28 +31,22 @@ FAMILIES = strip_families()
 
 
 @kernel
-def soften_strips(
-    focal: np.float32, count: int, keys: NDArray[np.int32], table: Floats32, work: Floats32
-) -> None:
-    """Lets the colours of neighbouring strips of one asphalt run into each other in a block, in `work`.
+def soften_border(
+    focal: np.float32, begin: int, middle: int, end: int, keys: NDArray[np.int32], table: Floats32,
+    work: Floats32,
+) -> None:  # fmt: skip
+    """Lets the colours of two neighbouring strips of one asphalt run into each other in a block, in `work`.
 
+    begin, middle, end: of the block's pixels, where the first strip begins, the second, and what follows it.
     table: colour by instance and material, as in `gather`.
     """
-    begin, middle = 0, end_of_run(keys, 0)
-    while middle < count:
-        end = end_of_run(keys, middle)
-        before, after = keys[middle - 1], keys[middle]
-        family = FAMILIES[before & 255]
-        if (
-            family != _NO_FAMILY
-            and family == FAMILIES[after & 255]
-            and max(before, after) < _ACTORS
-        ):
-            reach = WIDTH * focal * work[W + middle]
-            left, right = _HALF * np.float32(middle - begin), _HALF * np.float32(end - middle)
-            left, right = min(reach, left), min(reach, right)
-            _blend(middle, left, right, before & 255, after & 255, table, work)
-        begin, middle = middle, end
+    before, after = keys[middle - 1], keys[middle]
+    family = FAMILIES[before & 255]
+    if family == _NO_FAMILY or family != FAMILIES[after & 255] or max(before, after) >= _ACTORS:
+        return
+    reach = WIDTH * focal * work[W + middle]
+    left, right = _HALF * np.float32(middle - begin), _HALF * np.float32(end - middle)
+    _blend(middle, min(reach, left), min(reach, right), before & 255, after & 255, table, work)
 
 
 @inner_kernel
@@ -60,12 +54,28 @@ def _blend(
     middle: int, left: np.float32, right: np.float32, first: int, second: int, table: Floats32, work: Floats32
 ) -> None:  # fmt: skip
     """Mixes two materials' colours from `left` px before a border to `right` px after it."""
-    per = ONE / (left + right + ONE)
-    start = middle - int(left)
-    for x in range(start, middle + int(right)):
-        t = (np.float32(x - start) + ONE) * per
+    per, before = ONE / (left + right + ONE), int(left)
+    red, green, blue = (
+        table[second, 0] / table[first, 0] - ONE,
+        table[second, 1] / table[first, 1] - ONE,
+        table[second, 2] / table[first, 2] - ONE,
+    )
+    run = work[middle - before :]
+    for x in range(before):
+        t = (np.float32(x) + ONE) * per
         t = t * t * (_THREE - _TWO * t)
-        own = first if x < middle else second
-        for lane, column in ((R, 0), (G, 1), (B, 2)):
-            a, b = table[first, column], table[second, column]
-            work[lane + x] *= (a + t * (b - a)) / table[own, column]
+        run[R + x] *= ONE + t * red
+        run[G + x] *= ONE + t * green
+        run[B + x] *= ONE + t * blue
+    red, green, blue = (
+        table[first, 0] / table[second, 0] - ONE,
+        table[first, 1] / table[second, 1] - ONE,
+        table[first, 2] / table[second, 2] - ONE,
+    )
+    run = work[middle:]
+    for x in range(int(right)):
+        t = ONE - (np.float32(x + before) + ONE) * per
+        t = t * t * (_THREE - _TWO * t)
+        run[R + x] *= ONE + t * red
+        run[G + x] *= ONE + t * green
+        run[B + x] *= ONE + t * blue

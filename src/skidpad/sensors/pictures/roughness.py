@@ -16,6 +16,7 @@ from scipy import ndimage
 from skidpad.core.arrays import Floats, Floats32
 from skidpad.core.kernels.jit import inner_kernel
 from skidpad.sensors.pictures.blocks import BLOCK, LANES, ONE, ZERO, B, G, R, U, W, end_of_run
+from skidpad.sensors.pictures.lane_wear import soften_border
 from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.raster.view import View
 
@@ -110,13 +111,14 @@ def _texel(a: np.float32, b: np.float32, size: np.float32) -> np.float32:
 
 @inner_kernel
 def roughen(
-    view: View, v: np.float32, count: int, keys: NDArray[np.int32], grain: Floats32, tiles: NDArray[np.int8],
-    clear: np.float32, mirrored: Floats32, work: Floats32,
+    view: View, v: np.float32, count: int, keys: NDArray[np.int32], table: Floats32, grain: Floats32,
+    tiles: NDArray[np.int8], clear: np.float32, mirrored: Floats32, work: Floats32,
 ) -> None:  # fmt: skip
     """Changes the colours of a block's surfaces in `work` by where they lie and how they lie to the sun.
 
     v: m down per m ahead of the block's row; clear: of 1, light of the sun's disc; mirrored: (3,) towards the
-    sun's image below the ground, camera axes; grain: (256, 5) strengths by material; tiles: `make_tiles`.
+    sun's image below the ground, camera axes; table: colours as in `gather`; grain: (256, 5) strengths
+    by material; tiles: `make_tiles`.
     """
     r = view.rotation
     x_u, x_1 = np.float32(r[0, 0]), np.float32(r[1, 0]) * v + np.float32(r[2, 0])
@@ -128,13 +130,15 @@ def roughen(
     sheen, height = clear * _SHEEN, np.float32(view.centre[2])
     a_0 = np.float32(view.centre[0]) + _LEAN_X * height
     b_0 = np.float32(view.centre[1]) + _LEAN_Y * height
-    x = 0
+    x, begin, focal = 0, 0, np.float32(view.focal)
     while x < count:
         m, end = keys[x] & 255, end_of_run(keys, x)
         grains, patches, tints, repairs = grain[m, 0], grain[m, 1], grain[m, 2], grain[m, 3]
         graze = grain[m, 4]
         per_patch, per_repair = patches * _PER_BYTE, repairs * _PER_BYTE
-        run, size = work[x:], end - x
+        if x > 0:
+            soften_border(focal, begin, x, end, keys, table, work)
+        run, size, begin = work[x:], end - x, x
         x = end
         if patches == ZERO:
             continue

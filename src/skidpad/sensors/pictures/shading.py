@@ -38,7 +38,6 @@ from skidpad.sensors.pictures.blocks import (
     gather,
     slopes,
 )
-from skidpad.sensors.pictures.lane_wear import soften_strips
 from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.pictures.roughness import MORE_LANES, NO_TILES, make_tiles, roughen, vary_sky
 from skidpad.sensors.pictures.settled_snow import NOTHING_SETTLES, settle_snow
@@ -424,14 +423,12 @@ def shade(
                         v,
                         count,
                         key[y, first : first + count],
+                        table,
                         grain,
                         tiles,
                         clear,
                         mirrored,
                         work,
-                    )
-                    soften_strips(
-                        np.float32(view.focal), count, key[y, first : first + count], table, work
                     )
                 if settling.size > 0:
                     settle_snow(v, count, key[y, first : first + count], settling, up, work)

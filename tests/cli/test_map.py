@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import json
+import os
 import tarfile
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
-from zipfile import ZipFile
+from zipfile import ZIP_LZMA, ZipFile
 
 import pytest
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app, main
+from skidpad.core.errors import FileError
+from skidpad.roads import carla_import
 from skidpad.roads.bundled import FOLDER, load_map
+from skidpad.roads.carla_import import find_road_files
 from skidpad.simulation.carla_server.maps.maps import MapStore
 
 RUNNER = CliRunner()
@@ -79,10 +85,10 @@ def test_a_file_that_is_no_map_ends_with_one_sentence_and_code_2(
 LAYOUT = "CarlaUE4/Content/Carla/Maps"
 ROADS = (FOLDER / "straight.xodr").read_bytes()
 FILES = {
+    f"{LAYOUT}/AnOldOne/Town03.xodr": b"an older one, not in a folder OpenDrive, and first",
     f"{LAYOUT}/OpenDrive/Town03.xodr": ROADS,
     f"{LAYOUT}/Town12/OpenDrive/Town12.xodr": ROADS,
     f"{LAYOUT}/Town12/TM/Town12.bin": b"no roads",
-    "CarlaUE4/Content/Old/Town03.xodr": b"an older one, not in a folder OpenDrive",
     f"{LAYOUT}/OpenDrive/Broken.xodr": b"<OpenDRIVE",
 }
 
@@ -91,6 +97,9 @@ def add(archive: tarfile.TarFile, name: str, content: bytes) -> None:
     member = tarfile.TarInfo(name)
     member.size = len(content)
     archive.addfile(member, BytesIO(content))
+
+
+ZSTD = b"\x28\xb5\x2f\xfd" + bytes(600)
 
 
 def tarred(files: dict[str, bytes], mode: str) -> bytes:
@@ -120,6 +129,12 @@ def windows_package(at: Path) -> Path:
     return at / "CARLA_0.9.16.zip"
 
 
+def saved(layers: dict[str, bytes], order: Sequence[str] | None = None) -> bytes:
+    """An image: its layers in the order of the archive, and a manifest with theirs."""
+    named = [{"Layers": list(layers if order is None else order)}]
+    return tarred({**layers, "manifest.json": json.dumps(named).encode()}, "w")
+
+
 def image(at: Path) -> Path:
     """Layers of a container image: plain and compressed blobs beside its description."""
     names = list(FILES)
@@ -127,9 +142,8 @@ def image(at: Path) -> Path:
         "blobs/sha256/aa": b'{"no": "layer"}',
         "blobs/sha256/bb": tarred({n: FILES[n] for n in names[:1]}, "w"),
         "cc/layer.tar": tarred({n: FILES[n] for n in names[1:]}, "w:gz"),
-        "manifest.json": b"[]",
     }
-    (at / "carla.tar").write_bytes(tarred(layers, "w"))
+    (at / "carla.tar").write_bytes(saved(layers, list(layers)[1:]))
     return at / "carla.tar"
 
 
@@ -140,9 +154,114 @@ def test_road_files_are_taken_out_of_a_carla(tmp_path: Path, layout) -> None:
     assert result.exit_code == 0, result.output
     assert sorted(p.name for p in out.iterdir()) == ["Town03.xodr", "Town12.xodr"]
     assert load_map(out / "Town03.xodr").content_hash == load_map("straight").content_hash
-    assert "Broken: not taken: " in result.output
+    assert "not taken: Broken: not XML" in result.output
     assert f"skidpad carla-server --maps {out} --map Town03" in result.output
     assert {"Town03", "Town12", "Town12_Opt"} <= set(MapStore(out).names())
+
+
+def test_an_import_overwrites_nothing(tmp_path: Path) -> None:
+    own = tmp_path / "Town03.xodr"
+    own.write_bytes(b"<OpenDRIVE")
+    result = RUNNER.invoke(app, ["map", "import-carla", str(tmp_path), "--out", str(tmp_path)])
+    assert result.exit_code != 0
+    assert f"{own} exists already" in str(result.exception)
+    assert own.read_bytes() == b"<OpenDRIVE"
+
+
+PLACE = f"{LAYOUT}/OpenDrive"
+OLD, NEW = b"old", b"new"
+
+
+@pytest.mark.parametrize(
+    ("upper", "wanted"),
+    [
+        ({f"{PLACE}/Town03.xodr": NEW}, {"Town03": NEW, "Town04": OLD}),
+        ({f"./{PLACE}/.wh.Town03.xodr": b""}, {"Town04": OLD}),
+        ({f"{LAYOUT}/.wh.OpenDrive": b"", "a/New.xodr": NEW}, {"New": NEW}),
+        ({f"{PLACE}/.wh..wh..opq": b"", f"{PLACE}/Town04.xodr": NEW}, {"Town04": NEW}),
+    ],
+)
+@pytest.mark.parametrize("names", ["ab", "ba"])
+def test_an_upper_layer_hides_those_below(
+    tmp_path: Path, upper: dict[str, bytes], wanted: dict[str, bytes], names: str
+) -> None:
+    lower = {f"{PLACE}/Town03.xodr": OLD, f"{PLACE}/Town04.xodr": OLD}
+    low, high = (f"{name}/layer.tar" for name in names)
+    layers = {low: tarred(lower, "w"), high: tarred(upper, "w")}
+    source = tmp_path / "carla.tar"
+    source.write_bytes(saved({name: layers[name] for name in sorted(layers)}, [low, high]))
+    found = find_road_files(source)
+    assert found.contents == wanted
+    assert not found.left_out
+
+
+def test_what_cannot_be_taken_is_named_and_the_rest_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(carla_import, "SIZE_MAX", 10)
+    files = {
+        "a/OpenDrive/Large.xodr": bytes(11),
+        "a/OpenDrive/Town03.xodr": b"one",
+        "b/OpenDrive/Town03.xodr": b"another",
+        "c/OpenDrive/Town03.xodr": b"one",
+        "a\\..\\..\\Town04.xodr": b"four",
+        "a/c:Town05.xodr": b"five",
+    }
+    source = tmp_path / "some.tar"
+    source.write_bytes(tarred(files, "w"))
+    found = find_road_files(source)
+    assert found.contents == {"Town03": b"one", "Town04": b"four"}
+    assert found.left_out == [
+        "a/OpenDrive/Large.xodr: more than the allowed 10 bytes",
+        "b/OpenDrive/Town03.xodr: another file of this name is a/OpenDrive/Town03.xodr",
+        "a/c:Town05.xodr: 'c:Town05' cannot be the name of a map",
+    ]
+
+
+@pytest.mark.parametrize("limit", ["TOTAL_MAX", "FILES_MAX"])
+def test_a_source_cannot_fill_the_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: str
+) -> None:
+    monkeypatch.setattr(carla_import, limit, 2)
+    source = tmp_path / "some.tar"
+    source.write_bytes(tarred({f"{n}.xodr": b"x" for n in range(3)}, "w:gz"))
+    with pytest.raises(FileError, match=r"some\.tar: its \.xodr files are more than the allowed"):
+        find_road_files(source)
+
+
+def test_a_folder_or_pipe_with_the_name_of_a_road_file_is_none(tmp_path: Path) -> None:
+    (tmp_path / "Folder.xodr").mkdir()
+    os.mkfifo(tmp_path / "Pipe.xodr")
+    (tmp_path / "Town03.xodr").write_bytes(ROADS)
+    assert find_road_files(tmp_path).contents == {"Town03": ROADS}
+
+
+@pytest.mark.parametrize(("at", "value"), [(6, 1), (8, 9)])  # encrypted; Deflate64
+def test_a_zip_that_zipfile_does_not_read_is_one_sentence(
+    tmp_path: Path, at: int, value: int
+) -> None:
+    source = tmp_path / "some.zip"
+    with ZipFile(source, "w") as archive:
+        archive.writestr("Town03.xodr", ROADS)
+    data = bytearray(source.read_bytes())
+    data[at] = data[data.index(b"PK\x01\x02") + at + 2] = value
+    source.write_bytes(data)
+    with pytest.raises(FileError, match="cannot be read as a CARLA folder or archive"):
+        find_road_files(source)
+
+
+def test_a_damaged_zip_is_one_sentence(tmp_path: Path) -> None:
+    source = tmp_path / "some.zip"
+    with ZipFile(source, "w", compression=ZIP_LZMA) as archive:
+        archive.writestr("Town03.xodr", ROADS)
+    data = bytearray(source.read_bytes())
+    data[60:100] = bytes(40)
+    source.write_bytes(data)
+    with pytest.raises(FileError, match="cannot be read as a CARLA folder or archive"):
+        find_road_files(source)
+
+
+TOWN = tarred({"a/Town03.xodr": ROADS}, "w")
 
 
 @pytest.mark.parametrize(
@@ -152,6 +271,15 @@ def test_road_files_are_taken_out_of_a_carla(tmp_path: Path, layout) -> None:
         (tarred(FILES, "w:gz")[:700], "cannot be read as a CARLA folder or archive"),
         (b"no archive", "cannot be read as a CARLA folder or archive"),
         (tarred({"a/Broken.xodr": b"<OpenDRIVE"}, "w"), "none of its maps can be read"),
+        (saved({"a/layer.tar": tarred(FILES, "w")[:4000]}), "cannot be read as a CARLA folder or"),
+        (
+            saved({"a/layer.tar": tarred(FILES, "w:gz")[:700]}),
+            "cannot be read as a CARLA folder or",
+        ),
+        (saved({"a/layer.tar": tarred(FILES, "w:gz")[:30]}), "layer a/layer.tar cannot be read"),
+        (saved({"blobs/sha256/bb": ZSTD}), "layer blobs/sha256/bb is compressed with zstd"),
+        (ZSTD, "it is compressed with zstd"),
+        (saved({"a.tar": TOWN, "b.tar": TOWN}, []), "manifest.json is needed"),
     ],
 )
 def test_what_holds_no_roads_is_one_sentence(

@@ -97,23 +97,30 @@ def import_carla(
     out: Annotated[Path, typer.Option(help="The folder to write to.")] = Path("carla-maps"),
 ) -> None:
     """Take the road files out of your own CARLA, for `skidpad carla-server --maps`."""
-    from skidpad.core.errors import FileError, SkidpadError
+    from skidpad.core.errors import FileError, OutputError, SkidpadError
+    from skidpad.core.text.told import clean
     from skidpad.recording.files import write_bytes
-    from skidpad.roads.bundled import load_map
     from skidpad.roads.carla_import import find_road_files
+    from skidpad.roads.opendrive.bake import bake
+    from skidpad.roads.queries import RoadMap
 
+    found = find_road_files(source)
+    files = {name: out / f"{name}.xodr" for name in found.contents}
+    there = [file for file in files.values() if file.exists() or file.is_symlink()]
+    if there:
+        raise OutputError(f"{there[0]} exists already; choose another --out")
+    for words in found.left_out:
+        typer.echo(f"not taken: {clean(words)}")
     taken = []
-    for name, content in find_road_files(source).items():
-        file = out / f"{name}.xodr"
-        write_bytes(file, content)
+    for name, content in found.contents.items():
         try:
-            roads = load_map(file)
+            roads = RoadMap(bake(content, name))
         except SkidpadError as error:
-            file.unlink()
-            typer.echo(f"{name}: not taken: {error}")
+            typer.echo(f"not taken: {error}")
             continue
+        write_bytes(files[name], content)
         length = roads.lanes.length[roads.arrays.drivable == 1].sum() / 1000.0
-        typer.echo(f"{file}: {length:.1f} km of driving lanes")
+        typer.echo(f"{files[name]}: {length:.1f} km of driving lanes")
         taken.append(name)
     if not taken:
         raise FileError(f"{source}: none of its maps can be read")

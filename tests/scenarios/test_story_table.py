@@ -24,6 +24,7 @@ from support.scenarios.files import (
     event,
     private,
     speed,
+    state,
     story,
     time,
     to,
@@ -112,6 +113,33 @@ def test_edges_delays_and_collisions_are_waited_for(tmp_path):
     player, ticks = play_both(file, ego=ActorMode.PHYSICAL)
     what = [h.path[-1] for h in player.scene.story if h.what == "startTransition"]
     assert [name for name in what if name in ("stop", "late", "hit")] == ["stop", "late", "hit"]
+    assert player.reason == ""
+    assert 0.5 * ticks < player.by_table < ticks
+
+
+@pytest.mark.parametrize(
+    ("body", "edge"),
+    [
+        (time(1), "rising"),
+        (time(1, "lessThan"), "falling"),
+        (state("event", "first", "endTransition"), "none"),
+    ],
+)
+def test_a_pulse_comes_out_of_its_delay_as_short_as_it_went_in(tmp_path, body, edge):
+    first = event("first", private(speed(to(9))), time(1))
+    late = event("late", private(speed(to(3), "linear", 1)), "{}").replace(
+        condition("{}"), condition(body, edge, 0.8)
+    )
+    file = write(
+        tmp_path,
+        init=at("ego", -1, 30, 8) + at("other", -1, 75, 8),
+        stories=story(first, late),
+        end=6.0,
+    )
+    player, ticks = play_both(file, ego=ActorMode.PHYSICAL)
+    said = [h.t for h in player.scene.story if h.path[-1:] == ("late",) and "condition" in h.what]
+    assert len(said) == 2
+    assert said[1] - said[0] == pytest.approx(player.scene.dt)
     assert player.reason == ""
     assert 0.5 * ticks < player.by_table < ticks
 

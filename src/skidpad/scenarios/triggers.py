@@ -10,7 +10,7 @@ from math import inf
 
 from skidpad.scenarios.conditions.base import Condition, EntityCondition, Probe
 from skidpad.scenarios.conditions.by_entity import BY_ENTITY
-from skidpad.scenarios.conditions.by_value import BY_VALUE, Never
+from skidpad.scenarios.conditions.by_value import BY_VALUE, ElementMove, Never
 from skidpad.scenarios.conditions.distances import DISTANCES
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.reading.document import Node
@@ -124,9 +124,10 @@ class Watched:
     def wakes(self) -> float:
         """Returns when the next change comes out of its delay, s; inf: none is on its way.
 
-        -inf where an edge has just gone in, which is over in the next step.
+        -inf where an edge or a transition has just gone in, which is over in the next step.
         """
-        if self.sent and self.timed.edge is not Edge.NONE:
+        timed = self.timed
+        if self.sent and (timed.edge is not Edge.NONE or isinstance(timed.condition, ElementMove)):
             return -inf
         return self.past[0][0] if self.past else inf
 

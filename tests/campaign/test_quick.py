@@ -16,10 +16,13 @@ from skidpad.campaign.driving.loop import Moment, Sink
 from skidpad.campaign.driving.quick_kernel import drive_ticks
 from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.campaign.runs.run import OpenRun, Run
-from skidpad.core.run import Roads, RunSpec
+from skidpad.core.environment.surface import SurfacePatch
+from skidpad.core.inputs import Outside
+from skidpad.core.run import Function, Roads, RunSpec
 from skidpad.core.vocabulary import Govern, Outcome, RelocationReason, SensorLevel, TrafficStart
 from skidpad.physics.presets import all_presets, find_weather
 from skidpad.recording.run.log import RunLog
+from skidpad.recording.run.log_files import log_hash
 from skidpad.recording.run.ticks import copy_actors
 from skidpad.scenarios.shipped import NAMES
 from skidpad.sensors.object_level.objects import sense
@@ -108,7 +111,7 @@ def compare(numbers: range) -> None:
         assert opened.quick is not None, opened.why_not_quick
         assert not first_difference(one.log, other.log), f"run {k}"
         assert one.outcome == other.outcome
-        quick += opened.quick.ticks
+        quick += opened.quick_ticks
         driven += int((one.log.supervision == 0).sum())
         events += len(one.log.events)
     share = quick / driven
@@ -138,7 +141,7 @@ def test_scripted_runs_give_the_same_bits(scenario: str, weather: str) -> None:
     assert one.outcome == other.outcome
     assert one.played == other.played
     assert opened.quick is not None
-    assert opened.quick.ticks > SHARE * len(one.log)
+    assert opened.quick_ticks > SHARE * len(one.log)
 
 
 def test_a_script_that_changes_what_is_seen_and_felt_gives_the_same_bits(tmp_path: Path) -> None:
@@ -160,7 +163,7 @@ def test_a_script_that_changes_what_is_seen_and_felt_gives_the_same_bits(tmp_pat
     assert not first_difference(one.log, other.log)
     assert one.log.weathers == other.log.weathers
     assert opened.quick is not None
-    assert 0.2 * len(one.log) < opened.quick.ticks < 0.8 * len(one.log)
+    assert 0.2 * len(one.log) < opened.quick_ticks < 0.8 * len(one.log)
 
 
 @pytest.mark.parametrize("number", [0, 4])
@@ -186,8 +189,88 @@ def test_a_run_may_be_cut_anywhere() -> None:
     whole, opened = drive_quickly(spec)
     pieces, _ = drive_quickly(spec, most=7)
     assert opened.quick is not None
-    assert opened.quick.ticks > 0.9 * len(whole.log)
+    assert opened.quick_ticks > 0.9 * len(whole.log)
     assert not first_difference(whole.log, pieces.log)
+
+
+@pytest.mark.parametrize("scripted", [False, True])
+def test_a_branch_is_the_same_both_ways(scripted: bool) -> None:
+    """The radar has the seed of the branch; back at the checkpoint the run has its own again."""
+    spec = scenario_run("lead_slowdown") if scripted else adas_run(4)
+    hashes = []
+    for quickly in (False, True):
+        opened = OpenRun(structs.replace(spec, duration=6.0))
+
+        def drive(ticks: int, opened: OpenRun = opened, quickly: bool = quickly) -> None:
+            while ticks > 0:
+                ticks -= opened.drive(ticks) if quickly else opened.step() is not None
+
+        drive(40)
+        saved = opened.save()
+        for name in ("elsewhere", ""):
+            opened.restore(saved, name)
+            drive(50)
+            hashes.append(log_hash(opened.finish().log))
+        assert (opened.quick_ticks > 70) is quickly
+        opened.close()
+    assert hashes[0] != hashes[1]
+    assert hashes[:2] == hashes[2:]
+
+
+def lay_ice(opened: OpenRun) -> None:
+    spec = opened.spec
+    outside = Outside(
+        weather=spec.weather, grip=spec.grip, range_model=spec.settings.sensors.range,
+        patches=(SurfacePatch(ice_mm=3.0, circle=(0.0, 0.0, 1000.0)),),
+    )  # fmt: skip
+    opened.backend.change(outside)
+
+
+def slow_in_bends(opened: OpenRun) -> None:
+    assert opened.driver is not None
+    stack: Any = opened.driver.stack.stack
+    stack.switch(stack.functions | {Function.BEND})
+
+
+@pytest.mark.parametrize(("change", "reason"), [(lay_ice, "patches"), (slow_in_bends, "bends")])
+def test_what_is_changed_between_two_calls_counts(change: Any, reason: str) -> None:
+    logs = []
+    for quickly in (False, True):
+        opened = OpenRun(adas_run(4, duration=5.0))
+        for _ in range(30):
+            opened.step()
+        change(opened)
+        while opened.drive(100) if quickly else opened.step() is not None:
+            pass
+        opened.close()
+        run = opened.finish()
+        logs.append(run.log)
+        assert run.quick_ticks == 0
+        assert not quickly or reason in run.why_not_quick
+    assert not first_difference(*logs)
+
+
+def test_the_supervisor_notes_where_an_ego_first_comes_to_a_lane() -> None:
+    opened = OpenRun(adas_run(4, duration=5.0))
+    for _ in range(30):
+        opened.step()
+    supervisor = opened.stage.supervisor
+    assert isinstance(supervisor, Supervisor)
+    supervisor.first = None  # as if there was no lane before
+    ticks = opened.drive(10) + opened.drive(10)
+    opened.close()
+    assert supervisor.first is not None
+    assert opened.quick_ticks == ticks - 1 > 0
+
+
+def test_the_stepper_knows_the_truth_of_the_last_tick() -> None:
+    opened = OpenRun(adas_run(4, duration=5.0))
+    opened.drive(10)
+    opened.drive(10)
+    assert opened.quick_ticks > 0
+    assert opened.stepper is not None
+    assert opened.stepper.truth.tick == opened.tick
+    opened.close()
 
 
 def test_addresses_are_of_the_types_that_the_kernel_calls() -> None:

@@ -1,8 +1,10 @@
 """The quick way through a run: many ticks of the loop in one compiled call, as long as nothing happens.
 
-`QuickDrive` works beside the `Stepper` of a run and leaves it as the stepper itself would. Contacts, crossed
-markings, changes of lights, departures, an ego that stands without a reason, and vehicles that are put
-elsewhere end the call; the stepper then drives that tick. `why_not_quick` says which runs have no quick way.
+`QuickDrive` works beside the `Stepper` of a run and leaves it ready for the next tick: its action, words
+and truth are those of the last one. Its frame, the reports of driver and stack, and the supervisor's truth
+stay those of the last tick that the stepper drove. Contacts, crossed markings, changes of lights,
+departures, an ego that stands without a reason, and vehicles that are put elsewhere end the call; the
+stepper then drives that tick. `find_parts` says which runs have no quick way.
 """
 
 from __future__ import annotations
@@ -84,22 +86,24 @@ def find_parts(stepper: Stepper, changes: FileChanges | None = None) -> QuickPar
     if isinstance(backend, ChangedBackend) and changes is not None and script is changes.player:
         changed = backend, changes
         backend = backend.inner
+    if isinstance(backend, ChangedBackend):
+        return "the world is changed from outside"
     if type(backend) is not EmbeddedBackend:
-        return "another simulator drives, or the world is changed from outside"
+        return "another simulator drives"
     sensing, supervisor = backend.sensing, stepper.supervisor
     if type(sensing) is not Objects:
         return "its sensors are pixels, or a radar with noise"
     if type(driver) is not StackAtWheel or type(driver.stack.stack) is not AdasStack:
         return "another stack drives, or an envelope governs ours"
-    if driver.lens is not None:
-        return "drops lie on the lens"
     stack, suite, timer = driver.stack.stack, sensing.suite, None
+    if stack.config.dt != backend.world.dt:
+        return "the steps of its stack have another length"
     if reason := stack.why_not_quick():
         return reason
     if not backend.has_common_frames or suite.hold_common(backend.world.states) is None:
         return "it has other sensors than the common ones, or its localisation is noisy"
-    if not isinstance(supervisor, (Supervisor, Unsupervised)):
-        return "somebody is at the controls"
+    if type(supervisor) not in (Supervisor, Unsupervised):
+        return "another supervisor looks on, or somebody is at the controls"
     supervising = supervisor if isinstance(supervisor, Supervisor) else None
     if changed is None:
         if reason := backend.why_not_quick():
@@ -117,14 +121,17 @@ def find_parts(stepper: Stepper, changes: FileChanges | None = None) -> QuickPar
 
 
 class QuickDrive:
-    """The quick way of a run for which `find_parts` finds no reason.
+    """The quick way of a run for which `find_parts` finds no reason when it begins.
 
     Attributes:
-        ticks: how many it has driven.
+        why_not: why the stepper drove the last tick that was asked for, or all; "": it did not.
     """
 
-    def __init__(self, stepper: Stepper, parts: QuickParts, log: TickLog) -> None:
-        self.stepper, self.parts, self.log, self.ticks = stepper, parts, log, 0
+    def __init__(
+        self, stepper: Stepper, parts: QuickParts, log: TickLog, changes: FileChanges | None = None
+    ) -> None:
+        self.stepper, self.parts, self.log, self.changes = stepper, parts, log, changes
+        self.why_not = "it was driven tick by tick"
         self._clocks = parts.world.lights.clocks()
         self._stops = stops_of(parts.world.map)
         self._shown: dict[int, LightState] = {}  # of the next two
@@ -139,13 +146,25 @@ class QuickDrive:
 
         0 where the next tick is the stepper's.
         """
-        timer, changed, last = self.parts.timer, self.parts.changed, self._last_request()
-        driven = 0
-        if last is not None and changed is not None:
+        # anew, as surroundings, functions and random streams may be others since the last call
+        found = find_parts(self.stepper, self.changes)
+        if isinstance(found, str):
+            self.why_not = found
+            return 0
+        self.parts, last = found, self._last_request()
+        if isinstance(last, str):
+            self.why_not = last
+            return 0
+        self.why_not = ""
+        timer, changed, driven = found.timer, found.changed, 0
+        if changed is not None:
             driven = self._follow_script(most, last, *changed)
-        elif last is not None and timer is not None and timer.left > 0:
+        elif timer is not None and timer.left > 0:
             driven = self._drive_alone(min(most, timer.left), last)
-        self.ticks += driven
+        if driven:
+            self.stepper.truth = found.backend.truth()
+        else:
+            self.why_not = "something happened in each tick"
         return driven
 
     def _follow_script(
@@ -200,20 +219,21 @@ class QuickDrive:
                 sink.pass_ticks(driven)
         return driven
 
-    def _last_request(self) -> Request | None:
-        """Returns what the stack asked for in the last tick; None unless it drives on as it did."""
+    def _last_request(self) -> Request | str:
+        """Returns what the stack asked for in the last tick; else why it does not drive on as it did."""
         stepper, stack, supervisor = self.stepper, self.parts.stack, self.parts.supervisor
         action = stepper.action
-        if action is None or action.relocate is not None or action.command.reverse:
-            return None
-        if stepper.failure is not None or stepper.next_frame is not None:
-            return None
-        if not self.parts.backend.has_common_frames:
-            return None
+        if action is None or stepper.failure is not None or stepper.next_frame is not None:
+            return "the first tick, or one that has begun"
+        if action.relocate is not None or action.command.reverse:
+            return "the ego is moved, or drives backwards"
         if stack.supervision is not Supervision.NONE or not stack.road.is_traced:
-            return None
-        if supervisor is not None and (supervisor.phase is not Supervision.NONE or supervisor.over):
-            return None
+            return "the stack does not drive, or is on no lane"
+        if supervisor is not None:
+            if supervisor.phase is not Supervision.NONE or supervisor.over:
+                return "the supervisor drives"
+            if supervisor.first is None:  # only it notes where the ego comes to a lane
+                return "the ego has been on no lane yet"
         c = action.command
         return Request(c.throttle, c.brake, c.steer, c.handbrake)
 
@@ -305,8 +325,9 @@ class QuickDrive:
         world, lines = self.parts.world, self.parts.stack.road.scan.held
         runs, points = self.parts.suite.sample_arrays()
         pose, way = (0.0, 0.0, 0.0, 0.0, 0.0), (0, 0.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
+        step = (world.arena, 0, 0, 0.0, 0, 0.0, 0.0)
         return Addresses(
-            advance=find_address(advance, world.arena, 0, 0, 0.0, 0, 0.0, 0.0),
+            advance=0 if self.parts.timer is None else find_address(advance, *step),
             feel_motion=find_address(feel_motion, world.arena, EGO),
             sense=find_address(sense, common, map, 0),
             read_road=find_address(read_road, t.memory, road, t.on_highway, t.ways, *pose, True),

@@ -355,6 +355,7 @@ class OpenRun:
         self.stepper: Stepper | None = None
         self.over = False
         self.quick: QuickDrive | None = None
+        self.quick_ticks = 0
         self.why_not_quick = "nothing was driven"
 
     def step(self) -> Moment | None:
@@ -364,6 +365,7 @@ class OpenRun:
     def drive(self, most: int) -> int:
         """Drives up to `most` ticks, the quick way where there is one; returns how many, 0 at the end."""
         ticks = 0 if self.quick is None else self.quick.drive(most)
+        self.quick_ticks += ticks
         if ticks and self.stepper is not None and self.stepper.next_frame is None:
             return ticks
         return ticks + (self.step() is not None)  # so that each tick that has begun is whole
@@ -451,8 +453,8 @@ class OpenRun:
             None if self.recorder is None else self.recorder.finish(),
             stage.setup.patches,
             tuple(self.log.laid),
-            0 if self.quick is None else self.quick.ticks,
-            self.why_not_quick,
+            self.quick_ticks,
+            self.why_not_quick if self.quick is None or self.quick_ticks else self.quick.why_not,
         )
 
     def _begin(self) -> Stepper | None:
@@ -483,7 +485,8 @@ class OpenRun:
         if isinstance(parts, str):
             self.why_not_quick = parts
         else:
-            self.why_not_quick, self.quick = "", QuickDrive(stepper, parts, self.log.log)
+            self.why_not_quick = ""
+            self.quick = QuickDrive(stepper, parts, self.log.log, self.log.changes)
         return stepper
 
     def _end(self) -> None:

@@ -29,9 +29,12 @@ def describe_type(value: Any) -> object:
     """Returns what decides the type that numba gives a value."""
     if isinstance(value, np.ndarray):
         flags = value.flags
-        return value.dtype, value.ndim, flags.c_contiguous, flags.writeable, flags.aligned
+        return (
+            value.dtype, value.ndim, flags.c_contiguous, flags.f_contiguous, flags.writeable,
+            flags.aligned,
+        )  # fmt: skip
     if isinstance(value, tuple):
-        return tuple(map(describe_type, value))
+        return type(value), *map(describe_type, value)
     return value._numba_type_ if isinstance(value, StructRefProxy) else type(value)
 
 

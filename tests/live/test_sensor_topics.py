@@ -33,6 +33,7 @@ from skidpad.simulation.carla_server.methods.episode import (
     is_sensor_enabled_for_ros,
 )
 from skidpad.simulation.carla_server.options import ServerOptions
+from skidpad.simulation.carla_server.protocol.rpc import CallError
 from skidpad.simulation.carla_server.protocol.streams import StreamHub
 from skidpad.simulation.carla_server.ros_output import RosOutput
 from skidpad.simulation.carla_server.served import Served
@@ -147,3 +148,43 @@ def test_a_subscriber_gets_images_points_odometry_and_frames() -> None:
     served.tick()
     time.sleep(0.2)
     assert not list(readers["/carla/ego/front/image"].take(100))
+
+
+def test_a_name_of_any_letters_is_published_in_ascii() -> None:
+    hub, sent = StreamHub(), []
+    served = Served(ServerOptions(map="straight"), hub)
+    topics = SensorTopics(DOMAIN)
+    served.ros = RosOutput(topics, hub)
+    send = topics._send
+    topics._send = lambda topic, *rest: (sent.append(topic), send(topic, *rest))  # type: ignore[method-assign]
+    episode = served.episode
+    named = Wanted("vehicle.tesla.model3", {"ros_name": "größe 1"})
+    car = episode.spawn(named, episode.map.spawn_points[0])
+    few = Wanted("sensor.lidar.ray_cast", {"points_per_second": "20000", "ros_name": "上"})
+    lidar = episode.attach(few, Pose(0.0, 0.0, 2.0), car.id, Attachment.RIGID)
+    enable_sensor_for_ros(served, lidar.stream)
+    served.tick()
+    assert sent == ["/carla/gr__e_1/odometry", "/tf", "/carla/gr__e_1/_"]
+    assert topics.dropped == 0
+
+
+def test_a_lidar_cannot_take_the_topic_of_odometry() -> None:
+    hub = StreamHub()
+    served = Served(ServerOptions(map="straight"), hub)
+    served.ros = RosOutput(SensorTopics(DOMAIN), hub)
+    episode = served.episode
+    car = episode.spawn(Wanted("vehicle.tesla.model3", {}), episode.map.spawn_points[0])
+    named = Wanted("sensor.lidar.ray_cast", {"ros_name": "odometry"})
+    lidar = episode.attach(named, Pose(0.0, 0.0, 2.0), car.id, Attachment.RIGID)
+    with pytest.raises(CallError, match="ros_name odometry is taken"):
+        enable_sensor_for_ros(served, lidar.stream)
+
+
+def test_a_topic_that_dds_refuses_is_a_dropped_message() -> None:
+    topics, points = SensorTopics(DOMAIN), np.zeros((1, 4), np.float32)
+    topics.send_points("/carla/größe", "a", 0.0, points)
+    assert topics.dropped == 1
+    topics.send_points("/carla/one", "a", 0.0, points)
+    topics.send_image("/carla/one", "a", 0.0, (1, 1), bytes(4))  # another type
+    topics.send_points("/carla/one", "a", 0.0, points)
+    assert topics.dropped <= 2

@@ -120,9 +120,9 @@ class SensorTopics:
     def __init__(self, domain: int) -> None:
         self.types = Types()
         self.messages = SensorMessages(self.types)
-        self.dropped = 0  # messages for which a reader had no room
+        self.dropped = 0  # messages that were not published
         self._participant = participant(domain)
-        self._writers: dict[str, Any] = {}
+        self._writers: dict[tuple[str, str], Any] = {}
 
     def send_image(
         self, topic: str, frame: str, t: float, size: tuple[int, int], bgra: bytes
@@ -145,12 +145,12 @@ class SensorTopics:
         self._send(PLACES_TOPIC, PLACES, self.messages.places(t, places))
 
     def _send(self, topic: str, kind: str, message: Any) -> None:
-        """Publishes a message; counts it as dropped when a reader has no room."""
-        if topic not in self._writers:
-            wanted = qos(Flow.LIVE, self.types.describe_type(kind))
-            made = Topic(self._participant, f"rt{topic}", self.types.cls(kind), qos=wanted)
-            self._writers[topic] = DataWriter(self._participant, made, qos=wanted)
+        """Publishes a message; counts it as dropped where DDS refuses the topic or a reader has no room."""
         try:
-            self._writers[topic].write(message)
+            if (topic, kind) not in self._writers:
+                wanted = qos(Flow.LIVE, self.types.describe_type(kind))
+                made = Topic(self._participant, f"rt{topic}", self.types.cls(kind), qos=wanted)
+                self._writers[topic, kind] = DataWriter(self._participant, made, qos=wanted)
+            self._writers[topic, kind].write(message)
         except DDSException:
             self.dropped += 1

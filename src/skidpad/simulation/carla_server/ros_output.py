@@ -20,6 +20,7 @@ from skidpad.core.maths.lefthanded import vectors_to_carla
 from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.episode import Episode
+from skidpad.simulation.carla_server.protocol.rpc import CallError
 from skidpad.simulation.carla_server.protocol.streams import StreamHub
 from skidpad.simulation.carla_server.protocol.wire import Vector
 from skidpad.simulation.carla_server.sensing.images import IMAGE_HEAD
@@ -30,6 +31,7 @@ IMAGES = tuple(
 )
 POINTS = ("sensor.lidar.ray_cast",)
 MAP = "map"  # the frame of the world
+ODOMETRY = "odometry"  # the last word of a topic
 Part = bytes | memoryview
 
 
@@ -63,7 +65,14 @@ class RosOutput:
         self._now = 0.0  # s of the episode
 
     def enable(self, sensor: Actor, carrier: Actor | None) -> None:
-        """Publishes a sensor's readings from now on; nothing for kinds other than images and points."""
+        """Publishes a sensor's readings from now on; nothing for kinds other than images and points.
+
+        CallError for a lidar whose topic is that of its vehicle's odometry.
+        """
+        if carrier is not None and sensor.blueprint.id in POINTS and _name(sensor) == ODOMETRY:
+            raise CallError(
+                f"ros_name {ODOMETRY} is taken by the vehicle's odometry; choose another"
+            )
         stream = sensor.stream
         if stream is not None and sensor.blueprint.id in (*IMAGES, *POINTS):
             above = "" if carrier is None else f"/{_name(carrier)}"
@@ -97,7 +106,7 @@ class RosOutput:
                 pose = episode.actors.pose(carrier)
                 places[_frame(carrier)] = (MAP, _frame(carrier), pose)
                 motion = _motion(episode, carrier, pose)
-                topic = f"/carla/{_name(carrier)}/odometry"
+                topic = f"/carla/{_name(carrier)}/{ODOMETRY}"
                 self._link.send_odometry(topic, _frame(carrier), self._now, pose, motion)
         if places:
             self._link.send_places(self._now, list(places.values()))
@@ -121,7 +130,7 @@ def _name(actor: Actor) -> str:
     given = (
         actor.attributes.get("ros_name") or f"{actor.blueprint.id.rsplit('.', 1)[-1]}_{actor.id}"
     )
-    return re.sub(r"\W", "_", given)
+    return re.sub(r"\W", "_", given, flags=re.ASCII)
 
 
 def _frame(actor: Actor) -> str:

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import json
+import re
+from importlib.resources import files
 
 import numpy as np
 import pytest
 from msgspec import structs
 
+from skidpad.campaign import channels
+from skidpad.campaign.channels import routes
 from skidpad.campaign.channels.drive import RISKY_JUMPS, Crew, drive_segment
 from skidpad.campaign.channels.routes import CONDITIONS, Condition, chosen_routes, driven_routes
 from skidpad.campaign.channels.world import segment_of
 from skidpad.campaign.recipes.channels import segments
 from skidpad.core.channels import TruthFrame
 from skidpad.core.errors import ConfigError
+from skidpad.core.files.reading import decode_yaml
 from skidpad.core.run import run_from_plain
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.vocabulary import Stratum
@@ -40,6 +45,23 @@ def test_every_route_by_day_night_rain_and_ice_and_in_both_strata():
     assert sum(p.duration for p in plans) == pytest.approx(8.0 * 3600.0)
     seeds = [p.seed for p in plans]  # none twice: the same errors of sensors would be counted twice
     assert len(set(seeds)) == len(seeds)
+
+
+@pytest.mark.parametrize(
+    ("line", "wrong", "words"),
+    [
+        ("vehicles: 16", "vehicles: many", "Expected `int`, got `str` - at `$.vehicles`"),
+        ("vehicles: 16", "vehicles: 81", "Expected `int` <= 80 - at `$.vehicles`"),
+        ("parked: 20", "parks: 20", "unknown field `parks`"),
+        ("  weather: {cloud", "  sky: {cloud", "Expected `object`, got `null`"),
+    ],
+)
+def test_a_wrong_file_of_routes_is_one_sentence(monkeypatch, line: str, wrong: str, words: str):
+    text = (files(channels) / routes.FILE).read_text().replace(line, wrong, 1)
+    assert text.count(wrong)
+    monkeypatch.setattr(routes, "decode_yaml", lambda *_: decode_yaml(text.encode(), "it"))
+    with pytest.raises(ConfigError, match=rf"^routes\.yaml: route-1: .*{re.escape(words)}"):
+        driven_routes.__wrapped__()
 
 
 def test_the_route_as_published_is_what_it_was():

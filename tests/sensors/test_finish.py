@@ -230,7 +230,7 @@ def test_a_calm_picture_has_less_noise_and_the_streaks():
     assert (np.abs(calm - Seen(preset("rain-night"), NO_EXTRAS).rgb).max(axis=2) > 20).any()
 
 
-def test_tone_makes_corners_darker_by_day_and_night_and_contrast_by_day_only():
+def test_tone_makes_corners_darker_at_noon_and_contrast_by_day_only():
     for weather, contrast in (("clear-noon", True), ("clear-night", False)):
         seen, other, _ = both(preset(weather), Extra.TONE)
         curve = curve_of(seen.suite.shading.light)

@@ -10,14 +10,16 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from msgspec import convert, structs, yaml
+from msgspec import structs
 
 from skidpad.core.errors import require_choice
+from skidpad.core.files.reading import convert_plain, decode_yaml
 from skidpad.core.run import ChannelCrew, Route, RunSpec
 from skidpad.core.vocabulary import SensorLevel, Stratum
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import preset
 
+FILE = "routes.yaml"
 PACK = 20  # vehicles at least that stay around the ego in the stratum of risky drivers
 
 
@@ -49,12 +51,14 @@ CONDITIONS = {
 }
 
 
-def _run_on(name: str, weather: dict[str, Any], **course: Any) -> RunSpec:
-    """Returns a run of a shipped route, as its file describes it."""
+def _run_on(name: str, row: dict[str, Any]) -> RunSpec:
+    """Returns a run of a shipped route, as its file describes it; ConfigError for what does not fit."""
+    course, where = {**row, "name": name}, f"{FILE}: {name}"
+    weather = convert_plain(course.pop("weather", None), Weather, where)
     return RunSpec(
         driver=ChannelCrew(),
-        course=Route(name=name, **course),
-        weather=convert({**weather, "name": name}, Weather),
+        course=convert_plain(course, Route, where),
+        weather=replace(weather, name=name),
         sensors=SensorLevel.OBJECTS,
     )
 
@@ -62,9 +66,9 @@ def _run_on(name: str, weather: dict[str, Any], **course: Any) -> RunSpec:
 @lru_cache(maxsize=1)
 def driven_routes() -> dict[str, RunSpec]:
     """Returns a run of each shipped route by name."""
-    text = resources.files("skidpad.campaign.channels").joinpath("routes.yaml").read_bytes()
-    rows = yaml.decode(text, type=dict[str, dict[str, Any]])
-    return {name: _run_on(name, **row) for name, row in rows.items()}
+    text = resources.files("skidpad.campaign.channels").joinpath(FILE).read_bytes()
+    rows = decode_yaml(text, FILE, dict[str, dict[str, Any]])
+    return {name: _run_on(name, row) for name, row in rows.items()}
 
 
 def chosen_routes(

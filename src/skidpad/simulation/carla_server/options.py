@@ -62,7 +62,7 @@ class ServerOptions(Struct, frozen=True, kw_only=True):
             ge=0,
             le=232,
             description="DDS domain (ROS_DOMAIN_ID) in which sensors publish that clients enable for "
-            "ROS 2; without it they do not. Needs the extra live.",
+            "ROS 2, on all network interfaces; without it they do not. Needs the extra live.",
         ),
     ] = None
     idle_exit: Annotated[

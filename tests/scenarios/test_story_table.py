@@ -33,13 +33,14 @@ from support.scenarios.files import (
 
 LOOKS = 50  # ticks between two looks at all that is known of every actor
 LONGEST = 500  # ticks
+AHEAD = VehicleCommand(throttle=0.3, steer=0.001)
 GUIDE = ("v", "a", "pace", "offset", "offset_rate", "offset_bend", "adds_offset", "at_end", "base")
 ACTOR = (
     "motion", "pose", "a", "acceleration", "travelled", "stood", "at_end", "present", "word", "seen",
 )  # fmt: skip
 
 
-def play_both(file, mode=ActorMode.PHYSICAL, ego=None, ticks=LONGEST):
+def play_both(file, mode=ActorMode.PHYSICAL, ego=None, ticks=LONGEST, command=AHEAD):
     """Plays a file both ways in one world; returns the player with tables, and how many ticks it played."""
     spec = template(course=Scenario(file=str(file), actors=mode))
     stage = stage_of(spec)
@@ -61,8 +62,9 @@ def play_both(file, mode=ActorMode.PHYSICAL, ego=None, ticks=LONGEST):
             assert states_of(table) == states_of(python), tick
         if python.ended:
             break
-        backend.step(VehicleCommand(throttle=0.3, steer=0.001), words)
+        backend.step(command, words)
     assert python.by_table == 0
+    assert table.played.staging == python.played.staging
     return table, tick + 1
 
 
@@ -142,6 +144,18 @@ def test_a_pulse_comes_out_of_its_delay_as_short_as_it_went_in(tmp_path, body, e
     assert said[1] - said[0] == pytest.approx(player.scene.dt)
     assert player.reason == ""
     assert 0.5 * ticks < player.by_table < ticks
+
+
+def test_a_way_back_counts_while_a_table_plays(tmp_path):
+    """The file asks the ego to go backwards, and it does, before anybody has looked at the actors."""
+    asked = story(event("back", private(speed(to(-2))), time(9)), actor="ego")
+    start = at("ego", -1, 50, 0) + at("other", -1, 120, 8)
+    file = write(tmp_path, init=start, stories=asked, end=10.0)
+    back = VehicleCommand(throttle=0.6, reverse=True)
+    player, ticks = play_both(file, ticks=LOOKS - 1, command=back)
+    assert player.by_table > 0.8 * ticks
+    assert player.way_back > 1.0
+    assert not player.played.staging.unreversed
 
 
 def test_what_no_table_can_hold_is_named(tmp_path):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from collections.abc import Sequence
 from math import cos, sin
 
@@ -184,4 +183,10 @@ class Fleet:
 
 def shown_gear(speed: float, reverse: bool) -> int:
     """Returns the gear that an automatic box shows: -1 in reverse, else 1 to 6 by speed in m/s."""
-    return -1 if reverse else 1 + bisect_left(GEAR_UP_V, abs(speed))
+    if reverse:
+        return -1
+    gear = 1
+    for limit in GEAR_UP_V:
+        if limit < abs(speed):
+            gear += 1
+    return gear

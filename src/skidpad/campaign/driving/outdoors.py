@@ -118,7 +118,7 @@ class FileChanges:
     """Turns actions of a played file into surroundings: weather, road, lights, lamps, hidden actors."""
 
     def __init__(self, player: Player, spec: RunSpec) -> None:
-        self.player, self.done, self.noticed = player, 0, 0
+        self.player, self.done, self.logged, self.noticed = player, 0, 0, 0
         settings = spec.settings
         self.serves_surface = spec.backend.backend != BackendKind.CARLA
         assert isinstance(spec.course, Scenario)
@@ -167,13 +167,14 @@ class FileChanges:
 
     @property
     def is_silent(self) -> bool:
-        """Whether the file has changed nothing so far that a log tells, and has nothing new to say."""
-        return not self.done and len(self.player.scene.notices) == self.noticed
+        """Whether the file has nothing new to say, and has changed nothing since it was asked for notices."""
+        return self.done == self.logged and len(self.player.scene.notices) == self.noticed
 
     def new_notices(self) -> list[str]:
         """Returns what the scenario could not do since the last call, empty mostly."""
         new = self.player.scene.notices[self.noticed :]
         self.noticed += len(new)
+        self.logged = self.done
         return new
 
     def hands(self, command: VehicleCommand) -> VehicleCommand:

@@ -12,7 +12,10 @@ SLOW = 0.9  # real-time factor below which a tick counts as slow (A-246)
 
 
 class Pace(Sink):
-    """Counts the ticks of a run, and those whose wall time was slow."""
+    """Counts the ticks of a run, and those whose wall time was slow.
+
+    Of ticks that a kernel drives in one call the mean counts, for all of them.
+    """
 
     sees_all = False
 

@@ -16,7 +16,7 @@ from skidpad.core.arrays import Flags, Floats
 from skidpad.core.kernels.calls import call
 from skidpad.core.kernels.jit import Held, kernel
 from skidpad.core.states import ActorStates
-from skidpad.physics.fleet import GEAR_UP_V
+from skidpad.physics.fleet import shown_gear
 from skidpad.recording.run.ticks import APPLIED, REPORT, REQUESTED, ActorColumns, copy_actors
 from skidpad.roads.kernels import LaneArrays
 from skidpad.sensors.object_level.objects import Common, sense
@@ -24,13 +24,13 @@ from skidpad.simulation.recovery import WRONG_WAY_DOT, find_ego, has_reason
 from skidpad.simulation.world.feel import feel_motion
 from skidpad.simulation.world.lights import ROUNDING
 from skidpad.simulation.world.step import DECIDE, MOVE, SETTLE, Arena, advance
+from skidpad.simulation.world.touch import EGO
 from skidpad.simulation.world.traffic.manager import CHECK_PERIOD
 from skidpad.stack.memory import Memory
 from skidpad.stack.perception.lights import NONE_AHEAD, StopLines, heed_light
 from skidpad.stack.road import RoadParts, read_road
 from skidpad.stack.think import Parts, think, write_report
 
-EGO = 0
 # why the kernel came back
 DONE = 0  # all ticks that were asked for are driven
 MOVED = 1  # actors have moved, and Python is to look after the traffic before they settle
@@ -128,16 +128,7 @@ class Stop(NamedTuple):
     request: Request  # of the last tick
 
 
-@kernel
-def count_gear(speed: float, reverse: bool) -> int:
-    """Returns the gear that `shown_gear` shows."""
-    if reverse:
-        return -1
-    gear, v = 1, abs(speed)
-    for limit in GEAR_UP_V:
-        if limit < v:
-            gear += 1
-    return gear
+count_gear = kernel(shown_gear)
 
 
 @kernel

@@ -43,7 +43,7 @@ class Timing:
     wall_s: float  # s, on the wall
     cpu_s: float = 0.0  # s, of the processor; 0: unknown, the run ended its process
     rtf: float | None = None  # simulated per wall time
-    rtf_below_0_9_pct: float | None = None  # ticks slower than that
+    rtf_below_0_9_pct: float | None = None  # ticks slower than that, those of a block by its mean
     quick_pct: float | None = None  # ticks that were driven in compiled blocks
     why_not_quick: str | None = None  # the first reason where none could be
     story_table_pct: float | None = None  # ticks of a story that a kernel played as a table

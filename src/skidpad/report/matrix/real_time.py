@@ -40,7 +40,7 @@ def real_time_blocks(matrix: Matrix) -> list[Block]:
         Column[WeatherGroup](
             f"ticks below {BEHIND:g}",
             partial(_of, known, "rtf_below_0_9_pct", "mean"),
-            "share of ticks slower than 0.9 times real time, mean over runs",
+            "share of ticks slower than 0.9 times real time, those of a block by its mean; mean over runs",
             "%",
             Format(".2f", absent="not measured"),
         ),

@@ -141,6 +141,7 @@ class Player:
     @property
     def played(self) -> Played:
         """Returns what was played as a value."""
+        self.settle()
         boxes = {name: entity.box for name, entity in self.scenario.entities.items()}
         story = tuple(self.scene.story)
         driven_by_file = self.modes.get(self.scenario.ego, ActorMode.PHYSICAL) is not None

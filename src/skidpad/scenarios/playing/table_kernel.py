@@ -17,7 +17,10 @@ from numpy.typing import NDArray
 from skidpad.core.kernels.jit import Held, inner_kernel, kernel
 from skidpad.core.states import ActorStates
 from skidpad.roads.kernels import LaneArrays
+from skidpad.scenarios.conditions.distances import SLOWEST
 from skidpad.scenarios.movement.following import follow
+from skidpad.scenarios.movement.motion import SLOW
+from skidpad.scenarios.scene import JUST, STANDING
 from skidpad.simulation.scripted import Hands
 
 F, I, B = np.float64, np.int64, np.bool_
@@ -95,9 +98,7 @@ KINDS = (
     COLLISION_TIME_ACROSS,
 ) = range(20)  # fmt: skip
 UNSURE = 1e-6  # of a value, at least of 1: so near to it Python decides
-STANDING = 0.05  # m/s, as `scene.STANDING` of what drives on tyres
-SLOW, SLOWEST = 1e-6, 1e-3  # m/s: `motion.SLOW`; of an approach, as in `conditions/distances`
-JUST = 1e-9  # s, as in `scene`
+ON_TYRES, _ = STANDING
 
 
 class Table(NamedTuple):
@@ -162,7 +163,7 @@ def observe(one: Row, s: ActorStates, dt: float) -> None:
         one.pz = one.pz + 0.0
     one.travelled = one.travelled + now * dt
     one.way_back = one.way_back + max(-(vx * cos(one.yaw) + vy * sin(one.yaw)), 0.0) * dt
-    one.stood = one.stood + dt if max(v, now) < STANDING else 0.0
+    one.stood = one.stood + dt if max(v, now) < ON_TYRES else 0.0
     if one.at_end:
         one.at_end_s = one.at_end_s + dt if one.at_end_s != 0.0 else JUST
     else:

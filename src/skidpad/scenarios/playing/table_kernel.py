@@ -98,7 +98,7 @@ KINDS = (
     COLLISION_TIME_ACROSS,
 ) = range(20)  # fmt: skip
 UNSURE = 1e-6  # of a value, at least of 1: so near to it Python decides
-ON_TYRES, _ = STANDING
+ON_TYRES = STANDING[0]  # m/s
 
 
 class Table(NamedTuple):

@@ -124,10 +124,13 @@ class Watched:
     def wakes(self) -> float:
         """Returns when the next change comes out of its delay, s; inf: none is on its way.
 
-        -inf where an edge or a transition has just gone in, which is over in the next step.
+        -inf where an edge or a transition has just been seen or come out, which is over in the next step.
         """
         timed = self.timed
-        if self.sent and (timed.edge is not Edge.NONE or isinstance(timed.condition, ElementMove)):
+        moved = isinstance(timed.condition, ElementMove)
+        if (moved or timed.edge is not Edge.NONE) and (self.sent or self.said):
+            return -inf
+        if moved and self.before:
             return -inf
         return self.past[0][0] if self.past else inf
 

@@ -15,8 +15,9 @@ from skidpad.core.weather import Weather
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.world.stage import build_world
+from skidpad.simulation.world.touch import EGO
 from skidpad.simulation.world.traffic.pack import RADIUS, UNSEEN, Pack
-from skidpad.simulation.world.world import EGO, World
+from skidpad.simulation.world.world import World
 
 JUMP = 10.0  # m in one tick, more than anybody drives
 

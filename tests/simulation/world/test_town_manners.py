@@ -7,8 +7,8 @@ from skidpad.campaign.bench.traffic import background_world
 from skidpad.campaign.bench.traffic_options import TrafficBench
 from skidpad.core.vocabulary import LightState
 from skidpad.roads.bundled import load_map
+from skidpad.simulation.world.touch import EGO
 from skidpad.simulation.world.traffic.spacing import claims, is_crossing_free
-from skidpad.simulation.world.world import EGO
 
 TOWN = load_map("town")
 

@@ -23,6 +23,7 @@ from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.world.lights import CYCLE_S, Lights
 from skidpad.simulation.world.stage import build_world
+from skidpad.simulation.world.touch import EGO
 from skidpad.simulation.world.traffic.idm import A_EMERGENCY, Character, idm
 from skidpad.simulation.world.traffic.mobil import GAP_CLEAR, incentive, is_safe
 from skidpad.simulation.world.traffic.placement import (
@@ -30,7 +31,7 @@ from skidpad.simulation.world.traffic.placement import (
     fixed_spawns,
     published_positions,
 )
-from skidpad.simulation.world.world import EGO, World
+from skidpad.simulation.world.world import World
 
 MAP = load_map("figure8")
 assert MAP.ego_start is not None

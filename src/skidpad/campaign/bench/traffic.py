@@ -17,7 +17,8 @@ from skidpad.core.vocabulary import TrafficStart
 from skidpad.evidence.statistics import Interval, poisson_interval
 from skidpad.physics.presets import find_weather
 from skidpad.simulation.world.stage import build_world
-from skidpad.simulation.world.world import EGO, World
+from skidpad.simulation.world.touch import EGO
+from skidpad.simulation.world.world import World
 
 DRIVE = 500.0  # s from one seed
 FIRST_SEED = 900_000  # nothing else is driven from here on (decision X-8)

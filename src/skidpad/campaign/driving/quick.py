@@ -50,7 +50,8 @@ from skidpad.simulation.recovery import (
 from skidpad.simulation.sensing import Objects
 from skidpad.simulation.world.feel import feel_motion
 from skidpad.simulation.world.step import advance
-from skidpad.simulation.world.world import EGO, World
+from skidpad.simulation.world.touch import EGO
+from skidpad.simulation.world.world import World
 from skidpad.stack.adas import AdasStack
 from skidpad.stack.loading import GuardedStack
 from skidpad.stack.perception.lights import heed_light

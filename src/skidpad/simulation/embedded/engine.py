@@ -24,7 +24,8 @@ from skidpad.sensors.requested import AskedSensors
 from skidpad.simulation.sensing import sensing_of
 from skidpad.simulation.world.feel import feel_motion
 from skidpad.simulation.world.stage import build_world, patches_of
-from skidpad.simulation.world.world import EGO, World
+from skidpad.simulation.world.touch import EGO
+from skidpad.simulation.world.world import World
 
 REVERSE = 4  # column of the commands
 UNLIT = np.zeros(0, dtype=np.bool_)  # brake lamps where no sensor sees any

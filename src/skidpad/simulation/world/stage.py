@@ -13,10 +13,10 @@ from skidpad.simulation.world.actors import Role, cast_of, place_of
 from skidpad.simulation.world.lights import Lights
 from skidpad.simulation.world.patches import LaneFrictions, Patches
 from skidpad.simulation.world.sheet_flow import SheetFlow
-from skidpad.simulation.world.touch import ContactBook
+from skidpad.simulation.world.touch import EGO, ContactBook
 from skidpad.simulation.world.traffic.care import care_of
 from skidpad.simulation.world.traffic.manager import Traffic
-from skidpad.simulation.world.world import EGO, Conditions, World
+from skidpad.simulation.world.world import Conditions, World
 
 
 def build_world(setup: Setup, seed: int) -> World:

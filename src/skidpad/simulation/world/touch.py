@@ -18,7 +18,7 @@ from skidpad.roads.queries import RoadMap
 from skidpad.simulation.world.placed import Places
 
 HOLD = 0.5  # s: bodies that bounce apart and touch again within this are one contact
-EGO = 0
+EGO = 0  # row and id of the first actor of a run
 LEFT, RIGHT = 1, 2  # bits of crossed markings
 
 

@@ -48,14 +48,13 @@ from skidpad.simulation.world.step import (
     advance_undriven,
     feel_grip,
 )
-from skidpad.simulation.world.touch import ContactBook, Touches, forget, invasions, markings_of
+from skidpad.simulation.world.touch import EGO, ContactBook, Touches, forget, invasions, markings_of
 from skidpad.simulation.world.traffic.care import careless
 from skidpad.simulation.world.traffic.manager import CHECK_PERIOD, Reason, Traffic, no_streets
 from skidpad.simulation.world.traffic.occupancy import occupancy
 from skidpad.simulation.world.traffic.state import drivers
 
 CARELESS = careless()
-EGO = 0  # row and id of the first actor of a run
 BRAKING = 0.05  # pedal at which the brake lamps light up
 
 

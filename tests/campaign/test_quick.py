@@ -254,6 +254,30 @@ def test_what_is_changed_between_two_calls_counts(change: Any, reason: str) -> N
     assert not first_difference(*logs)
 
 
+def test_the_first_of_two_reasons_stays() -> None:
+    opened = OpenRun(adas_run(4, duration=1.0))
+    opened.step()
+    for change in (lay_ice, slow_in_bends):
+        change(opened)
+        opened.drive(100)
+    opened.close()
+    run = opened.finish()
+    assert run.quick_ticks == 0
+    assert "patches" in run.why_not_quick
+
+
+@pytest.mark.parametrize("spec", [adas_run(4), scenario_run("front_accident")])
+def test_the_end_of_a_run_is_no_reason(spec: RunSpec) -> None:
+    opened = OpenRun(structs.replace(spec, duration=0.5))
+    opened.step()
+    assert opened.stepper is not None
+    while not opened.stepper.script.ended:
+        opened.step()
+    assert not opened.drive(100)
+    opened.close()
+    assert opened.finish().why_not_quick == "it was driven tick by tick"
+
+
 def test_the_supervisor_notes_where_an_ego_first_comes_to_a_lane() -> None:
     opened = OpenRun(adas_run(4, duration=5.0))
     for _ in range(30):

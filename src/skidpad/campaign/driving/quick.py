@@ -125,14 +125,14 @@ class QuickDrive:
     """The quick way of a run for which `find_parts` finds no reason when it begins.
 
     Attributes:
-        why_not: why the stepper drove the last tick that was asked for, or all; "": it did not.
+        reason: the first one for which the stepper drove a tick that was asked for here; "": none.
     """
 
     def __init__(
         self, stepper: Stepper, parts: QuickParts, log: TickLog, changes: FileChanges | None = None
     ) -> None:
         self.stepper, self.parts, self.log, self.changes = stepper, parts, log, changes
-        self.why_not = "it was driven tick by tick"
+        self.reason = ""
         self._clocks = parts.world.lights.clocks()
         self._stops = stops_of(parts.world.map)
         self._shown: dict[int, LightState] = {}  # of the next two
@@ -150,13 +150,10 @@ class QuickDrive:
         # anew, as surroundings, functions and random streams may be others since the last call
         found = find_parts(self.stepper, self.changes)
         if isinstance(found, str):
-            self.why_not = found
-            return 0
+            return self._leave(found)
         self.parts, last = found, self._last_request()
         if isinstance(last, str):
-            self.why_not = last
-            return 0
-        self.why_not = ""
+            return self._leave(last)
         timer, changed, driven = found.timer, found.changed, 0
         if changed is not None:
             driven = self._follow_script(most, last, *changed)
@@ -164,9 +161,19 @@ class QuickDrive:
             driven = self._drive_alone(min(most, timer.left), last)
         if driven:
             self.stepper.truth = found.backend.truth()
-        else:
-            self.why_not = "something happened in each tick"
+        elif not self.stepper.script.ended:
+            self._leave("something happened in each tick")
         return driven
+
+    @property
+    def why_not(self) -> str:
+        """Returns the first reason for which the stepper drove a tick."""
+        return self.reason or "it was driven tick by tick"
+
+    def _leave(self, reason: str) -> int:
+        """Leaves the next tick to the stepper; returns 0, as many as were driven."""
+        self.reason = self.reason or reason
+        return 0
 
     def _follow_script(
         self, most: int, last: Request, backend: ChangedBackend, changes: FileChanges

@@ -80,7 +80,7 @@ class Run:
         surface: what lay on parts of the road at the begin, by the run and by its scenario's file.
         laid: what its events have laid later.
         quick_ticks: how many ticks were driven in compiled blocks.
-        why_not_quick: the first reason why none were; empty where some could be.
+        why_not_quick: the first reason why none were; empty where some were.
     """
 
     log: RunLog

@@ -45,7 +45,7 @@ class Timing:
     rtf: float | None = None  # simulated per wall time
     rtf_below_0_9_pct: float | None = None  # ticks slower than that, those of a block by its mean
     quick_pct: float | None = None  # ticks that were driven in compiled blocks
-    why_not_quick: str | None = None  # the first reason where none could be
+    why_not_quick: str | None = None  # the first reason where none were
     story_table_pct: float | None = None  # ticks of a story that a kernel played as a table
     why_no_story_table: str | None = None  # the first thing in it that no table can hold
 

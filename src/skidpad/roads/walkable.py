@@ -69,7 +69,8 @@ class WalkMesh:
 def walk_mesh(map: RoadMap) -> WalkMesh | None:
     """Returns the map's walking surface; None when it has neither sidewalks nor shoulders to walk on.
 
-    A plane cannot hold lanes above each other: on maps with sidewalks nobody walks on the upper ones.
+    A plane cannot hold lanes above each other: on maps with sidewalks, a lane of which a part lies above
+    another one is left out over its whole length.
     """
     if np.any(map.lanes.kind == LaneKind.SIDEWALK):
         kept = _lowest_lanes(map)

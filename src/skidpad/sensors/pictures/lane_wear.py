@@ -37,6 +37,7 @@ def soften_border(
 ) -> None:  # fmt: skip
     """Lets the colours of two neighbouring strips of one asphalt run into each other in a block, in `work`.
 
+    A border between two blocks stays hard, as the colours of the first are written already.
     begin, middle, end: of the block's pixels, where the first strip begins, the second, and what follows it.
     table: colour by instance and material, as in `gather`.
     """

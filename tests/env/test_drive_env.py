@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,8 @@ import skidpad  # noqa: E402
 from skidpad.campaign.runs.rerun import first_ticks  # noqa: E402
 from skidpad.core.errors import ConfigError  # noqa: E402
 from skidpad.env import OBSERVED, WEIGHTS  # noqa: E402
+from skidpad.env.drive_env import DriveEnv  # noqa: E402
+from skidpad.env.episodes import Episodes  # noqa: E402
 from skidpad.env.wheel import WHERE  # noqa: E402
 from skidpad.evidence.drive.metrics import run_metrics  # noqa: E402
 from skidpad.recording.run.log_files import log_hash  # noqa: E402
@@ -163,3 +167,19 @@ def test_what_cannot_be_is_said_at_once(options, message):
         ConfigError, match="unknown reset option 'friction'; choose one of: weather, grip"
     ):
         make().reset(options={"friction": 0.3})
+
+
+def test_help_tells_what_each_argument_is_by_default():
+    said = " ".join(DriveEnv.__doc__.split())
+    for name, parameter in inspect.signature(Episodes).parameters.items():
+        if name != "make":
+            default = parameter.default
+            word = (
+                f'"{default}"'
+                if isinstance(default, str)
+                else f"{default:g}"
+                if default
+                else "None"
+            )
+            about = said.partition(f" {name}: ")[2].partition(".")[0]
+            assert f"{word} (default)" in about or f"default {word}" in about

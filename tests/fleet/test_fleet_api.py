@@ -200,3 +200,6 @@ def test_drives_and_indicators_are_checked(lite):
     assert send("indicators", json.dumps(row).encode(), "indicators-1") == 200
     assert send("indicators", json.dumps(row | {"n": -1}).encode(), "indicators-2") == 422
     assert send("indicators", json.dumps(row | {"x": 1}).encode(), "indicators-3") == 422
+    two = json.dumps(row).encode() + b"\n\n" + json.dumps(row | {"minute": 1}).encode()
+    assert send("indicators", two, "indicators-4") == 200
+    assert send("indicators", json.dumps(row, indent=1).encode(), "indicators-5") == 422

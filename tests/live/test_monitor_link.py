@@ -6,6 +6,7 @@ import io
 import json
 import os
 import signal
+import threading
 import time
 
 import numpy as np
@@ -14,6 +15,7 @@ import pytest
 
 from skidpad.campaign.channels.drive import drive_segment
 from skidpad.core.channels import ChannelFrame, Context
+from skidpad.core.errors import ConfigError
 from skidpad.evidence.channels.monitor import MonitorSettings
 from skidpad.evidence.channels.timing import LIVE_TIMES, delay_sentence, late_cycles
 from skidpad.live import links as live_links
@@ -234,3 +236,20 @@ def test_the_monitor_has_a_processor_of_its_own_where_that_is_allowed(tmp_path):
     said = read_outcome(tmp_path / "live").isolation
     assert said["processor"] == cpu
     assert {"nice", "governor"} <= said.keys()
+
+
+def test_a_feeder_that_died_holds_no_drive_at_its_end(tmp_path, monkeypatch):
+    monkeypatch.setattr(MonitorLink, "_feed", lambda self: None)
+    settings = MonitorLinkSettings(flow=Flow.LIVE, capacity=1)
+    link = MonitorLink(("a", "b"), tmp_path / "live", settings)
+    tell(link, drive(FOLLOWED, (Eyes("a"), Eyes("b")), 0.5))
+    closing = threading.Thread(target=link.close, daemon=True)
+    closing.start()
+    closing.join(60.0)
+    assert not closing.is_alive()
+    assert read_outcome(tmp_path / "live").missing == list(range(6))
+
+
+def test_a_queue_without_room_is_refused():
+    with pytest.raises(ConfigError, match="at least 1 cycle, got 0"):
+        MonitorLinkSettings(capacity=0)

@@ -208,3 +208,40 @@ def test_ten_thousand_objects_are_read(tmp_path):
     (message,) = McapRecording(tmp_path / "big.mcap").messages()
     assert isinstance(message.item, ChannelFrame)
     assert same(message.item, big)
+
+
+@pytest.mark.req("C-021")
+def test_a_type_that_only_ends_like_ours_is_foreign(tmp_path, monkeypatch):
+    listed = drive(WORLD, EYES, 1.0)
+    path = tmp_path / "a.mcap"
+    write(path, listed)
+    records = McapRecording._records
+    monkeypatch.setattr(
+        McapRecording,
+        "_records",
+        lambda self, losses: (
+            (topic, schema.replace("skidpad.Truth", "x.skidpad.Truth"), record)
+            for topic, schema, record in records(self, losses)
+        ),
+    )
+    recording = McapRecording(path, truth=False)
+    assert all(message.channel is not None for message in recording.messages())
+    assert recording.losses.foreign == sum(channel is None for channel, _ in listed.rows) > 0
+
+
+@pytest.mark.parametrize(
+    ("item", "channel"),
+    [
+        (frame(0.0, (0, 0, 0, 1, 0)), None),
+        (frame(0.0, (0, 0, 0, 1, 0)), 2),
+        (frame(0.0, (0, 0, 0, 1, 0)), -1),
+        (Context(0.0, {"route": "town"}), 0),
+        (Decision(0.1, "a", "preferred", (0.5,)), 1),
+    ],
+)
+def test_frames_alone_have_a_channel(tmp_path, item, channel):
+    with (
+        ChannelWriter(tmp_path / "a.mcap", ["a", "b"]) as writer,
+        pytest.raises(ConfigError, match=f"channel of a {type(item).__name__} must be in"),
+    ):
+        writer.add(item, channel)

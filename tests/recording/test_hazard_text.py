@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 from skidpad.core.channels import Cycle
 from skidpad.core.errors import FileError
 from skidpad.core.vocabulary import HazardType
+from skidpad.fleet.batch import hazards_of
+from skidpad.fleet.words import Limits, Refused
 from skidpad.recording.channels.cycles import cycles
 from skidpad.recording.hazards.records import (
     HazardRecord,
@@ -23,6 +25,7 @@ from skidpad.recording.hazards.records import (
     read_hazards,
     read_index,
 )
+from skidpad.recording.hazards.text import HEADER
 from support.channel_worlds import Eyes, World, drive, frame, traffic
 from support.examples import examples
 
@@ -170,3 +173,19 @@ def test_no_damage_makes_the_text_reader_raise_anything_but_its_own_error(data):
         text[place] = data.draw(st.sampled_from(list('0123456789 -~\nWFELTSOQZH{}[]",.x')))
     with contextlib.suppress(FileError):
         decode_record("".join(text))
+
+
+@pytest.mark.parametrize("key", ["objects", "flags"])
+def test_a_head_without_its_objects_or_flags_is_refused(key):
+    text = re.sub(rf'"{key}": \[[^]]*\], ', "", encode_record(record([])), count=1)
+    assert f'"{key}"' not in text
+    with pytest.raises(FileError, match=key):
+        decode_record(text)
+    with pytest.raises(Refused, match=key):
+        hazards_of(f"{HEADER}\n{text}".encode(), Limits())
+
+
+def test_numbers_of_numpy_come_back():
+    objects = (InvolvedObject("b", np.int64(3), np.float32(1.5), np.float64(2.0)),)
+    made = record([], objects=objects, count=np.int64(11))
+    assert decode_record(encode_record(made)).objects == (InvolvedObject("b", 3, 1.5, 2.0),)

@@ -16,6 +16,7 @@ import pytest
 from skidpad.core.errors import FileError, OutputError
 from skidpad.core.vocabulary import Outcome
 from skidpad.recording.campaign import ledger as ledger_module
+from skidpad.recording.campaign.added_metrics import METRICS_FILE, read_added_metrics
 from skidpad.recording.campaign.ledger import (
     CAMPAIGN,
     LEDGER,
@@ -274,3 +275,10 @@ def test_an_unfinished_campaign_says_how_to_finish_it(tmp_path):
     (tmp_path / "ledger.jsonl").touch()
     with pytest.raises(FileError, match="not finished: finish it with --resume"):
         read_results(tmp_path)
+
+
+def test_a_file_of_metrics_beyond_its_limit_is_named_once(tmp_path):
+    (tmp_path / METRICS_FILE).write_text("[" + " " * 2**20 + "]")
+    with pytest.raises(FileError, match="larger than 1048576 bytes") as told:
+        read_added_metrics(tmp_path)
+    assert str(told.value).count(METRICS_FILE) == 1

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from lxml import etree
+from msgspec import structs
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError, InputError
 from skidpad.recording.channels.cycles import cycles
 from skidpad.recording.hazards.records import (
-    HazardRecord,
     HazardWriter,
 )
 from skidpad.scenarios.export.hazard_export import export_hazard
@@ -143,10 +143,7 @@ def test_a_1_0_file_takes_the_driving_channel_and_names_wrong_ones(tmp_path):
 
 
 def test_a_record_without_worlds_is_refused(tmp_path):
-    record = a_record(1, 0.2)
-    empty = HazardRecord(
-        **{n: getattr(record, n) for n in HazardRecord.__dataclass_fields__ if n != "worlds"}
-    )
+    empty = structs.replace(a_record(1, 0.2), worlds=())
     with pytest.raises(InputError, match="no world"):
         export_hazard(empty, tmp_path)
 

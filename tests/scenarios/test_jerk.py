@@ -148,3 +148,12 @@ maxSpeed="40"/></LongitudinalDistanceAction></LongitudinalAction>""")
     a = [(q - p) / 0.05 for p, q in pairwise(v)]
     grown = [(q - p) / 0.05 for p, q in pairwise(a) if q > 0.0]
     assert max(grown) == pytest.approx(2.0, abs=0.01)
+
+
+@pytest.mark.osc("SpeedProfileAction")
+def test_rates_of_a_profile_by_position_are_not_read(tmp_path):
+    profile = private("""<LongitudinalAction><SpeedProfileAction followingMode="position">
+<DynamicConstraints maxAccelerationRate="none"/><SpeedProfileEntry speed="16" time="3"/>
+</SpeedProfileAction></LongitudinalAction>""")
+    found = speeds(tmp_path, event("e", profile, time(0.975)))
+    assert found[4.0] == pytest.approx(16.0, abs=1e-6)

@@ -30,17 +30,17 @@ class DriveEnv(gymnasium.Env):  # type: ignore[misc]
     on the wrong way, rolled over or stuck. It is cut (`truncated`) after `duration`.
 
     Args:
-        map: a bundled map's name, or an OpenDRIVE file.
-        weather: a preset's name, a file, or a weather.
-        grip: what weather does to tyres: "physical", "statistical" or "none".
-        vehicles: background vehicles, 0 to 80; fewer where the map has no place for them.
-        traffic: "fixed", "random" or "pack".
-        duration: of an episode, s.
+        map: a bundled map's name, or an OpenDRIVE file; default "figure8".
+        weather: a preset's name, a file, or a weather; default "clear-noon".
+        grip: what weather does to tyres: "physical" (default), "statistical" or "none".
+        vehicles: background vehicles, 0 to 80, default 20; fewer where the map has no place for them.
+        traffic: "fixed" (default), "random" or "pack".
+        duration: of an episode, s; default 60.
         steers: the action has a steer, too; else lane centring steers.
         rewards: weight of each term, by the name of a metric; terms that are left out weigh 0.
-        seeds: run seeds that `reset()` draws from; None: any. Worlds of listed seeds are kept, and
+        seeds: run seeds that `reset()` draws from; None (default): any. Worlds of listed seeds are kept, and
             resets go back to their begin by a checkpoint, which is cheaper than to build them.
-        profile: as `--profile`.
+        profile: as `--profile`; default "recommended".
 
     Raises:
         ConfigError: a value is out of its range, or is no name that exists.

@@ -35,16 +35,16 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
     side; its vehicle is then taken off the road. All are cut (`truncations`) after `duration`.
 
     Args:
-        map: a bundled map's name, or an OpenDRIVE file.
-        weather: a preset's name, a file, or a weather.
-        grip: what weather does to tyres: "physical", "statistical" or "none".
-        vehicles: beside the ego, 0 to 80; fewer where the map has no place for them.
-        traffic: "fixed" or "pack": where they begin, at rest.
-        duration: of an episode, s.
+        map: a bundled map's name, or an OpenDRIVE file; default "figure8".
+        weather: a preset's name, a file, or a weather; default "clear-noon".
+        grip: what weather does to tyres: "physical" (default), "statistical" or "none".
+        vehicles: beside the ego, 0 to 80, default 20; fewer where the map has no place for them.
+        traffic: "fixed" (default) or "pack": where they begin, at rest.
+        duration: of an episode, s; default 60.
         rewards: weight of each term, by the name of a metric; terms that are left out weigh 0.
-        seeds: seeds that `reset()` draws from; None: any. Worlds of listed seeds are kept, and resets go
-            back to their begin by a checkpoint.
-        profile: as `--profile`.
+        seeds: seeds that `reset()` draws from; None (default): any. Worlds of listed seeds are kept, and
+            resets go back to their begin by a checkpoint.
+        profile: as `--profile`; default "recommended".
 
     Raises:
         ConfigError: a value is out of its range, or is no name that exists.
@@ -65,7 +65,8 @@ class TrafficEnv(ParallelEnv):  # type: ignore[misc]
         **course: Unpack[Course],
     ) -> None:
         self.render_mode = render_mode
-        require_choice("traffic", course.get("traffic", "fixed"), ("fixed", "pack"))
+        if "traffic" in course:
+            require_choice("traffic", course["traffic"], ("fixed", "pack"))
         asked = {name: WEIGHTS[name] for name in DRIVEN} if rewards is None else rewards
         for name in asked:
             require_choice("reward term of all agents", name, DRIVEN)

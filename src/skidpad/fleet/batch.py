@@ -159,7 +159,11 @@ def drive_of(content: bytes) -> BatchDrive:
 
 def rows_of(content: bytes, limits: Limits) -> list[IndicatorRow]:
     """Returns the rows of a batch of indicators; Refused (413, 422) if one is wrong or they are too many."""
-    rows = decode_sent(_ROWS.decode_lines, content, "a row of indicators cannot be read")
+    rows = decode_sent(
+        lambda text: [_ROWS.decode(line) for line in text.splitlines() if line],
+        content,
+        "a row of indicators cannot be read",
+    )
     if len(rows) > 100 * limits.records:
         raise Refused(413, f"a batch may hold {100 * limits.records} rows of indicators")
     for row in rows:

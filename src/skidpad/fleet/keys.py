@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
+from secrets import token_hex
 
 from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePrivateKey
@@ -10,7 +12,7 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
 from skidpad.core.errors import FileError, OutputError
 from skidpad.core.text.told import on_a_line
-from skidpad.recording.files import write_secret
+from skidpad.recording.files import output_error, write_secret
 
 
 def secret_pem(key: Ed25519PrivateKey | EllipticCurvePrivateKey) -> bytes:
@@ -24,10 +26,17 @@ def secret_pem(key: Ed25519PrivateKey | EllipticCurvePrivateKey) -> bytes:
 
 def new_key(path: Path) -> Ed25519PrivateKey:
     """Writes a fresh Ed25519 key to `path` and returns it; OutputError when a file is there already."""
-    if path.exists():
-        raise OutputError(f"{path} exists, and a key is never replaced")
     key = Ed25519PrivateKey.generate()
-    write_secret(path, secret_pem(key))
+    temporary = path.with_name(f".{path.name}.{token_hex(8)}")
+    write_secret(temporary, secret_pem(key))
+    try:
+        os.link(temporary, path)  # in contrast to a rename it replaces nothing
+    except FileExistsError:
+        raise OutputError(f"{path} exists, and a key is never replaced") from None
+    except OSError as error:
+        raise output_error(path, error) from error
+    finally:
+        temporary.unlink()
     return key
 
 

@@ -17,8 +17,9 @@ import tempfile
 import threading
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
-from queue import Queue
+from queue import Full, Queue
 from typing import Any
 
 import skidpad
@@ -74,8 +75,7 @@ class MonitorLink:
     def close(self) -> None:
         """Ends the monitor, waits for it, and writes what became of the link."""
         if self.settings.flow is Flow.LIVE:
-            self._waiting.put(None)
-            self._feeder.join()
+            self._end_feeder()
         self._push(end_mark())
         assert self.process.stdin is not None
         assert self.process.stdout is not None
@@ -84,6 +84,17 @@ class MonitorLink:
         self.process.stdout.close()
         self._errors.close()
         write_outcome(self.folder, self.outcome)
+
+    def _end_feeder(self) -> None:
+        """Lets the thread deliver what waits, then ends it; one that died leaves missing cycles."""
+        while self._feeder.is_alive():
+            with suppress(Full):
+                self._waiting.put(None, timeout=0.1)
+                break
+        self._feeder.join()
+        while not self._waiting.empty():
+            if left := self._waiting.get():
+                self.missing.append(left[0])
 
     @property
     def outcome(self) -> LinkOutcome:

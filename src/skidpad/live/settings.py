@@ -61,3 +61,7 @@ class MonitorLinkSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     capacity: int = 20  # cycles that wait in the drive's process: 2 s
     patience: float = 120.0  # s without any progress after which the monitor counts as hanging
     pin: int | None = None  # processor for the monitor alone (C-231)
+
+    def __post_init__(self) -> None:
+        if self.capacity < 1:
+            raise ConfigError(f"capacity of a link must be at least 1 cycle, got {self.capacity}")

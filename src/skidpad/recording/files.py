@@ -69,7 +69,7 @@ def read_json(path: Path, kind: type[T], limit: int = TEXT_MAX) -> T | None:
     """Returns the value of a JSON file; None where there is no file, FileError where it is damaged."""
     if not path.is_file():
         return None
-    found: T = decode_json(read_bytes(path, path.name, limit), str(path), kind)
+    found: T = decode_json(read_bytes(path, "file", limit), str(path), kind)
     return found
 
 

@@ -122,12 +122,14 @@ class Demo:
     next_seed: int = SEED
     payloads: dict[str, bytes] = field(default_factory=dict)  # by name, "": what cars come with
 
-    def client(self, token: str) -> Client:
-        """Returns a connection to the service with a credential."""
+    def client(self, token: str, timeout: float = 600.0) -> Client:
+        """Returns a connection to the service with a credential; timeout: of each request, s."""
         import httpx
 
         headers = {"Authorization": f"Bearer {token}"}
-        return httpx.Client(base_url=self.address, headers=headers, timeout=600.0, trust_env=False)
+        return httpx.Client(
+            base_url=self.address, headers=headers, timeout=timeout, trust_env=False
+        )
 
     def call(self, token: str, method: str, path: str, body: Any = None) -> Any:
         """Sends one request with a credential and returns the answer; BackendError unless it is 200."""
@@ -176,11 +178,11 @@ class Demo:
         """Spools and sends what the monitor wrote; BackendError when a batch waits or is refused."""
         from skidpad.fleet.monitored import spool_folder
         from skidpad.fleet.spool import Spool
-        from skidpad.fleet.uploader import poster, send
+        from skidpad.fleet.uploader import TIMEOUT_S, poster, send
 
         spool = Spool(car.folder / "spool")
         spool_folder(spool, folder, release, judged)
-        with self.client(car.token) as client:
+        with self.client(car.token, TIMEOUT_S) as client:
             sent = send(spool, poster(client))
         if sent.waiting or sent.refused:
             raise BackendError(f"{car.name}: {sent.waiting} batches wait, {sent.refused} refused")

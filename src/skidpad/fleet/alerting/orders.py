@@ -15,6 +15,7 @@ from typing import Any
 from sqlalchemy import Connection, select
 from sqlalchemy.exc import IntegrityError
 
+from skidpad.core.errors import OutputError
 from skidpad.fleet.alerting.keeping import alert_of
 from skidpad.fleet.identity import new_id
 from skidpad.fleet.keys import load_key, new_key
@@ -42,7 +43,12 @@ class Signer:
     def __init__(self, folder: Path) -> None:
         """Reads orders.key in the folder, or makes one, and writes orders.pub; FileError for no such key."""
         path = folder / "orders.key"
-        self._key = load_key(path) if path.exists() else new_key(path)
+        try:
+            self._key = load_key(path) if path.exists() else new_key(path)
+        except OutputError:
+            if not path.exists():
+                raise
+            self._key = load_key(path)  # another process made it at this moment
         self.public = self._key.public_key().public_bytes_raw()
         write_bytes(folder / "orders.pub", self.public.hex().encode() + b"\n")
 

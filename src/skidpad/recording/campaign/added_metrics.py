@@ -10,6 +10,7 @@ import msgspec
 from skidpad.recording.files import read_json, write_bytes
 
 METRICS_FILE = "added_metrics.json"  # in a run's folder
+SIZE_MAX = 2**20  # bytes
 
 
 class AddedMetric(msgspec.Struct, frozen=True):
@@ -29,4 +30,4 @@ def write_added_metrics(folder: Path, added: Sequence[AddedMetric]) -> None:
 
 def read_added_metrics(folder: Path) -> tuple[AddedMetric, ...]:
     """Returns the metrics that packages added to a run as it was driven; () where there are none."""
-    return read_json(folder / METRICS_FILE, tuple[AddedMetric, ...]) or ()
+    return read_json(folder / METRICS_FILE, tuple[AddedMetric, ...], SIZE_MAX) or ()

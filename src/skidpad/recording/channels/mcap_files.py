@@ -31,6 +31,7 @@ CHUNK_SIZE = 64 * 1024  # bytes; what a power cut can cost
 RECORD_LIMIT = 64 * 1024 * 1024  # bytes; a longer record is damage
 FLUSH_EVERY = 1.0  # s of recorded time
 NS = 1_000_000_000
+PREFIX = "skidpad."  # of schemas
 
 Item = ChannelFrame | TruthFrame | Decision | Context
 
@@ -131,10 +132,14 @@ class ChannelWriter(AbstractContextManager["ChannelWriter"]):
         return int(self._writer.register_channel(topic, "protobuf", schema))
 
     def add(self, item: Item, channel: int | None = None) -> None:
-        """Appends any item; a frame with the index of the channel that said it.
+        """Appends any item; a frame, and nothing else, with the index of the channel that said it.
 
-        ConfigError for a time outside [0, 1.8e10) s.
+        ConfigError for another index, and for a time outside [0, 1.8e10) s.
         """
+        indices = range(len(self.channels)) if isinstance(item, ChannelFrame) else (None,)
+        if channel not in indices:
+            kind = type(item).__name__
+            raise ConfigError(f"channel of a {kind} must be in {list(indices)}, got {channel!r}")
         if not 0.0 <= item.t < 1.8e10:  # MCAP stores unsigned nanoseconds
             raise ConfigError(f"time of a channel message must be in [0, 1.8e10) s, got {item.t!r}")
         message, stamp = codec.KINDS[type(item)].write(item), round(item.t * NS)
@@ -193,7 +198,8 @@ class McapRecording:
         for topic, schema, record in self._records(self.losses):
             if schema == "skidpad.Truth" and not self.truth:
                 continue
-            item = read_item(schema.partition("skidpad.")[2], record.data, self.losses)
+            name = schema.removeprefix(PREFIX) if schema.startswith(PREFIX) else ""
+            item = read_item(name, record.data, self.losses)
             if item is None:
                 continue
             channel = index.get(topic) if isinstance(item, ChannelFrame) else None

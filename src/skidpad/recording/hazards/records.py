@@ -53,14 +53,16 @@ class HazardHead(msgspec.Struct, frozen=True, kw_only=True):
     channels: tuple[str, ...]  # all channels, in the order of the worlds
     driving: str | None  # name of the channel that drove; null: none
     involved: tuple[str, ...]  # names of the channels that it is about
-    objects: tuple[InvolvedObject, ...] = ()  # that it is about, m in the world frame
-    flags: tuple[str, ...] = ()  # "assumed": OLSS without a pair; "cut": the world ends early
+    objects: tuple[InvolvedObject, ...]  # that it is about, m in the world frame
+    flags: tuple[str, ...]  # "assumed": OLSS without a pair; "cut": the world ends early
     context: dict[str, str]  # map and weather of the drive
 
 
 class HazardRecord(HazardHead, frozen=True, kw_only=True):
     """Record of one hazardous scene, with the worlds around it."""
 
+    objects: tuple[InvolvedObject, ...] = ()
+    flags: tuple[str, ...] = ()
     worlds: tuple[Cycle, ...] = ()  # from 5 s before to 5 s after
 
 
@@ -103,7 +105,7 @@ def index_row(record: HazardRecord) -> dict[str, Any]:
 def _plain(head: HazardHead) -> dict[str, Any]:
     """Returns what a record says of its hazard as plain values."""
     said = {name: getattr(head, name) for name in HazardHead.__struct_fields__}
-    plain: dict[str, Any] = msgspec.to_builtins(said, enc_hook=float)  # also of NumPy
+    plain: dict[str, Any] = msgspec.to_builtins(said, enc_hook=lambda v: v.item())  # of NumPy
     return plain
 
 

@@ -9,6 +9,7 @@ from msgspec import Struct
 from skidpad.recording.files import read_json, write_json
 
 STAGING, JUDGING = "staging.json", "judging.json"
+SIZE_MAX = 1024**3  # bytes of a file
 
 
 class StagedEvent(Struct, frozen=True, kw_only=True):
@@ -52,7 +53,7 @@ def write_staging(folder: Path, staging: Staging) -> None:
 
 def read_staging(folder: Path) -> Staging | None:
     """Return the staging of a run; None where it has none, FileError where it cannot be read."""
-    return read_json(folder / STAGING, Staging)
+    return read_json(folder / STAGING, Staging, SIZE_MAX)
 
 
 class LeftOut(Struct, frozen=True):
@@ -76,4 +77,4 @@ def write_judging(folder: Path, judging: Judging) -> None:
 
 def read_judging(folder: Path) -> Judging:
     """Return how the runs of a folder are judged; the default where it does not say."""
-    return read_json(folder / JUDGING, Judging) or Judging()
+    return read_json(folder / JUDGING, Judging, SIZE_MAX) or Judging()

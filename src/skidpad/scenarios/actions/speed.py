@@ -409,8 +409,7 @@ def compile_profile(node: Node, ctx: Context) -> Profile:
         entries.append((entry.number("speed"), duration))
     if not entries:
         raise node.error("needs a <SpeedProfileEntry>")
-    limits, jerk = read_limits(node.find("DynamicConstraints")), Jerk()
-    if following is Following.FOLLOW:
-        jerk = Jerk(*(rate if rate > 0.0 else inf for rate in (limits.a_rate, limits.b_rate)))
+    limits = read_limits(node.find("DynamicConstraints"), rates=following is Following.FOLLOW)
+    jerk = Jerk(*(rate if rate > 0.0 else inf for rate in (limits.a_rate, limits.b_rate)))
     other = ctx.entity(node) if node.has("entityRef") else None
     return Profile(tuple(entries), other, limits, jerk, following)

@@ -318,14 +318,18 @@ def _performance(node: Node) -> Performance:
     return Performance(*(m if m > 0.0 else inf for m in most))
 
 
-def read_limits(found: Node | None) -> Performance:
-    """Returns the limits that an element names; inf where one is missing, and without an element."""
-    return Performance(*(found.limit(name, inf) for name in LIMITS)) if found else Performance()
-
-
 LIMITS = (
     "maxSpeed", "maxAcceleration", "maxDeceleration", "maxAccelerationRate", "maxDecelerationRate",
 )  # fmt: skip
+
+
+def read_limits(found: Node | None, rates: bool = True) -> Performance:
+    """Returns the limits that an element names; inf where one is missing, and without an element.
+
+    rates: the limits of jerk are read, too.
+    """
+    names = LIMITS if rates else LIMITS[:3]
+    return Performance(*(found.limit(name, inf) for name in names)) if found else Performance()
 
 
 def read_properties(node: Node) -> dict[str, str]:

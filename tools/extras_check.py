@@ -2,14 +2,16 @@
 
     python tools/extras_check.py                # all extras; needs uv (pip install uv) and the index
     python tools/extras_check.py osi carla      # some of them
-    python tools/extras_check.py --install osi  # installed, and tested; Pythons of PATH and of pyenv
+    python tools/extras_check.py --install osi  # installed and imported; Pythons of PATH and of pyenv
+    python tools/extras_check.py --test osi     # and tested
 
 Without `--install` nothing is installed: uv asks the index which versions have wheels for this platform and
 the other Python. A cell is the number of distributions of the whole installation, base included; where a
 requirement of the extra is left out by its marker, its name follows.
 
-With it, the wheel and the one extra go into an empty environment, every module of the package is imported
-there, and the quick tests run that name a module which the extra brings. A cell says how many passed.
+With it, the wheel and the one extra go into an empty environment, and every module of the package that the
+extra allows is imported there: a cell says how many. `--test` then runs the quick tests that name a module
+which the extra brings: a cell says how many passed.
 """
 
 from __future__ import annotations
@@ -86,8 +88,10 @@ def files_that_ask(modules: Sequence[str], folder: Path = ROOT / "tests") -> lis
     return [str(file) for file in files if is_asked.search(file.read_text(encoding="utf-8"))]
 
 
-def install(extra: str, python: str, wheel: Path, named: Sequence[str]) -> tuple[bool, str]:
-    """Installs the wheel with an extra alone, imports all of it and runs its tests; returns how that went."""
+def install(
+    extra: str, python: str, wheel: Path, named: Sequence[str], is_tested: bool
+) -> tuple[bool, str]:
+    """Installs the wheel with an extra alone, imports all of it, and tests it where asked."""
     alone = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "VIRTUAL_ENV")}
     with tempfile.TemporaryDirectory() as folder:
         own = str(Path(folder) / "bin" / "python")
@@ -98,7 +102,6 @@ def install(extra: str, python: str, wheel: Path, named: Sequence[str]) -> tuple
             [*put, asked],
             ["uv", "pip", "check", "--quiet", "--python", own],
             [own, "-c", IMPORT_ALL],
-            [*put, *TOOLS],
         ]
         for step in steps:
             done = subprocess.run(
@@ -106,6 +109,9 @@ def install(extra: str, python: str, wheel: Path, named: Sequence[str]) -> tuple
             )
             if done.returncode:
                 return False, f"**no**: {' '.join((done.stdout + done.stderr).split())[-300:]}"
+        if not is_tested:
+            return True, done.stdout.split()[0]
+        subprocess.run([*put, *TOOLS], cwd=folder, env=alone, check=True)
         asking = [own, "-c", MODULES_OF, *named]
         brought = subprocess.run(asking, capture_output=True, text=True, check=True).stdout.split()
         files = files_that_ask(brought)
@@ -130,7 +136,7 @@ def install(extra: str, python: str, wheel: Path, named: Sequence[str]) -> tuple
         return done.returncode == 0, lines[-1].rpartition(" in ")[0].strip("= ")
 
 
-def install_all(extras: dict[str, list[str]], chosen: Sequence[str]) -> int:
+def install_all(extras: dict[str, list[str]], chosen: Sequence[str], is_tested: bool) -> int:
     """Prints a row for each extra that is installed on each Python; returns 1 where one of them fails."""
     at_hand = pythons()
     print_head(minor_of(python) for python in at_hand)
@@ -141,7 +147,7 @@ def install_all(extras: dict[str, list[str]], chosen: Sequence[str]) -> int:
         subprocess.run(building, check=True)
         (wheel,) = Path(folder).glob("skidpad-*.whl")
         for extra in chosen:
-            done = [install(extra, python, wheel, extras[extra]) for python in at_hand]
+            done = [install(extra, python, wheel, extras[extra], is_tested) for python in at_hand]
             failed |= not all(ok for ok, _ in done)
             row = " | ".join(said for _, said in done)
             print(f"| {f'`{extra}`' if extra else 'none'} | {row} |", flush=True)
@@ -164,14 +170,14 @@ def print_head(versions: Iterable[str]) -> None:
 def main(words: list[str]) -> int:
     """Prints a row for each extra; returns 1 where one of them cannot be installed on one Python."""
     extras = {BASE: [], **extras_of(PROJECT.read_text(encoding="utf-8"))}
-    is_installed = "--install" in words
-    words = [word for word in words if word != "--install"]
+    options = {"--install", "--test"} & set(words)
+    words = [word for word in words if word not in options]
     unknown = [word for word in words if word not in extras]
     if unknown:
         print(f"no extra of {PROJECT.name}: {', '.join(unknown)}", file=sys.stderr)
         return 2
-    if is_installed:
-        return install_all(extras, words or list(extras))
+    if options:
+        return install_all(extras, words or list(extras), "--test" in options)
     print_head(f"3.{minor}" for minor in MINORS)
     failed = False
     with ThreadPoolExecutor(2) as pool:

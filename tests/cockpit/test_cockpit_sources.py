@@ -297,10 +297,17 @@ def test_the_crash_camera_looks_at_the_crash_from_wherever_the_ego_is(yaw):
     assert (x / z, y / z) == pytest.approx((0.0, 0.0), abs=1e-9)
 
 
-def test_who_is_of_a_foreign_class_is_shown_as_a_car():
+def test_who_is_of_a_foreign_class_is_shown_as_a_car(tmp_path):
     assert [class_of(label) for label in (-1, 104, 2**31)] == 3 * [SemanticClass.CAR]
-    assert channel_source._kind(104) is channel_source._kind(-1) is ActorKind.CAR
-    assert channel_source._height(104) == channel_source._height(-1) == channel_source.CAR_HEIGHT
+    others = [lane(0, 25.0)[0], lane(0, 40.0)[0]]
+    with ChannelWriter(tmp_path / "a.mcap", ("lav",)) as writer:
+        writer.add(Context(0.0, {"map": "figure8"}))
+        for k in range(2):
+            ego = lane(k)[0]
+            writer.add(frame(0.1 * k, ego, others, ids=[5, 6], classes=[104, -1]), 0)
+    table = open_source(tmp_path / "a.mcap")._table
+    assert table.kind[1:].tolist() == 2 * [ActorKind.CAR]
+    assert table.height[1:].tolist() == 2 * [channel_source.CAR_HEIGHT]
 
 
 def test_a_run_is_driven_again_with_one_thing_changed_and_shown_beside_it(two, tmp_path):

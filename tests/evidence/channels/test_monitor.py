@@ -271,9 +271,7 @@ def all_values(evidence):
 
 
 def without_context(records):
-    return [
-        {n: str(getattr(r, n)) for n in r.__dataclass_fields__ if n != "context"} for r in records
-    ]
+    return [{n: str(getattr(r, n)) for n in r.__struct_fields__ if n != "context"} for r in records]
 
 
 @pytest.mark.req("C-021", "C-203")

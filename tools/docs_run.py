@@ -241,7 +241,7 @@ def main(names: list[str]) -> int:
                 rows.append((block.page, block.number, begins, f"{seconds:.0f}", day, commit))
     if not names and not failed:
         with RECORD.open("w", newline="", encoding="utf-8") as stream:
-            csv.writer(stream).writerows([COLUMNS, *rows])
+            csv.writer(stream, lineterminator="\n").writerows([COLUMNS, *rows])
     return int(failed > 0)
 
 

@@ -9,6 +9,7 @@ from skidpad.cockpit.studio import SENSOR, Looks, Studio, plane
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Beam, Outside
 from skidpad.core.specs import CameraSpec, Modality
+from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import (
     ActorKind,
     Bodywork,
@@ -203,7 +204,7 @@ def test_weather_noise_spares_the_mask_only_where_a_cockpit_is_shown():
     """People look with cameras outside of the car: none of the five views hides a cockpit."""
     world = straight()
     table, states = traffic(world)
-    night, nobody = preset("rain-night"), np.zeros(len(table), dtype=np.bool_)
+    night, n = preset("rain-night"), len(table)
     outside = Outside(weather=night, grip=GripModel.NONE, range_model=RangeModel.NONE)
     shown = Studio(world, table, outside, 1, NO_EXTRAS, Looks(Scenery.NONE, Bodywork.PLAIN))
     read = PixelSuite(world, table, twelve_sensors(), night)
@@ -211,8 +212,9 @@ def test_weather_noise_spares_the_mask_only_where_a_cockpit_is_shown():
         if not id.startswith("rgb"):
             continue
         ours, theirs = [], []
-        for tick in (3, 4):  # nothing moves: what differs is noise
-            ours.append(plane(shown.look(tick, states, {}, nobody)[view.value]).copy())
+        for tick in (3, 4):  # nothing moves, and nobody brakes: what differs is noise
+            truth = WorldTruth(tick, table, states, np.ones((n, 4)), np.zeros((n, 5)), {}, (), ())
+            ours.append(plane(shown.look(truth)[view.value]).copy())
             theirs.append(read.observe(tick, states, {}).images[id].packed.copy())
         spared = clear_of_weather(*ours[0].shape)
         moved, stayed = ours[0] != ours[1], theirs[0] == theirs[1]

@@ -268,6 +268,7 @@ def test_every_number_of_a_module_has_a_guard(module):
     """But for what is ours, or a mere bound of a search."""
     bounds = {"LANE_STEP", "MAX_LANES", "MAX_SHIFTS", "WAYS", "NOWHERE"}
     bounds |= {"KEYS", "COASTED_FROM"}  # names of settings and of tiers
+    bounds |= {"NOT_SEEN"}  # stands for no light state, which are 0 and more
     bounds |= {"EMERGENCY_BRAKE_MIN"}  # out of reach: tier 3 starts at 0.75 s (D-041)
     loaded = import_module(f"skidpad.stack.{module}")
     own = Path(loaded.__file__).read_text(encoding="utf-8")

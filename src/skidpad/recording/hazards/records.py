@@ -61,8 +61,8 @@ class HazardHead(msgspec.Struct, frozen=True, kw_only=True):
 class HazardRecord(HazardHead, frozen=True, kw_only=True):
     """Record of one hazardous scene, with the worlds around it."""
 
-    objects: tuple[InvolvedObject, ...] = ()
-    flags: tuple[str, ...] = ()
+    objects: tuple[InvolvedObject, ...] = ()  # that it is about, m in the world frame
+    flags: tuple[str, ...] = ()  # "assumed": OLSS without a pair; "cut": the world ends early
     worlds: tuple[Cycle, ...] = ()  # from 5 s before to 5 s after
 
 

@@ -1,4 +1,4 @@
-"""Private keys: whoever makes one first has made it for all."""
+"""Private keys: the first one that is made is the one for all."""
 
 from __future__ import annotations
 

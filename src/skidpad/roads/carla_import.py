@@ -1,4 +1,4 @@
-"""Road files out of somebody's own CARLA: an installed folder, a package, or a saved container image.
+"""Road files out of the user's own CARLA: an installed folder, a package, or a saved container image.
 
 CARLA looks for `Content/Carla/Maps/OpenDrive/NAME.xodr` and then for that name anywhere below `Content`
 (public source: the plugin's `OpenDrive.cpp`). So does this module: of several files of one name, one in

@@ -168,7 +168,7 @@ def test_what_is_written_are_the_bytes_of_the_documentation() -> None:
     assert packets.pack_end() == FRAMES[-1]
 
 
-def test_packets_that_nobody_knows_are_skipped(recorder: Recorder, tmp_path: Path) -> None:
+def test_packets_of_unknown_kinds_are_skipped(recorder: Recorder, tmp_path: Path) -> None:
     ours = packet(200, b"of a user") + counted(11, bytes(26)) + packet(20, struct.pack("<d", 1.0))
     (tmp_path / NAME).write_bytes(HEAD + FRAMES[0] + ours + b"".join(FRAMES[1:]))
     assert recorder.summary(NAME, show_all=True).startswith(SAID)

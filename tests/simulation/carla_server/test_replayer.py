@@ -159,7 +159,7 @@ def test_lights_controls_lamps_and_weather_are_played(tmp_path: Path) -> None:
         if k < TICKS - 1:
             assert vehicle.control.brake == (0.5 if late else 0.0)
             assert vehicle.control.steer == pytest.approx(0.1 if late else 0.0)
-    assert vehicle.control == Control()  # nobody drives it now
+    assert vehicle.control == Control()  # no driver any more
 
 
 @pytest.mark.parametrize("ignore", [True, False])

@@ -104,7 +104,7 @@ def find_parts(stepper: Stepper, changes: FileChanges | None = None) -> QuickPar
     if not backend.has_common_frames or suite.hold_common(backend.world.states) is None:
         return "it has other sensors than the common ones, or its localisation is noisy"
     if type(supervisor) not in (Supervisor, Unsupervised):
-        return "another supervisor looks on, or somebody is at the controls"
+        return "another supervisor looks on, or a person is at the controls"
     supervising = supervisor if isinstance(supervisor, Supervisor) else None
     if changed is None:
         if reason := backend.why_not_quick():

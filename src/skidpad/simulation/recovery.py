@@ -373,8 +373,7 @@ class Supervisor:
 
         Counts the ticks.
         """
-        states = truth.states
-        slow = hypot(float(states.vx[0]), float(states.vy[0])) < self.settings.stuck_speed
+        slow = is_slow(self._hold(truth.states), self.settings.stuck_speed)
         if not slow or self.grace > 0 or self._has_reason(truth, report):
             self.standing = 0
             return False
@@ -427,6 +426,13 @@ def find_ego(
     if lane < 0:
         return -1, s, offset, 1.0, False
     return lane, s, offset, cos(heading - states.yaw[0]), hypot(x - px, y - py) < 0.5 * width
+
+
+@kernel
+def is_slow(held: Held[ActorStates], v: float) -> bool:
+    """Returns whether the ego is slower than v m/s over ground."""
+    s = held.value
+    return bool(s.vx[0] * s.vx[0] + s.vy[0] * s.vy[0] < v * v)
 
 
 @kernel

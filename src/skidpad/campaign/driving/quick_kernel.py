@@ -14,22 +14,22 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Flags, Floats
 from skidpad.core.kernels.calls import call
-from skidpad.core.kernels.jit import Held, kernel
+from skidpad.core.kernels.jit import Held, inner_kernel, kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics.fleet import shown_gear
 from skidpad.recording.run.ticks import APPLIED, REPORT, REQUESTED, ActorColumns, copy_actors
 from skidpad.roads.kernels import LaneArrays
 from skidpad.sensors.object_level.objects import Common, sense
-from skidpad.simulation.recovery import WRONG_WAY_DOT, find_ego, has_reason
-from skidpad.simulation.world.feel import feel_motion
+from skidpad.simulation.recovery import WRONG_WAY_DOT, find_ego, has_reason, is_slow
+from skidpad.simulation.world.feel import Felt, feel_motion
 from skidpad.simulation.world.lights import ROUNDING
 from skidpad.simulation.world.step import DECIDE, MOVE, SETTLE, Arena, advance
 from skidpad.simulation.world.touch import EGO
 from skidpad.simulation.world.traffic.manager import CHECK_PERIOD
 from skidpad.stack.memory import Memory
-from skidpad.stack.perception.lights import NONE_AHEAD, StopLines, heed_light
+from skidpad.stack.perception.lights import NONE_AHEAD, StopLines, Way, heed_light
 from skidpad.stack.road import RoadParts, read_road
-from skidpad.stack.think import Parts, think, write_report
+from skidpad.stack.think import Answer, Light, Parts, think, write_report
 
 # why the kernel came back
 DONE = 0  # all ticks that were asked for are driven
@@ -152,6 +152,115 @@ def is_traffic_due(a: Arena, far: float, stuck: float) -> bool:
     return due
 
 
+@inner_kernel
+def step_world(joined: Held[Joined], tick: int) -> tuple[int, int, int]:
+    """Makes the world's step to `tick`; returns why Python has to go on (DONE: it need not).
+
+    Then contacts and crossed markings of the step.
+    """
+    rules, t, arena = joined.value.rules, joined.value.tables, joined.value.arena
+    address = joined.value.at.advance
+    looks = tick % CHECK_PERIOD == 0
+    stages = DECIDE | MOVE if looks else DECIDE | MOVE | SETTLE
+    touches, crossed = call(
+        address, advance, (arena, stages, tick, rules.dt, rules.substeps, 0.0, 0.0)
+    )
+    if looks:
+        if is_traffic_due(arena.value, rules.far, rules.stuck):
+            return MOVED, touches, crossed
+        _, crossed = call(
+            address, advance, (arena, SETTLE, tick, rules.dt, rules.substeps, 0.0, 0.0)
+        )
+    if touches > 0 or crossed or is_change_due(t, rules.dt):
+        return STEPPED, touches, crossed
+    for i in range(len(t.elapsed)):
+        t.elapsed[i] += rules.dt
+    return DONE, touches, crossed
+
+
+@inner_kernel
+def watch_ego(
+    joined: Held[Joined], standing: int, has_grace: bool
+) -> tuple[bool, bool, tuple[int, float, float]]:
+    """Returns whether the supervisor leaves the tick to the stack, and whether the ego stands.
+
+    It stands when it is slow and neither an actor nor a light explains it. Then lane (-1: not looked for),
+    s and offset of the ego. has_grace: the detector of an ego that is stuck is off.
+    """
+    at, rules, t = joined.value.at, joined.value.rules, joined.value.tables
+    if not rules.supervised:
+        return True, False, (-1, nan, nan)
+    map, states = joined.value.map, joined.value.states
+    lane, s, offset, turned, inside = call(at.find_ego, find_ego, (map, states))
+    usual = lane >= 0 and inside and turned >= WRONG_WAY_DOT
+    stands = usual and not has_grace and is_slow(states, rules.stuck_speed)
+    if stands:
+        stands = not call(
+            at.has_reason, has_reason, (map, states, t.stop_lane, t.stop_s, t.shown, rules.reach)
+        )
+    if stands:
+        usual = (standing + 1) * rules.dt < rules.stuck_time
+    return usual, stands, (lane, s, offset)
+
+
+@inner_kernel
+def answer_tick(joined: Held[Joined], tick: int, felt: Felt) -> tuple[Answer, Way, Light]:
+    """Senses and lets the stack decide: what it answers, where its way is, and the light ahead."""
+    at, rules, t = joined.value.at, joined.value.rules, joined.value.tables
+    sensors = joined.value.sensors
+    x, y, z, yaw, v = felt[0], felt[1], felt[2], felt[5], felt[6]
+    eyes = sensors.value
+    n_one, n_other, n_radar = call(at.sense, sense, (sensors, joined.value.map, tick))
+    bumper, roof = (eyes.one, eyes.other) if rules.bumper_first else (eyes.other, eyes.one)
+    b, r = (n_one, n_other) if rules.bumper_first else (n_other, n_one)
+    echoes = eyes.around.radar.echoes
+    way = call(
+        at.read_road, read_road,
+        (t.memory, joined.value.road, t.on_highway, t.ways, x, y, z, yaw, v, True),
+    )  # fmt: skip
+    source, state, there, stop = NONE_AHEAD, -1, nan, nan
+    if rules.assists:
+        source, ahead, there, stop = call(
+            at.heed_light, heed_light,
+            (t.memory, joined.value.lines, t.lines, way, rules.hsv_required, v, rules.dt),
+        )  # fmt: skip
+        if ahead >= 0:
+            state = int(t.lines[ahead])
+    answer = call(
+        at.think, think,
+        (
+            t.memory, joined.value.stack, t.samples, t.history, t.kept, t.ways, t.room,
+            bumper.runs[0, :b], bumper.runs[1, :b], bumper.runs[2, :b], bumper.runs[3, :b],
+            bumper.runs[4, :b], bumper.classes[:b],
+            roof.runs[0, :r], roof.runs[1, :r], roof.runs[2, :r], roof.runs[3, :r],
+            roof.runs[4, :r], roof.classes[:r],
+            echoes[0, :n_radar], echoes[1, :n_radar], echoes[2, :n_radar], echoes[3, :n_radar],
+            t.on_highway, x, y, z, yaw, v, True, stop, inf, rules.v_told,
+        ),
+    )  # fmt: skip
+    return answer, way, (source, state, there, stop)
+
+
+@inner_kernel
+def write_tick(
+    joined: Held[Joined], k: int, tick: int, felt: Felt, answer: Answer, way: Way, light: Light
+) -> None:
+    """Writes row k of the log."""
+    at, rules, t = joined.value.at, joined.value.rules, joined.value.tables
+    rows, states = joined.value.arena.value.rows, joined.value.states
+    t.ticks[k, 0], t.ticks[k, 1], t.ticks[k, 2] = tick, 0, rules.weather
+    row = t.rows[k]
+    row[0], row[1], row[2], row[3] = felt[0], felt[1], felt[5], felt[6]
+    row[4], row[5], row[6] = felt[7], felt[8], felt[9]
+    row[7] = count_gear(felt[6], rows.commands[EGO, 4] != 0.0)
+    for c in range(5):
+        row[APPLIED + c] = rows.commands[EGO, c]
+    row[REQUESTED], row[REQUESTED + 1], row[REQUESTED + 2] = answer[1], answer[2], way[4]
+    row[REQUESTED + 3], row[REQUESTED + 4] = 1.0 if answer[3] else 0.0, 0.0
+    write_report(row, REPORT, answer, way, light, rules.assists, rules.dt)
+    call(at.copy_actors, copy_actors, (states, rows.mu, joined.value.columns, k))
+
+
 @kernel
 def drive_ticks(
     joined: Held[Joined], begun: bool, tick: int, n: int, k: int, grace: int, standing: int,
@@ -165,107 +274,32 @@ def drive_ticks(
     crossed markings of the step, the last request, lane (-1: not looked for), s and offset of the ego, and
     `standing`.
     """
-    at, rules, t = joined.value.at, joined.value.rules, joined.value.tables
-    arena, states, map, sensors = (
-        joined.value.arena, joined.value.states, joined.value.map, joined.value.sensors,
-    )  # fmt: skip
-    a, eyes = arena.value, sensors.value
-    s, commands = a.rows.states, a.rows.commands
-    near = eyes.one if rules.bumper_first else eyes.other
-    far = eyes.other if rules.bumper_first else eyes.one
-    echoes = eyes.around.radar.echoes
-    done, why, touches, crossed = 0, DONE, 0, 0
-    lane, along, offset, stands = -1, nan, nan, False
+    at, rules, arena = joined.value.at, joined.value.rules, joined.value.arena
+    commands = arena.value.rows.commands
+    done, why, touches, crossed, place = 0, DONE, 0, 0, (-1, nan, nan)
     while done < n:
         if not begun:
             commands[EGO, 0], commands[EGO, 1], commands[EGO, 2] = throttle, brake, steer
             commands[EGO, 3], commands[EGO, 4] = 1.0 if handbrake else 0.0, 0.0
             tick += 1
-            looks = tick % CHECK_PERIOD == 0
-            stages = DECIDE | MOVE if looks else DECIDE | MOVE | SETTLE
-            touches, crossed = call(
-                at.advance, advance, (arena, stages, tick, rules.dt, rules.substeps, 0.0, 0.0)
-            )
-            if looks and is_traffic_due(a, rules.far, rules.stuck):
-                why = MOVED
+            why, touches, crossed = step_world(joined, tick)
+            if why != DONE:
                 break
-            if looks:
-                _, crossed = call(
-                    at.advance, advance, (arena, SETTLE, tick, rules.dt, rules.substeps, 0.0, 0.0)
-                )
-            if touches > 0 or crossed or is_change_due(t, rules.dt):
-                why = STEPPED
-                break
-            for i in range(len(t.elapsed)):
-                t.elapsed[i] += rules.dt
         begun = False
-        if rules.supervised:
-            found = call(at.find_ego, find_ego, (map, states))
-            usual = found[0] >= 0 and found[4] and found[3] >= WRONG_WAY_DOT
-            v2, slow2 = s.vx[EGO] * s.vx[EGO] + s.vy[EGO] * s.vy[EGO], rules.stuck_speed**2
-            stands = grace - done - 1 <= 0 and v2 < 1.001 * slow2
-            if usual and stands:
-                stands = not call(
-                    at.has_reason,
-                    has_reason,
-                    (map, states, t.stop_lane, t.stop_s, t.shown, rules.reach),
-                )
-            if stands:  # close to the limits the supervisor decides itself
-                usual &= v2 < 0.999 * slow2 and (standing + 1) * rules.dt < rules.stuck_time
-            if not usual:
-                why = UNUSUAL
-                break
-            lane, along, offset = found[0], found[1], found[2]
+        usual, stands, found = watch_ego(joined, standing, grace > done + 1)
+        if not usual:
+            why = UNUSUAL
+            break
+        place = found
         felt = call(at.feel_motion, feel_motion, (arena, EGO))
-        x, y, z, yaw, v = felt[0], felt[1], felt[2], felt[5], felt[6]
-        m_one, m_other, m_radar = call(at.sense, sense, (sensors, map, tick))
-        m_near, m_far = (m_one, m_other) if rules.bumper_first else (m_other, m_one)
-        way = call(
-            at.read_road,
-            read_road,
-            (t.memory, joined.value.road, t.on_highway, t.ways, x, y, z, yaw, v, True),
-        )
-        source, state, there, stop = NONE_AHEAD, -1, nan, nan
-        if rules.assists:
-            source, ahead, there, stop = call(
-                at.heed_light, heed_light,
-                (t.memory, joined.value.lines, t.lines, way, rules.hsv_required, v, rules.dt),
-            )  # fmt: skip
-            if ahead >= 0:
-                state = int(t.lines[ahead])
-        told = call(
-            at.think, think,
-            (
-                t.memory, joined.value.stack, t.samples, t.history, t.kept, t.ways, t.room,
-                near.runs[0, :m_near], near.runs[1, :m_near], near.runs[2, :m_near],
-                near.runs[3, :m_near], near.runs[4, :m_near], near.classes[:m_near],
-                far.runs[0, :m_far], far.runs[1, :m_far], far.runs[2, :m_far],
-                far.runs[3, :m_far], far.runs[4, :m_far], far.classes[:m_far],
-                echoes[0, :m_radar], echoes[1, :m_radar], echoes[2, :m_radar], echoes[3, :m_radar],
-                t.on_highway, x, y, z, yaw, v, True, stop, inf, rules.v_told,
-            ),
-        )  # fmt: skip
-        throttle, brake, steer, handbrake = told[1], told[2], way[4], told[3]
-        fits = 0.0 <= throttle <= 1.0 and 0.0 <= brake <= 1.0 and -1.0 <= steer <= 1.0
-        if not fits:
+        answer, way, light = answer_tick(joined, tick, felt)
+        throttle, brake, steer, handbrake = answer[1], answer[2], way[4], answer[3]
+        if not (0.0 <= throttle <= 1.0 and 0.0 <= brake <= 1.0 and -1.0 <= steer <= 1.0):
             why = REFUSED
             break
-        standing = standing + 1 if stands and not (rules.holding >> told[0]) & 1 else 0
-        t.ticks[k, 0], t.ticks[k, 1], t.ticks[k, 2] = tick, 0, rules.weather
-        row = t.rows[k]
-        row[0], row[1], row[2], row[3] = x, y, yaw, v
-        row[4], row[5], row[6] = felt[7], felt[8], felt[9]
-        row[7] = count_gear(v, commands[EGO, 4] != 0.0)
-        for c in range(5):
-            row[APPLIED + c] = commands[EGO, c]
-        row[REQUESTED], row[REQUESTED + 1], row[REQUESTED + 2] = throttle, brake, steer
-        row[REQUESTED + 3], row[REQUESTED + 4] = 1.0 if handbrake else 0.0, 0.0
-        light = source, state, there, stop
-        write_report(row, REPORT, told, way, light, rules.assists, rules.dt)
-        call(at.copy_actors, copy_actors, (states, a.rows.mu, joined.value.columns, k))
-        k += 1
+        standing = standing + 1 if stands and not (rules.holding >> answer[0]) & 1 else 0
+        write_tick(joined, k + done, tick, felt, answer, way, light)
         done += 1
     return (
-        done, why, touches, crossed, throttle, brake, steer, handbrake, lane, along, offset,
-        standing,
+        done, why, touches, crossed, throttle, brake, steer, handbrake, *place, standing,
     )  # fmt: skip

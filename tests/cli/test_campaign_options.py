@@ -3,6 +3,7 @@
 import pytest
 import typer
 from typer.core import TyperOption
+from typer.testing import CliRunner
 
 from skidpad.campaign.workers.worker import Finished
 from skidpad.cli.main import app
@@ -13,7 +14,7 @@ from support.toy_campaign import campaign
 
 ROOT = typer.main.get_command(app)
 CAMPAIGNS = {"adas": "adas", "grip": "grip", "channels drive": "channels", "play": "play"}
-SHARED = {"out", "workers", "cluster", "until_halfwidth", "resume", "or_next", "csv"}
+SHARED = {"out", "workers", "cluster", "until_halfwidth", "resume", "or_next", "csv", "plan"}
 OF_FILES = {"check", "expect", "junit", "tree"}  # what is asked of scenarios costs no run
 OF_ONE_FILE = {"checkpoints"}  # of `play`; the estimate is of a folder
 
@@ -82,3 +83,42 @@ def test_an_estimate_is_one_sentence(capsys):
     told = capsys.readouterr().out
     assert told.startswith("8 runs at 0.00 s each (measured on 8) on 3 workers: about 0.0 min")
     assert told.count("\n") == 1
+
+
+def test_a_plan_names_cells_and_runs_and_drives_nothing(tmp_path, capsys):
+    with pytest.raises(typer.Exit) as ended:
+        CampaignOptions(out=tmp_path / "out", plan=True)(campaign(), str)
+    assert ended.value.exit_code == 0
+    assert capsys.readouterr().out.splitlines() == [
+        "sure: 4 runs, quick way: no, runs of this kind are driven tick by tick",
+        "even: 4 runs, quick way: no, runs of this kind are driven tick by tick",
+        "8 runs planned, nothing was driven",
+    ]
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (
+            "adas --sensors objects --configs 4,reference --weather rain-noon --seeds 2",
+            [
+                "4_rain-noon: 2 runs, quick way: yes",
+                "reference_rain-noon: 2 runs, quick way: no, another stack drives",
+                "4 runs planned, nothing was driven",
+            ],
+        ),
+        (
+            "grip --scenarios front_accident --weather icy_30 --seeds 3 --sensors pixels",
+            ["quick way: no, its sensors are pixels, or a radar with noise"],
+        ),
+        ("play front_accident", ["1 run, quick way: yes"]),
+    ],
+)
+def test_a_plan_says_which_runs_go_the_quick_way(words, told, tmp_path):
+    out = tmp_path / "out"
+    done = CliRunner().invoke(app, [*words.split(), "--plan", "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    for line in told:
+        assert line in done.output
+    assert not out.exists()

@@ -244,6 +244,17 @@ class Campaign(Generic[T, K, M]):
         """Returns True when a run went well by its recipe, None where it does not count."""
         return None if entry.metrics is None else self.recipe.success(entry.metrics)
 
+    def plan(self) -> Iterator[tuple[str, int, str]]:
+        """Yields each cell, how many runs it has, and why its first one is driven tick by tick.
+
+        "" where it has a quick way. Worlds are built, and nothing is driven.
+        """
+        firsts = {cell_of(t.name): t for t in reversed(self.tasks)}
+        with TemporaryDirectory() as folder:
+            keep_files(Path(folder), self.files)
+            for cell, runs in Counter(cell_of(t.name) for t in self.tasks).items():
+                yield cell, runs, self.recipe.why_not_quick(Path(folder), firsts[cell])
+
     def estimate(self) -> Estimate:
         """Drives up to PROBES runs in this process, for PROBING_S s; returns the CPU time per run."""
         sample = self.tasks[:: max(len(self.tasks) // PROBES, 1)][:PROBES]

@@ -58,6 +58,8 @@ from skidpad.stack.perception.lights import heed_light
 from skidpad.stack.road import read_road
 from skidpad.stack.think import think
 
+ANOTHER_SIMULATOR = "another simulator drives"
+
 
 class QuickParts(NamedTuple):
     """What of a run takes part in its quick way.
@@ -90,7 +92,7 @@ def find_parts(stepper: Stepper, changes: FileChanges | None = None) -> QuickPar
     if isinstance(backend, ChangedBackend):
         return "the world is changed from outside"
     if type(backend) is not EmbeddedBackend:
-        return "another simulator drives"
+        return ANOTHER_SIMULATOR
     sensing, supervisor = backend.sensing, stepper.supervisor
     if type(sensing) is not Objects:
         return "its sensors are pixels, or a radar with noise"

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from skidpad import __version__
 from skidpad.campaign.cells.grip import Cross, cross, scenario_of, template
-from skidpad.campaign.recipes.recipe import Driven, Recipe
+from skidpad.campaign.recipes.recipe import Driven, Recipe, find_reason
 from skidpad.campaign.runs.folder import Stopwatch, fresh_folder, last_line, write_drive
 from skidpad.campaign.user_files import keep_road
 from skidpad.campaign.workers.worker import Job, Runner
@@ -170,6 +170,7 @@ def recipe(
         warm_up=warm_up,
         success=lambda metrics: metrics.completion,
         success_means="completed",
+        why_not_quick=find_reason,
         finish=partial(finish, checkpoints_s=checkpoints_s),
     )
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from skidpad import __version__
 from skidpad.campaign.cells.matrix import join_functions
 from skidpad.campaign.driving.pace import Pace
-from skidpad.campaign.recipes.recipe import Driven, Recipe
+from skidpad.campaign.recipes.recipe import Driven, Recipe, find_reason
 from skidpad.campaign.runs.folder import Stopwatch, fresh_folder, last_line, write_config, write_run
 from skidpad.campaign.user_files import road_file, with_kept_map
 from skidpad.core.errors import ConfigError
@@ -186,5 +186,6 @@ RECIPE = Recipe(
     warm_up=warm_up,
     success=is_unharmed,
     drive_of=drive_of,
+    why_not_quick=find_reason,
     success_means="without an intervention",
 )

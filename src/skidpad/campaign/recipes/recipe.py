@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
+from skidpad.campaign.user_files import with_kept_map
 from skidpad.campaign.workers.worker import Runner
+from skidpad.core.run import RunSpec
 from skidpad.core.vocabulary import Outcome
 from skidpad.recording.campaign.added_metrics import AddedMetric
 from skidpad.recording.campaign.ledger import Entry, K
@@ -57,6 +59,19 @@ def no_drive(key: Any) -> None:
     del key
 
 
+def no_quick_way(out: Path, task: Any) -> str:
+    """Returns that runs of this kind have no quick way: the `why_not_quick` of most recipes."""
+    del out, task
+    return "runs of this kind are driven tick by tick"
+
+
+def find_reason(out: Path, spec: RunSpec) -> str:
+    """Returns the first reason against the quick way of a run in the folder of its campaign; "": none."""
+    from skidpad.campaign.runs.run import find_reason as find_in
+
+    return find_in(with_kept_map(spec, out))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recipe(Generic[T, K, M]):
     """What a kind of campaign is made of. `drive` and `warm_up` are called in workers."""
@@ -70,6 +85,7 @@ class Recipe(Generic[T, K, M]):
     success: Callable[[M], bool | None]  # what a stopping rule counts; None: not a trial
     success_means: str  # in words, after a number of runs
     drive_of: Callable[[K], tuple[str, str] | None] = no_drive  # what drove, and how it moved
+    why_not_quick: Callable[[Path, T], str] = no_quick_way  # a run of the campaign in this folder
     finish: Callable[[Sequence[T], Path, Runner], None] = nothing_else
 
 

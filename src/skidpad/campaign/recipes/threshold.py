@@ -21,7 +21,7 @@ from skidpad.campaign.cells.threshold import (
     title_of,
 )
 from skidpad.campaign.recipes.grip import drive_and_judge
-from skidpad.campaign.recipes.recipe import Driven, Recipe
+from skidpad.campaign.recipes.recipe import Driven, Recipe, find_reason
 from skidpad.campaign.runs.folder import last_line
 from skidpad.campaign.workers.worker import Job, Runner
 from skidpad.core.geometry import kmh_from_mps
@@ -109,5 +109,6 @@ def recipe(keep_all: bool = False) -> Recipe[Task, ThresholdKey, GripMetrics]:
         warm_up=warm_up,
         success=lambda metrics: metrics.completion,
         success_means="completed",
+        why_not_quick=lambda out, task: find_reason(out, task.run),
         finish=finish,
     )

@@ -17,7 +17,7 @@ from skidpad.campaign.driving.backends import make_backend
 from skidpad.campaign.driving.drivers import describe_driver
 from skidpad.campaign.driving.loop import Driver, Moment, Sink, Stepper
 from skidpad.campaign.driving.outdoors import ChangedBackend, FileChanges, branch_backend
-from skidpad.campaign.driving.quick import QuickDrive, find_parts
+from skidpad.campaign.driving.quick import ANOTHER_SIMULATOR, QuickDrive, find_parts
 from skidpad.campaign.driving.readings import ReadingsRecorder
 from skidpad.campaign.driving.run_setup import (
     StackAtWheel,
@@ -312,6 +312,21 @@ def run(
     return opened.finish()
 
 
+def find_reason(spec: RunSpec) -> str:
+    """Returns the first reason why a run is driven tick by tick; "": it has a quick way.
+
+    Its world is built, and nothing is driven; another simulator than the embedded one is not asked.
+    """
+    if spec.backend.backend != BackendKind.EMBEDDED:
+        return ANOTHER_SIMULATOR
+    opened = OpenRun(spec)
+    try:
+        opened.begin()
+        return str(opened.failure or opened.why_not_quick)
+    finally:
+        opened.close()
+
+
 class OpenRun:
     """A run on its way: the one loop, stopped after each tick.
 
@@ -375,7 +390,7 @@ class OpenRun:
         if self.over:
             return False
         if self.stepper is None:
-            self.stepper = self._begin()
+            self.begin()
         if self.stepper is None or not self.stepper.sense():
             self._end()
         return not self.over
@@ -387,6 +402,10 @@ class OpenRun:
         if moment is None:
             self._end()
         return moment
+
+    def begin(self) -> None:
+        """Builds driver and world, before the first tick; `sense` does it where it was not done."""
+        self.stepper = self._begin()
 
     def save(self) -> RunCheckpoint:
         """Returns the state after the last tick, to which `restore` goes back.

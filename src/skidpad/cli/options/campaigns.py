@@ -45,6 +45,12 @@ class Driving(Struct, frozen=True, kw_only=True):
         bool, Meta(description="If OUT holds another campaign, use OUT-2, OUT-3, ...")
     ] = False
     csv: Annotated[bool, Meta(description="Write CSV beside Parquet.")] = False
+    plan: Annotated[
+        bool,
+        Meta(
+            description="Print cells and runs, and which go the quick way; drive and write nothing."
+        ),
+    ] = False
 
 
 class CampaignOptions(Driving, frozen=True, kw_only=True):
@@ -66,8 +72,12 @@ class CampaignOptions(Driving, frozen=True, kw_only=True):
         """Drives the campaign under a progress bar and prints what `report` says of its folder.
 
         parts: further campaigns by the folder below its own, driven after it. Returns the summary of the
-        campaign itself; ends with exit code 1 when none of its runs has a result.
+        campaign itself; ends with exit code 1 when none of its runs has a result, and with 0 after a plan.
         """
+        if self.plan:
+            for name, part in {"": campaign, **parts}.items():
+                print_plan(part, name and f"{name}: ")
+            raise typer.Exit
         from dataclasses import replace
 
         from skidpad.cli.output.tables import fit_terminal
@@ -165,6 +175,19 @@ class Estimate(Struct, frozen=True, kw_only=True):
 
 
 How = CampaignOptions | Estimate
+
+
+def print_plan(campaign: Campaign[Any, Any, Any], name: str) -> None:
+    """Prints a line for each cell: its runs, and if they go the quick way, else the first reason.
+
+    name: text before each line, as it stands.
+    """
+    from skidpad.core.text.wording import count_text
+
+    for cell, runs, reason in campaign.plan():
+        quick = f"no, {reason}" if reason else "yes"
+        typer.echo(f"{name}{cell}: {count_text(runs, 'run')}, quick way: {quick}")
+    typer.echo(f"{name}{count_text(len(campaign.tasks), 'run')} planned, nothing was driven")
 
 
 def next_folder(out: Path, identities: Mapping[str, dict[str, Any]]) -> Path:

@@ -90,7 +90,7 @@ def play(
     from skidpad.campaign.runs.play import run_to
     from skidpad.scenarios.reading.distributions import is_distribution
 
-    if file.is_dir() or is_distribution(file):
+    if file.is_dir() or is_distribution(file) or driving.plan:
         if checkpoints is not None:
             raise ConfigError("--checkpoints is for a single file: of a folder, rerun one run")
         how = CampaignOptions(out=out, **structs.asdict(driving))

@@ -3,6 +3,7 @@
     python tools/quick_mutants.py                    # four mutants of each package, then the table
     python tools/quick_mutants.py --per-package 2
     python tools/quick_mutants.py --table            # the table of what is there
+    python tools/quick_mutants.py --kernels          # its row of kernels alone
 
 A mutant is one small change of one line of the package, drawn by seed. The quick tests are run with it:
 those that import the changed module first, then the others of its package's folder in tests/. Where they
@@ -14,6 +15,9 @@ Not drawn: texts, annotations, kernels and every file that kernels are compiled 
 code would be made anew. A test that hangs has noticed the change; a run that is cut off at its limit of
 processor time has not. Mutants that are in OUT are not run again at the same commit. The
 tree that is changed is a copy.
+
+Kernels have a row of their own, which is not part of "all": their tests plant a fault of one bit into each
+kernel that the compiled loop calls, and into the table of a story, and pass when it is found.
 """
 
 from __future__ import annotations
@@ -29,6 +33,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
+from datetime import date
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -44,6 +49,7 @@ TEST_S = {"quick": 90, "slow": 400}  # a test that takes longer hangs
 RUN_S = {"quick": 90, "slow": 150}  # of processor time; six times as long by the clock
 SUITES = {"quick": ("-m", "not slow", "--hypothesis-profile", "quick"), "slow": ("-m", "slow")}
 IMPORT = re.compile(r"^ *from (skidpad(?:\.\w+)*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
+PLANTED = ("tests/campaign/test_planted_faults.py", "tests/scenarios/test_story_table.py")
 COLUMNS = ("package", "mutants", "quick", "full", "share", "date", "commit")
 
 
@@ -199,6 +205,19 @@ def judge(root: Path, package: str, file: Path, mutant: Mutant) -> dict[str, str
     return noticed
 
 
+def judge_kernels(root: Path) -> list[dict[str, str]]:
+    """Returns for each planted fault of a kernel what `judge` says of a mutant."""
+    listed = subprocess.run(
+        [sys.executable, "-m", "pytest", "--collect-only", "-q", "-k", "planted_fault", *PLANTED],
+        cwd=root, capture_output=True, text=True, check=True,
+    ).stdout  # fmt: skip
+    faults = [line for line in listed.splitlines() if "::" in line]
+    return [
+        {"quick": "" if run_tests(root, "quick", (fault,)) else fault, "slow": ""}
+        for fault in faults
+    ]
+
+
 def is_noticed(found: str) -> bool:
     """Returns whether a suite noticed a mutant, from what `judge` says of it: a test, or a file."""
     return found.startswith("tests/")
@@ -216,6 +235,22 @@ def make_rows(judged: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         counts = (package, len(own), quick, full, share)
         rows.append(dict(zip(COLUMNS[:5], counts, strict=True)) | made)
     return rows
+
+
+def read_table() -> list[dict[str, Any]]:
+    """Returns the rows of the table that is there."""
+    with TABLE.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def write_table(rows: Sequence[dict[str, Any]]) -> None:
+    """Prints the table and writes it."""
+    for row in rows:
+        print(*row.values(), sep="\t")
+    with TABLE.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
 
 
 def copy_tree(folder: Path) -> Path:
@@ -238,7 +273,13 @@ def main() -> None:
     parser.add_argument("--per-package", type=int, default=4)
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "quick-mutants")
     parser.add_argument("--table", action="store_true", help="run nothing")
+    parser.add_argument("--kernels", action="store_true", help="the row of kernels alone")
     asked = parser.parse_args()
+    if asked.kernels:
+        made = {"package": "kernels", "commit": commit(), "when": date.today().isoformat()}
+        row = make_rows([{**made, **found} for found in judge_kernels(ROOT)])[0]
+        write_table([*(r for r in read_table() if r["package"] != "kernels"), row])
+        return
     asked.out.mkdir(parents=True, exist_ok=True)
     lines, version = asked.out / "mutants.jsonl", commit()
     there = [line for line in dated_lines.read(lines) if line["commit"] == version]
@@ -257,12 +298,7 @@ def main() -> None:
     if not judged:
         sys.exit("no mutant was judged at this commit")
     rows = make_rows(judged)
-    for row in rows:
-        print(*row.values(), sep="\t")
-    with TABLE.open("w", encoding="utf-8", newline="") as file_:
-        writer = csv.DictWriter(file_, COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    write_table([*rows, *(r for r in read_table() if r["package"] == "kernels")])
 
 
 if __name__ == "__main__":

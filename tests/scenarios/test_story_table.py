@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from scenario_catalogue import SCENARIOS, file_name
@@ -14,6 +15,7 @@ from skidpad.core.run import ActorMode, Scenario
 from skidpad.core.states import VehicleCommand
 from skidpad.scenarios.export.version import OscVersion
 from skidpad.scenarios.playing.player import Player
+from skidpad.scenarios.playing.table import StoryTable
 from skidpad.scenarios.shipped import FOLDER
 from skidpad.scenarios.triggers import Edge
 from support.oracle.cases import CASES
@@ -94,6 +96,21 @@ def test_a_shipped_scenario_is_played_as_in_python(name, version, ego):
     assert player.by_table > 0.7 * ticks > 30  # with a look every so many ticks
     assert player.played.table.by_table == player.by_table
     assert len(player.scene.story) > 8
+
+
+def test_a_planted_fault_of_one_bit_is_found(monkeypatch):
+    """Else the tests of this file could not fail."""
+    play = StoryTable.play
+
+    def play_wrong(table, truth):
+        words = play(table, truth)
+        x = table.rows.actors["x"]
+        x[-1] = np.nextafter(x[-1], np.inf)
+        return words
+
+    monkeypatch.setattr(StoryTable, "play", play_wrong)
+    with pytest.raises(AssertionError):
+        play_both(FOLDER / file_name("lead_slowdown", OscVersion.V1_2), ticks=LOOKS)
 
 
 @pytest.mark.parametrize("name", sorted(CASES)[::5])

@@ -33,7 +33,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
-from datetime import date
+from datetime import datetime, timezone
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -208,7 +208,7 @@ def judge(root: Path, package: str, file: Path, mutant: Mutant) -> dict[str, str
 def judge_kernels(root: Path) -> list[dict[str, str]]:
     """Returns for each planted fault of a kernel what `judge` says of a mutant."""
     listed = subprocess.run(
-        [sys.executable, "-m", "pytest", "--collect-only", "-q", "-k", "planted_fault", *PLANTED],
+        [sys.executable, "-m", "pytest", "--collect-only", "-k", "planted_fault_of", *PLANTED],
         cwd=root, capture_output=True, text=True, check=True,
     ).stdout  # fmt: skip
     faults = [line for line in listed.splitlines() if "::" in line]
@@ -276,7 +276,11 @@ def main() -> None:
     parser.add_argument("--kernels", action="store_true", help="the row of kernels alone")
     asked = parser.parse_args()
     if asked.kernels:
-        made = {"package": "kernels", "commit": commit(), "when": date.today().isoformat()}
+        made = {
+            "package": "kernels",
+            "commit": commit(),
+            "when": datetime.now(timezone.utc).isoformat(),
+        }
         row = make_rows([{**made, **found} for found in judge_kernels(ROOT)])[0]
         write_table([*(r for r in read_table() if r["package"] != "kernels"), row])
         return

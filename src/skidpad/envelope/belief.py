@@ -9,12 +9,14 @@ of grip need a law: Gustafsson, Automatica 33 (1997); Rajamani et al., IEEE Cont
 
 from __future__ import annotations
 
-from functools import lru_cache
 from math import erf, exp, log, sqrt
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
+from skidpad.core.kernels.jit import kernel
 
 GRIP = np.geomspace(0.05, 1.05, 28)
 STIFFNESS_SHARES = np.geomspace(0.22, 1.55, 13)  # of the tyre that the estimator was designed with
@@ -43,7 +45,6 @@ RAIN_PRIORS = (
 COLD_PRIOR = ((0.12, 0.25, 0.25), (0.3, 0.3, 0.5), (0.7, 0.25, 0.25))
 
 
-@lru_cache(maxsize=8)
 def prior_of(stage: int, is_cold: bool) -> Floats:
     """Returns the (n,) probabilities of the n grips in GRIP before any evidence.
 
@@ -59,9 +60,24 @@ def prior_of(stage: int, is_cold: bool) -> Floats:
     return p
 
 
+# of all stages, those of the cold from len(RAIN_PRIORS) on
+PRIORS = np.array([prior_of(i, cold) for cold in (False, True) for i in range(len(RAIN_PRIORS))])
+
+
+@kernel
 def quantile(p: Floats, share: float) -> float:
     """Returns the grip below which `share` of the (n,) probabilities lies."""
-    return exp(float(np.interp(share, np.cumsum(p) - 0.5 * p, LOG_GRIP)))
+    below, middle, last = 0.0, 0.0, 0.0
+    for i in range(len(p)):
+        middle = below + 0.5 * p[i]
+        if share < middle:
+            if i == 0:
+                return float(GRIP[0])
+            part = (share - last) / (middle - last)
+            return exp(LOG_GRIP[i - 1] + part * (LOG_GRIP[i] - LOG_GRIP[i - 1]))
+        last = middle
+        below += p[i]
+    return float(GRIP[len(p) - 1])
 
 
 def prior_grip(stage: int, air_c: float) -> float:
@@ -83,77 +99,141 @@ def _stiffness_prior() -> Floats:
 STIFFNESS_PRIOR = _stiffness_prior()
 
 
-class GripBelief:
-    """Probabilities (grips, stiffnesses) of what the tyres stand on."""
-
-    def __init__(self) -> None:
-        self.prior, self.is_new, self.force = prior_of(0, False), True, 0.0
-        self.p = np.outer(self.prior, STIFFNESS_PRIOR)
-
-    def forget(self, way: float, prior: Floats) -> None:
-        """Mixes the belief with `prior` by the chance that the surface changed on a way of so many m.
-
-        The first call replaces it by the prior. `confidence` is measured against the last prior given here.
-        """
-        way, self.is_new, self.prior = 1e9 if self.is_new else way, False, prior
-        share = 1.0 - exp(-way / CHANGE)
-        self.p = (1.0 - share) * self.p + share * np.outer(prior, STIFFNESS_PRIOR)
-
-    def see_slip(
-        self, force: float, slip: float, stiffness: float, sigma_slip: float, sigma_force: float
-    ) -> None:
-        """Updates the belief by force over load and slip with their standard deviations.
-
-        Both are >= 0 when they work as meant. stiffness: force over load per unit slip of the design's tyre.
-        """
-        stiff = stiffness * STIFFNESS_SHARES
-        sigma = np.minimum(stiff * abs(slip) / (3.0 * GRIP[:, None]), 1.0)
-        left = 1.0 - sigma
-        expected = GRIP[:, None] * (1.0 - left**3)
-        variance = sigma_force**2 + (sigma_slip * stiff * left * left) ** 2
-        error = (force if slip >= 0.0 else -force) - expected
-        is_repeated = abs(force - self.force) < NEW_FORCE
-        self.force = force
-        likelihood = np.exp(-0.5 * error * error / variance) / np.sqrt(variance)
-        self._multiply(likelihood, REPEATED if is_repeated else TEMPER)
-
-    def see_least(self, use: float, sigma: float) -> None:
-        """Updates the belief by a lower bound: the car got `use`, over gravity, with error sigma."""
-        edge = (GRIP - use) / (sigma * sqrt(2.0))
-        self._multiply(np.array([0.5 * (1.0 + erf(x)) for x in edge.tolist()])[:, None])
-
-    def see_limit(self, grip: float, spread: float) -> None:
-        """Updates the belief by the grip that a car at its limit showed; spread: its relative error."""
-        error = (LOG_GRIP - log(max(grip, 1e-3))) / spread
-        self._multiply(np.exp(-0.5 * error * error)[:, None])
-
-    def _multiply(self, likelihood: Floats, exponent: float = TEMPER) -> None:
-        """Multiplies the belief by a likelihood to a power and makes it sum to 1 again.
-
-        No likelihood counts for less than WILD of the greatest one; all zeros change nothing.
-        """
-        likely = likelihood / likelihood.max() if likelihood.max() > 0.0 else 1.0
-        self.p = self.p * np.maximum(likely, WILD) ** exponent
-        self.p /= self.p.sum()
-
-    @property
-    def grips(self) -> Floats:
-        """Returns (n,) the probability of each of the n grips in GRIP, summed over stiffnesses."""
-        marginal: Floats = self.p.sum(axis=1)
-        return marginal
-
-    @property
-    def softness(self) -> float:
-        """Mean over the belief of the design's stiffness over the stiffness; 1 for the tyre of the design."""
-        return float(self.p.sum(axis=0) @ (1.0 / STIFFNESS_SHARES))
-
-    @property
-    def confidence(self) -> float:
-        """1 less the spread of the grip over that of the prior, at least 0: what signals have added."""
-        return max(1.0 - _compute_spread(self.grips) / _compute_spread(self.prior), 0.0)
+BELIEF = np.dtype([("is_new", np.bool_), ("force", np.float64)], align=True)
 
 
-def _compute_spread(p: Floats) -> float:
+class BeliefArrays(NamedTuple):
+    """What is believed, for kernels: n grips of GRIP, m stiffnesses of STIFFNESS_SHARES."""
+
+    memory: NDArray[
+        np.void
+    ]  # (1,) BELIEF: nothing was seen yet; force over load of the last reading
+    p: Floats  # (n, m) probabilities
+    prior: Floats  # (n,) the last one that was given
+    grips: Floats  # (n,) room: `p` summed over stiffnesses
+    likelihood: Floats  # (n, m) room
+
+
+def new_belief() -> BeliefArrays:
+    """Returns what is believed before anything is known."""
+    memory = np.zeros(1, BELIEF)
+    memory["is_new"] = True
+    prior = prior_of(0, False).copy()
+    p = np.outer(prior, STIFFNESS_PRIOR)
+    return BeliefArrays(memory, p, prior, np.empty(len(GRIP)), np.empty_like(p))
+
+
+@kernel
+def forget(belief: BeliefArrays, way: float, prior: Floats) -> None:
+    """Mixes the belief with `prior`, (n,), by the chance that the surface changed on a way of so many m.
+
+    The first call replaces it by the prior. `measure_confidence` measures against the last prior given here.
+    """
+    m, p = belief.memory[0], belief.p
+    share = 1.0 if m.is_new else 1.0 - exp(-way / CHANGE)
+    m.is_new = False
+    for i in range(len(GRIP)):
+        belief.prior[i] = prior[i]
+        for j in range(len(STIFFNESS_SHARES)):
+            p[i, j] = (1.0 - share) * p[i, j] + share * prior[i] * STIFFNESS_PRIOR[j]
+
+
+@kernel
+def see_slip(
+    belief: BeliefArrays, force: float, slip: float, stiffness: float, sigma_slip: float,
+    sigma_force: float,
+) -> None:  # fmt: skip
+    """Updates the belief by force over load and slip with their standard deviations.
+
+    Both are >= 0 when they work as meant. stiffness: force over load per unit slip of the design's tyre.
+    """
+    m, likelihood = belief.memory[0], belief.likelihood
+    measured = force if slip >= 0.0 else -force
+    for j in range(len(STIFFNESS_SHARES)):
+        stiff = stiffness * STIFFNESS_SHARES[j]
+        for i in range(len(GRIP)):
+            left = 1.0 - min(stiff * abs(slip) / (3.0 * GRIP[i]), 1.0)
+            spread = sigma_slip * stiff * left * left
+            variance = sigma_force * sigma_force + spread * spread
+            error = measured - GRIP[i] * (1.0 - left * left * left)
+            likelihood[i, j] = exp(-0.5 * error * error / variance) / sqrt(variance)
+    is_repeated = abs(force - m.force) < NEW_FORCE
+    m.force = force
+    multiply(belief, REPEATED if is_repeated else TEMPER)
+
+
+@kernel
+def see_least(belief: BeliefArrays, use: float, sigma: float) -> None:
+    """Updates the belief by a lower bound: the car got `use`, over gravity, with error sigma."""
+    for i in range(len(GRIP)):
+        edge = (GRIP[i] - use) / (sigma * sqrt(2.0))
+        belief.likelihood[i, :] = 0.5 * (1.0 + erf(edge))
+    multiply(belief, TEMPER)
+
+
+@kernel
+def see_limit(belief: BeliefArrays, grip: float, spread: float) -> None:
+    """Updates the belief by the grip that a car at its limit showed; spread: its relative error."""
+    shown = log(max(grip, 1e-3))
+    for i in range(len(GRIP)):
+        error = (LOG_GRIP[i] - shown) / spread
+        belief.likelihood[i, :] = exp(-0.5 * error * error)
+    multiply(belief, TEMPER)
+
+
+@kernel
+def multiply(belief: BeliefArrays, exponent: float) -> None:
+    """Multiplies the belief by the likelihood in its room to a power and makes it sum to 1 again.
+
+    No likelihood counts for less than WILD of the greatest one; all zeros change nothing.
+    """
+    p, likelihood, most, total = belief.p, belief.likelihood, 0.0, 0.0
+    for i in range(len(GRIP)):
+        for j in range(len(STIFFNESS_SHARES)):
+            most = max(most, likelihood[i, j])
+    for i in range(len(GRIP)):
+        for j in range(len(STIFFNESS_SHARES)):
+            likely = likelihood[i, j] / most if most > 0.0 else 1.0
+            p[i, j] *= max(likely, WILD) ** exponent
+            total += p[i, j]
+    for i in range(len(GRIP)):
+        for j in range(len(STIFFNESS_SHARES)):
+            p[i, j] /= total
+
+
+@kernel
+def sum_grips(belief: BeliefArrays) -> None:
+    """Writes (n,) the probability of each grip, summed over stiffnesses, to its room `grips`."""
+    for i in range(len(GRIP)):
+        total = 0.0
+        for j in range(len(STIFFNESS_SHARES)):
+            total += belief.p[i, j]
+        belief.grips[i] = total
+
+
+@kernel
+def measure_softness(belief: BeliefArrays) -> float:
+    """Returns the mean over the belief of the design's stiffness over the stiffness; 1 for its own tyre."""
+    mean = 0.0
+    for i in range(len(GRIP)):
+        for j in range(len(STIFFNESS_SHARES)):
+            mean += belief.p[i, j] / STIFFNESS_SHARES[j]
+    return mean
+
+
+@kernel
+def measure_confidence(belief: BeliefArrays) -> float:
+    """Returns 1 less the spread of the grip over that of the prior, at least 0: what signals have added."""
+    sum_grips(belief)
+    return max(1.0 - measure_spread(belief.grips) / measure_spread(belief.prior), 0.0)
+
+
+@kernel
+def measure_spread(p: Floats) -> float:
     """Returns the standard deviation of the logarithm of grip under the (n,) probabilities; at least 3e-5."""
-    mean = p @ LOG_GRIP
-    return sqrt(max(float(p @ (LOG_GRIP - mean) ** 2), 1e-9))
+    mean, variance = 0.0, 0.0
+    for i in range(len(GRIP)):
+        mean += p[i] * LOG_GRIP[i]
+    for i in range(len(GRIP)):
+        variance += p[i] * (LOG_GRIP[i] - mean) * (LOG_GRIP[i] - mean)
+    return sqrt(max(variance, 1e-9))

@@ -9,11 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import isfinite, nan
-from typing import Any
+from math import inf, isfinite, nan
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from skidpad.core.arrays import Floats, Floats32
 from skidpad.core.errors import ConfigError, require_range
-from skidpad.core.frames import SensorFrame
+from skidpad.core.frames import RadarPoints, SensorFrame
+from skidpad.core.kernels.jit import Held, hold, kernel
 from skidpad.core.maths.constants import G
 from skidpad.core.sensor_types import read_sensor
 from skidpad.core.setup import DT
@@ -24,11 +28,21 @@ from skidpad.core.specs import (
     RadarSpec,
     SensorSpec,
 )
-from skidpad.core.states import EgoEstimate, StackReport, VehicleCommand
+from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.vocabulary import Supervision
-from skidpad.envelope.belief import BRIDGE_K, COLD_C, prior_grip
+from skidpad.envelope.belief import BRIDGE_K, COLD_C, PRIORS, RAIN_PRIORS, prior_grip
 from skidpad.envelope.bridges import BridgesAhead
-from skidpad.envelope.grip import STIFFNESS, Grip, GripEstimator
+from skidpad.envelope.grip import (
+    STIFFNESS,
+    Car,
+    Grip,
+    GripArrays,
+    drive_at,
+    estimate_grip,
+    leave_place,
+    make_grip,
+    new_estimator,
+)
 from skidpad.envelope.limits import (
     Binding,
     RssParameters,
@@ -42,8 +56,20 @@ from skidpad.envelope.limits import (
     sight_speed,
 )
 from skidpad.envelope.seen import FurtherSight
-from skidpad.envelope.sight import Sight, Way, way_ahead
-from skidpad.envelope.signals import BusModel, CarBus
+from skidpad.envelope.sight import (
+    SightArrays,
+    SightRules,
+    Way,
+    clear_way,
+    look_for_lead,
+    lose_lead,
+    new_sight,
+    sight_rules,
+    trace_way,
+)
+from skidpad.envelope.signals import BusArrays, BusModel, BusRules, CarBus, write_message
+from skidpad.physics.grip import GripParams, mu_at
+from skidpad.roads.kernels import LaneArrays
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.interface import Stack
 
@@ -62,7 +88,6 @@ LEAD_BRAKE = 8.0  # m/s^2 that it brakes at most
 # of brake pulses: within what drivers find comfortable, 2 m/s^2 (our assumption)
 PULSE_BRAKE, PULSE_TIME, PULSE_EVERY = 1.5, 0.8, 300.0  # m/s^2, s, m from one to the next
 PULSE_BELOW, PULSE_V_LEAST, PULSE_AY_MOST = 0.3, 8.0, 0.5  # confidence, m/s, m/s^2 across
-GripAt = Callable[[float], float]  # grip at a speed in m/s
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,7 +125,7 @@ class EnvelopeSettings:
     stiffness: float = STIFFNESS
     factor: float = 1.0
     table_kmh: tuple[float, float, float] | None = None
-    oracle: GripAt | None = None
+    oracle: GripParams | None = None
     oracle_sight: Callable[[float], float] | None = None
     limits: frozenset[Binding] = frozenset(Binding)
     rss: bool = False
@@ -147,6 +172,225 @@ class Allowed:
         }  # fmt: skip
 
 
+class EnvelopeRules(NamedTuple):
+    """What holds for an envelope in all ticks; fields as in `EnvelopeSettings`."""
+
+    share: float
+    lateral_share: float
+    delay: float
+    approach: float
+    most: float
+    stiffness: float
+    factor: float
+    has_table: bool
+    table: tuple[float, float, float]  # m/s
+    rss: bool
+    rss_limits: RssParameters
+    counted: int  # limits that count, as bits by Binding
+    knows_grip: bool
+    true_grip: GripParams  # for studies only
+    acts: bool  # it does not only watch
+    pulses: bool
+    dt: float  # s
+    car: Car
+    bus: BusRules
+    sight: SightRules
+
+
+class EnvelopeArrays(NamedTuple):
+    """What an envelope remembers, for kernels."""
+
+    grip: GripArrays
+    bus: BusArrays
+    sight: SightArrays
+    limits: Floats  # (9,) m/s by Binding, inf: none; of this tick
+    pulse: Floats  # m since the last brake pulse, s that are left of one
+
+
+class EnvelopeParts(NamedTuple):
+    """All that an envelope reads and writes: behind one pointer, as each array costs a call 0.2 us."""
+
+    rules: EnvelopeRules
+    arrays: EnvelopeArrays
+    map: Held[LaneArrays]
+
+
+class Motion(NamedTuple):
+    """Pose, speed and accelerations of the ego, as `feel_motion` has them."""
+
+    x: float
+    y: float
+    z: float
+    pitch: float
+    yaw: float
+    v: float
+    yaw_rate: float
+    ax: float
+    ay: float
+    wheels: tuple[float, float, float, float]
+
+
+class Told(NamedTuple):
+    """What the envelope says in a tick: numbers of `Allowed`, NaN for None."""
+
+    speed: float
+    binding: int
+    value: float  # grip, to confidence
+    shown: float
+    confidence: float
+    prior: float
+    reach: float
+    places: int  # of the way ahead
+    grade: float
+    has_lead: bool
+
+
+RECORDED = ("speed_mps", "binding", "grip", "confidence", "prior", "reach_m", "ego_mps")
+
+
+@kernel
+def find_limits(
+    parts: Held[EnvelopeParts], distance: Floats32, azimuth: Floats32, altitude: Floats32,
+    velocity: Floats32, ego: Motion, throttle: float, brake: float, steer: float, stage: int,
+    is_cold: bool,
+) -> Told:  # fmt: skip
+    """Takes what is sensed in a tick and writes the limits of speed; returns what else is found.
+
+    distance to velocity: of the radar, as `RadarPoints`. throttle, brake, steer: of the command of the tick
+    before, 0 while a supervisor drives. stage: of the rain sensor, 0: dry; is_cold: by the thermometer. Once
+    per tick.
+    """
+    r, arrays, map = parts.value.rules, parts.value.arrays, parts.value.map
+    points = RadarPoints(distance, azimuth, altitude, velocity)
+    limits, v = arrays.limits, max(ego.v, 0.0)
+    limits[:] = inf
+    places, grade = trace_way(map, ego.x, ego.y, ego.z, ego.yaw, arrays.sight.way)
+    signals = write_message(
+        arrays.bus, r.bus, ego.wheels, ego.ax, ego.ay, ego.yaw_rate, steer, brake,
+        drive_at(r.car, throttle, v), grade,
+    )  # fmt: skip
+    expected = PRIORS[stage + len(RAIN_PRIORS) if is_cold else stage]
+    value, shown, sure, prior = estimate_grip(
+        arrays.grip, r.car, r.stiffness, r.dt, signals, stage, expected, grade
+    )
+    if r.knows_grip:
+        value = mu_at(r.true_grip, v)
+        shown, sure = value, 1.0
+    elif r.factor != 1.0:
+        value *= r.factor
+    reach, has_lead = 0.0, False
+    if r.has_table:
+        limits[Binding.TABLE] = r.table[2 if is_cold else min(stage, 1)]
+    elif r.rss:
+        limits[Binding.TABLE] = TABLE_KMH[0] / 3.6
+        if places > 0:
+            has_lead = see_lead(arrays, r, points, places, ego, v)
+        if has_lead:
+            lead = arrays.sight.memory[0]
+            limits[Binding.LEAD] = rss_speed(lead.gap, lead.lead_speed, r.rss_limits)
+    else:
+        limits[Binding.WATER] = floating_speed(FILMS[stage])
+        if places > 0:  # else nothing is known of what lies ahead
+            has_lead = see_lead(arrays, r, points, places, ego, v)
+            reach = limit_ahead(arrays, r, places, ego, v, value, has_lead)
+    speed, binding = lowest(limits, r.counted, r.most)
+    return Told(speed, binding, value, shown, sure, prior, reach, places, grade, has_lead)
+
+
+@kernel
+def see_lead(
+    arrays: EnvelopeArrays, r: EnvelopeRules, points: RadarPoints, places: int, ego: Motion,
+    v: float,
+) -> bool:  # fmt: skip
+    """Returns whether there is a lead, whose gap and speed are noted."""
+    return look_for_lead(
+        arrays.sight, r.sight, points, places, ego.x, ego.y, ego.z, ego.pitch, ego.yaw, v
+    )
+
+
+@kernel
+def limit_ahead(
+    arrays: EnvelopeArrays, r: EnvelopeRules, places: int, ego: Motion, v: float, grip: float,
+    has_lead: bool,
+) -> float:  # fmt: skip
+    """Writes the limits by sight, bends and lead, and returns the m that are seen to be clear."""
+    limits, sight, way = arrays.limits, arrays.sight.memory[0], arrays.sight.way
+    braking = r.share * grip * G
+    reach = min(sight.reach, clear_way(way, r.sight, places, ego.x, ego.y, ego.yaw))
+    limits[Binding.SIGHT] = sight_speed(reach, braking, r.delay)
+    limits[Binding.BEND] = bends_speed(
+        way[0, :places], way[4, :places], r.lateral_share * grip * G, min(r.approach, braking),
+        r.delay, v,
+    )  # fmt: skip
+    if has_lead:
+        hardest = min(LEAD_GRIP * grip * G, LEAD_BRAKE)
+        limits[Binding.LEAD] = following_speed(
+            sight.gap - CLOSE, sight.lead_speed, braking, hardest, r.delay
+        )
+    return reach
+
+
+@kernel
+def hold_back(
+    throttle: float, brake: float, reverse: bool, v: float, allowed: float, approach: float,
+    a_brake: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Returns less throttle above `allowed` - SOFT m/s and more brake above `allowed`.
+
+    Unchanged when backing up, below V_CREEP, or where no more is asked for. approach: m/s^2 of braking at
+    most; a_brake: m/s^2 of full brake.
+    """
+    if v <= max(allowed - SOFT, V_CREEP) or reverse:
+        return throttle, brake
+    share = min(max((allowed - v) / SOFT, 0.0), 1.0)
+    asked = min(BRAKE_GAIN * max(v - allowed, 0.0), approach) / a_brake
+    return throttle * share, max(brake, asked)
+
+
+@kernel
+def pulse_brake(
+    pulse: Floats, v: float, ay: float, confidence: float, has_lead: bool, dt: float
+) -> float:
+    """Returns m/s^2 to brake with in this tick, PULSE_BRAKE in a pulse, else 0; call it in every tick.
+
+    Brakes a little, now and then, where nothing is known of the grip and the way is free. pulse: m since the
+    last one, s left. A pulse lasts PULSE_TIME s and comes after PULSE_EVERY m. None comes from confidence
+    PULSE_BELOW on, behind a lead, at PULSE_V_LEAST or slower, or from PULSE_AY_MOST on.
+    """
+    pulse[0] += max(v, 0.0) * dt
+    is_free = not has_lead and v > PULSE_V_LEAST and abs(ay) < PULSE_AY_MOST
+    if confidence >= PULSE_BELOW or not is_free:
+        pulse[1] = 0.0
+        return 0.0
+    if pulse[0] > PULSE_EVERY:
+        pulse[0], pulse[1] = 0.0, PULSE_TIME
+    pulse[1] -= dt
+    return PULSE_BRAKE if pulse[1] > 0.0 else 0.0
+
+
+@kernel
+def keep_inside(
+    parts: Held[EnvelopeParts], told: Told, v: float, ay: float, throttle: float, brake: float,
+    reverse: bool,
+) -> tuple[float, float]:  # fmt: skip
+    """Returns throttle and brake of the stack's command, held back to the allowed speed.
+
+    v, ay: of the ego, m/s and m/s^2.
+    """
+    r = parts.value.rules
+    braking = r.share * told.value * G
+    approach = min(r.approach, braking)
+    if told.binding == Binding.LEAD:  # a lead may brake at any moment
+        approach = braking
+    throttle, brake = hold_back(throttle, brake, reverse, v, told.speed, approach, r.car.a_brake)
+    if r.pulses:
+        pulse = parts.value.arrays.pulse
+        least = pulse_brake(pulse, v, ay, told.confidence, told.has_lead, r.dt)
+        if least > 0.0:
+            throttle, brake = 0.0, max(brake, least / r.car.a_brake)
+    return throttle, brake
+
+
 class Envelope:
     """The speed that is safe here and now."""
 
@@ -161,173 +405,127 @@ class Envelope:
                 "--govern oracle-sight needs a stack with a radar, and this one has none"
             )
         known = None if true_range is None or radar is None else true_range(radar.range)
-        self.sight = Sight(radar, settings.dt, known)
-        self.grip = GripEstimator(settings.dt, stiffness=settings.stiffness)
-        self.bus = CarBus(settings.seed, settings.bus, self.grip.car.steer_max)
+        self.bus = CarBus(settings.seed, settings.bus, Car().steer_max)
+        self.rules = make_rules(settings, self.bus.rules, sight_rules(radar, settings.dt, known))
+        self.arrays = EnvelopeArrays(
+            new_estimator(), self.bus.arrays, new_sight(self.rules.sight),
+            np.full(len(Binding), inf), np.zeros(2),
+        )  # fmt: skip
+        self.held = hold(EnvelopeParts(self.rules, self.arrays, map.held))
         self.further: FurtherSight | None = None
         if settings.walkers or settings.lanes:
             self.further = FurtherSight(specs, settings.dt, settings.walkers, settings.lanes)
         self.bridges = BridgesAhead(map) if settings.bridges else None
         self.bridge: float | None = None  # m to the next one that may be frozen
 
+    @property
+    def reach(self) -> float:
+        """M at which leads are first seen."""
+        return float(self.arrays.sight.memory["reach"][0])
+
     def reset(self) -> None:
         """Forgets what was seen and felt at another place.
 
         Keeps the radar's reach and the belief of the grip.
         """
-        self.sight.reset()
-        self.grip.reset()
+        lose_lead(self.arrays.sight)
+        leave_place(self.arrays.grip)
 
-    def update(self, frame: SensorFrame, applied: VehicleCommand) -> Allowed:
+    def update(self, frame: SensorFrame, applied: VehicleCommand) -> Told:
         """Takes one frame and returns what is allowed in its tick; to be called once in every tick.
 
         applied: the command of the tick before. The frame's `extra` must hold RAIN_ID and AIR_ID.
         """
-        set_to, ego, v = self.settings, frame.ego, max(frame.ego.speed, 0.0)
         stage, air_c = read_sensor(frame, RAIN_ID, int), read_sensor(frame, AIR_ID, float)
-        way = way_ahead(self.map, ego.pose)
-        grade = 0.0 if way is None else way.grade
-        drive = self.grip.car.drive_at(applied.throttle, v)
-        signals = self.bus.read(ego, applied, drive, grade)
-        grip = self.grip.update(signals, stage, air_c, grade)
-        if set_to.oracle is not None:
-            true = set_to.oracle(v)
-            grip = Grip(true, true, 1.0, grip.prior)
-        elif set_to.factor != 1.0:
-            grip = replace(grip, value=grip.value * set_to.factor)
-        if set_to.table_kmh is not None:
-            row = 2 if air_c < COLD_C else min(stage, 1)
-            limits, reach = {Binding.TABLE: set_to.table_kmh[row] / 3.6}, 0.0
-        elif set_to.rss:
-            limits, reach = self._limit_by_rss(frame, way, v), 0.0
-        else:
-            limits, reach = self._limits(frame, way, grip, stage, v)
-            if way is not None:
-                limits |= self._limit_by_further_sight(frame, way, grip)
-                limits |= self._limit_by_bridge(frame, grip, stage, air_c, reach)
-            limits = {name: limit for name, limit in limits.items() if name in set_to.limits}
-        return Allowed(*lowest(limits, set_to.most), grip, reach, v, self._numbers())
+        self.bus.draw_noise()
+        told: Told = find_limits(
+            self.held, *frame.radar, read_motion(frame), applied.throttle, applied.brake,
+            applied.steer, stage, air_c < COLD_C,
+        )  # fmt: skip
+        if told.places and (self.further is not None or self.bridges is not None):
+            self._limit_by_further_sight(frame, told)
+            self._limit_by_bridge(frame, told, stage, air_c)
+            rules = self.rules
+            speed, binding = lowest(self.arrays.limits, rules.counted, rules.most)
+            told = told._replace(speed=speed, binding=binding)
+        return told
 
-    def _limit_by_further_sight(
-        self, frame: SensorFrame, way: Way, grip: Grip
-    ) -> dict[Binding, float]:
-        """Returns the limits by walkers and lane boundaries, where they are asked for and seen.
+    def _limit_by_further_sight(self, frame: SensorFrame, told: Told) -> None:
+        """Writes the limits by walkers and lane boundaries, where they are asked for and seen.
 
         Where walkers are expected the car can stop within the distance at which they are first seen, and
         before one that is in the way.
         """
         if self.further is None:
-            return {}
-        self.further.look(frame, way)
-        set_to, limits = self.settings, {}
+            return
+        self.further.look(frame, Way(*self.arrays.sight.way[:, : told.places], told.grade))
+        set_to, limits = self.settings, self.arrays.limits
         reach, lane = self.further.walker_reach, self.further.lane_reach
         if self.further.walker is not None:
             gap = self.further.walker - CLOSE
             reach = gap if reach is None else min(reach, gap)
         if reach is not None:
-            limits[Binding.WALKER] = sight_speed(reach, set_to.share * grip.value * G, set_to.delay)
+            braking = set_to.share * told.value * G
+            limits[Binding.WALKER] = sight_speed(reach, braking, set_to.delay)
         if lane is not None:
             limits[Binding.LANE] = preview_speed(lane, set_to.preview)
-        return limits
 
-    def _limit_by_bridge(
-        self, frame: SensorFrame, grip: Grip, stage: int, air_c: float, reach: float
-    ) -> dict[Binding, float]:
-        """Returns the limit by the next bridge where it may be frozen; stage: of the rain sensor."""
+    def _limit_by_bridge(self, frame: SensorFrame, told: Told, stage: int, air_c: float) -> None:
+        """Writes the limit by the next bridge where it may be frozen; stage: of the rain sensor."""
         self.bridge = None
         if self.bridges is None or air_c - BRIDGE_K >= COLD_C:
-            return {}
+            return
         self.bridge = self.bridges.find_next(frame.ego.pose)
         if self.bridge is None:
-            return {}
+            return
         set_to = self.settings
-        expected = min(grip.value, prior_grip(stage, air_c - BRIDGE_K))
-        approach = min(set_to.approach, set_to.share * grip.value * G)
+        expected = min(told.value, prior_grip(stage, air_c - BRIDGE_K))
+        approach = min(set_to.approach, set_to.share * told.value * G)
         v = max(frame.ego.speed, 0.0)
         on_bridge = set_to.share * expected * G
-        limit = bridge_speed(self.bridge, reach, on_bridge, approach, set_to.delay, v)
-        return {Binding.BRIDGE: limit}
+        self.arrays.limits[Binding.BRIDGE] = bridge_speed(
+            self.bridge, told.reach, on_bridge, approach, set_to.delay, v
+        )
 
-    def _numbers(self) -> dict[str, float]:
+    def numbers(self) -> dict[str, float]:
         """Returns what is recorded of sight of lanes and walkers and of bridges; empty where none counts."""
         told = {} if self.further is None else self.further.numbers()
         if self.bridges is not None:
             told["bridge_m"] = nan if self.bridge is None else self.bridge
         return told
 
-    def _limit_by_rss(self, frame: SensorFrame, way: Way | None, v: float) -> dict[Binding, float]:
-        """Returns the speed limits in m/s of the rival: a fixed table speed and RSS behind the lead."""
-        limits = {Binding.TABLE: TABLE_KMH[0] / 3.6}
-        lead = None if way is None else self.sight.look(frame.radar, frame.ego.pose, way, v)
-        if lead is not None:
-            limits[Binding.LEAD] = rss_speed(lead.gap, lead.speed, RssParameters())
-        return limits
 
-    def _limits(
-        self, frame: SensorFrame, way: Way | None, grip: Grip, stage: int, v: float
-    ) -> tuple[dict[Binding, float], float]:
-        """Returns the speed limits in m/s by their cause, and the m that are seen to be clear.
+def make_rules(settings: EnvelopeSettings, bus: BusRules, sight: SightRules) -> EnvelopeRules:
+    """Returns the settings as kernels take them."""
+    s = settings
+    table = s.table_kmh or (0.0, 0.0, 0.0)
+    return EnvelopeRules(
+        share=s.share, lateral_share=s.lateral_share, delay=s.delay, approach=s.approach,
+        most=s.most, stiffness=s.stiffness, factor=s.factor, has_table=s.table_kmh is not None,
+        table=(table[0] / 3.6, table[1] / 3.6, table[2] / 3.6), rss=s.rss,
+        rss_limits=RssParameters(), counted=sum(1 << name for name in s.limits),
+        knows_grip=s.oracle is not None, true_grip=s.oracle or GripParams(*(0.0,) * 9),
+        acts=not s.watches, pulses=s.pulses, dt=s.dt, car=Car(), bus=bus, sight=sight,
+    )  # fmt: skip
 
-        Off every lane (way None) only water limits, and nothing is seen: 0 m. stage: of the rain sensor.
-        """
-        set_to = self.settings
-        braking = set_to.share * grip.value * G
-        limits = {Binding.WATER: floating_speed(FILMS[stage])}
-        if way is None:  # off every lane: nothing is known of what lies ahead
-            return limits, 0.0
-        lead = self.sight.look(frame.radar, frame.ego.pose, way, v)
-        reach = min(self.sight.reach, self.sight.clear_way(frame.ego.pose, way))
-        limits[Binding.SIGHT] = sight_speed(reach, braking, set_to.delay)
-        limits[Binding.BEND] = bends_speed(
-            zip(way.s.tolist(), way.curvature.tolist(), strict=True),
-            set_to.lateral_share * grip.value * G, min(set_to.approach, braking), set_to.delay, v,
-        )  # fmt: skip
-        if lead is not None:
-            hardest = min(LEAD_GRIP * grip.value * G, LEAD_BRAKE)
-            gap = lead.gap - CLOSE
-            limits[Binding.LEAD] = following_speed(gap, lead.speed, braking, hardest, set_to.delay)
-        return limits, reach
+
+def read_motion(frame: SensorFrame) -> Motion:
+    """Returns the ego's motion as kernels take it."""
+    ego, pose = frame.ego, frame.ego.pose
+    return Motion(
+        pose.x, pose.y, pose.z, pose.pitch, pose.yaw, ego.speed, ego.yaw_rate, ego.ax, ego.ay,
+        ego.wheel_speeds,
+    )  # fmt: skip
 
 
 def lower(
     command: VehicleCommand, v: float, allowed: float, approach: float, a_brake: float
 ) -> VehicleCommand:
-    """Returns the command with less throttle above `allowed` - SOFT m/s and more brake above `allowed`.
-
-    Unchanged when backing up, below V_CREEP, or where it asks for no more. approach: m/s^2 of braking at
-    most; a_brake: m/s^2 of full brake.
-    """
-    if v <= max(allowed - SOFT, V_CREEP) or command.reverse:
-        return command
-    share = min(max((allowed - v) / SOFT, 0.0), 1.0)
-    brake = min(BRAKE_GAIN * max(v - allowed, 0.0), approach) / a_brake
-    throttle = command.throttle * share
-    if throttle == command.throttle and brake <= command.brake:
-        return command
-    return replace(command, throttle=throttle, brake=max(command.brake, brake))
-
-
-class BrakePulses:
-    """Brakes a little, now and then, where nothing is known of the grip and the way is free."""
-
-    def __init__(self, dt: float) -> None:
-        self.dt, self.way, self.left = dt, 0.0, 0.0
-
-    def update(self, ego: EgoEstimate, allowed: Allowed, has_lead: bool) -> float:
-        """Returns m/s^2 to brake with in this tick, PULSE_BRAKE in a pulse, else 0; call it in every tick.
-
-        A pulse lasts PULSE_TIME s and comes after PULSE_EVERY m. None comes from confidence PULSE_BELOW on,
-        behind a lead, at PULSE_V_LEAST or slower, or from PULSE_AY_MOST on.
-        """
-        self.way += max(ego.speed, 0.0) * self.dt
-        is_free = not has_lead and ego.speed > PULSE_V_LEAST and abs(ego.ay) < PULSE_AY_MOST
-        if allowed.grip.confidence >= PULSE_BELOW or not is_free:
-            self.left = 0.0
-            return 0.0
-        if self.way > PULSE_EVERY:
-            self.way, self.left = 0.0, PULSE_TIME
-        self.left -= self.dt
-        return PULSE_BRAKE if self.left > 0.0 else 0.0
+    """Returns the command as `hold_back` has it."""
+    throttle, brake = hold_back(
+        command.throttle, command.brake, command.reverse, v, allowed, approach, a_brake
+    )
+    return replace(command, throttle=throttle, brake=brake)
 
 
 class GovernedStack:
@@ -341,7 +539,6 @@ class GovernedStack:
         self.applied = VehicleCommand()
         self.supervision = Supervision.NONE
         self.allowed: Allowed | None = None
-        self.pulses = BrakePulses(settings.dt) if settings.pulses else None
 
     def sensors(self) -> tuple[SensorSpec, ...]:
         """Returns the specs of what the stack itself asks for, and the two sensors of the envelope."""
@@ -379,29 +576,29 @@ class GovernedStack:
         if frame.supervision is not self.supervision:
             self.envelope.reset()
             self.supervision = frame.supervision
-        driven = frame.supervision is Supervision.NONE
-        self.allowed = self.envelope.update(frame, self.applied if driven else VehicleCommand())
-        acts = driven and not self.settings.watches
+        driven, rules = frame.supervision is Supervision.NONE, self.envelope.rules
+        told = self.envelope.update(frame, self.applied if driven else VehicleCommand())
+        self.allowed = make_allowed(told, max(frame.ego.speed, 0.0), self.envelope.numbers())
         tell = getattr(self.inner, "limit_speed", None)
-        if callable(tell) and not self.settings.watches:
-            tell(max(self.allowed.speed, V_CREEP))
+        if callable(tell) and rules.acts:
+            tell(max(told.speed, V_CREEP))
         command = self.inner.tick(frame)
-        if acts and isinstance(command, VehicleCommand) and isfinite(frame.ego.speed):
-            braking = self.settings.share * self.allowed.grip.value * G
-            approach = min(self.settings.approach, braking)
-            if self.allowed.binding is Binding.LEAD:  # a lead may brake at any moment
-                approach = braking
-            car = self.envelope.grip.car
-            command = lower(command, frame.ego.speed, self.allowed.speed, approach, car.a_brake)
-            if self.pulses is not None:
-                least = self.pulses.update(
-                    frame.ego, self.allowed, self.envelope.sight.lead is not None
-                )
-                if least > 0.0:
-                    brake = max(command.brake, least / car.a_brake)
-                    command = replace(command, throttle=0.0, brake=brake)
+        acts = driven and rules.acts and isinstance(command, VehicleCommand)
+        if acts and isfinite(frame.ego.speed):
+            throttle, brake = keep_inside(
+                self.envelope.held, told, frame.ego.speed, frame.ego.ay,
+                command.throttle, command.brake, command.reverse,
+            )  # fmt: skip
+            if throttle != command.throttle or brake > command.brake:
+                command = replace(command, throttle=throttle, brake=brake)
         self.applied = command
         return command
+
+
+def make_allowed(told: Told, v: float, further: Mapping[str, float]) -> Allowed:
+    """Returns what the envelope said at v in m/s, with names."""
+    grip = make_grip(told.value, told.shown, told.confidence, told.prior)
+    return Allowed(told.speed, Binding(told.binding), grip, told.reach, v, further)
 
 
 def govern(stack: type[Stack], settings: EnvelopeSettings | None = None) -> type[Stack]:

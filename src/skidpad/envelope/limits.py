@@ -5,10 +5,12 @@ Speeds in m/s, distances in m, decelerations positive in m/s^2. The lowest speed
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from enum import IntEnum
 from math import inf, sqrt
+from typing import NamedTuple
+
+from skidpad.core.arrays import Floats
+from skidpad.core.kernels.jit import kernel
 
 STRAIGHT = 1e-5  # 1/m, less is no bend
 INCH_MM = 25.4
@@ -30,6 +32,7 @@ class Binding(IntEnum):
     BRIDGE = 8
 
 
+@kernel
 def sight_speed(distance: float, deceleration: float, delay: float) -> float:
     """Returns the highest speed from which a car stops within `distance`; 0 where that is not above 0.
 
@@ -42,6 +45,7 @@ def sight_speed(distance: float, deceleration: float, delay: float) -> float:
     return sqrt(b * b + 2.0 * deceleration * distance) - b
 
 
+@kernel
 def following_speed(
     gap: float, v_lead: float, deceleration: float, lead_deceleration: float, delay: float
 ) -> float:
@@ -57,8 +61,7 @@ def following_speed(
     return sight_speed(max(gap, 0.0) + lead_way, deceleration, delay)
 
 
-@dataclass(frozen=True, slots=True)
-class RssParameters:
+class RssParameters(NamedTuple):
     """Constants of RSS, here those of intel/ad-rss-lib's documentation; they know no weather."""
 
     response: float = 1.0  # s
@@ -67,6 +70,7 @@ class RssParameters:
     brake_most: float = 8.0  # m/s^2 of the lead
 
 
+@kernel
 def rss_speed(gap: float, v_lead: float, constants: RssParameters) -> float:
     """Returns the highest speed for which `gap` is the safe distance of RSS, which is solved for v + a t.
 
@@ -78,6 +82,7 @@ def rss_speed(gap: float, v_lead: float, constants: RssParameters) -> float:
     return max(sight_speed(way, constants.brake_least, t) - a * t, 0.0)
 
 
+@kernel
 def bend_speed(curvature: float, lateral: float) -> float:
     """Returns the speed at which a bend takes `lateral` m/s^2; inf below a curvature (1/m) of STRAIGHT.
 
@@ -87,27 +92,28 @@ def bend_speed(curvature: float, lateral: float) -> float:
     return sqrt(lateral / abs(curvature)) if abs(curvature) > STRAIGHT else inf
 
 
+@kernel
 def speed_before_bend(v_bend: float, distance: float, approach: float) -> float:
     """Returns the speed `distance` before a bend from which `approach` m/s^2 slows to v_bend; inf for inf."""
     return sqrt(v_bend * v_bend + 2.0 * approach * max(distance, 0.0)) if v_bend < inf else inf
 
 
+@kernel
 def bends_speed(
-    places: Iterable[tuple[float, float]], lateral: float, approach: float, delay: float, v: float
+    distance: Floats, curvature: Floats, lateral: float, approach: float, delay: float, v: float
 ) -> float:
     """Returns the speed that all bends allow, inf without any; `v` drives on for the delay before braking.
 
-    places: (m ahead, curvature in 1/m) of points of the lane.
+    distance, curvature: (n,) m ahead and 1/m of points of the lane.
     """
-    return min(
-        (
-            speed_before_bend(bend_speed(curvature, lateral), distance - v * delay, approach)
-            for distance, curvature in places
-        ),
-        default=inf,
-    )
+    least = inf
+    for i in range(len(distance)):
+        bend = bend_speed(curvature[i], lateral)
+        least = min(least, speed_before_bend(bend, distance[i] - v * delay, approach))
+    return least
 
 
+@kernel
 def preview_speed(distance: float, preview: float) -> float:
     """Returns the highest speed at which `distance` m of lane boundary are `preview` s of driving.
 
@@ -117,6 +123,7 @@ def preview_speed(distance: float, preview: float) -> float:
     return max(distance, 0.0) / preview
 
 
+@kernel
 def bridge_speed(
     distance: float, reach: float, deceleration: float, approach: float, delay: float, v: float
 ) -> float:
@@ -129,6 +136,7 @@ def bridge_speed(
     return speed_before_bend(on_it, distance - v * delay, approach) if distance > 0.0 else on_it
 
 
+@kernel
 def floating_speed(film_mm: float) -> float:
     """Returns the speed at which tyres begin to float on so much water; inf on less than 0.2 mm.
 
@@ -138,11 +146,17 @@ def floating_speed(film_mm: float) -> float:
     """
     if film_mm < FILM_LEAST:
         return inf
-    return float(MPH * 26.04 * (min(film_mm, FILM_MOST) / INCH_MM) ** -0.259)
+    return MPH * 26.04 * (min(film_mm, FILM_MOST) / INCH_MM) ** -0.259
 
 
-def lowest(limits: Mapping[Binding, float], most: float) -> tuple[float, Binding]:
-    """Returns the lowest speed and its name; `most` and NONE where no limit is below it."""
-    binding = min(limits, key=lambda name: limits[name], default=Binding.NONE)
-    v = limits.get(binding, inf)
-    return (v, binding) if v < most else (most, Binding.NONE)
+@kernel
+def lowest(limits: Floats, counted: int, most: float) -> tuple[float, int]:
+    """Returns the lowest speed and its Binding; `most` and NONE where no limit is below it.
+
+    limits: (n,) by Binding, inf: none; counted: those that count, as bits by Binding.
+    """
+    speed, binding = most, 0
+    for name in range(len(limits)):
+        if (counted >> name) & 1 and limits[name] < speed:
+            speed, binding = limits[name], name
+    return speed, binding

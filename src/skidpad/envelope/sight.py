@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
-from math import cos, inf, sin
+from math import atan2, cos, hypot, inf, isnan, nan, pi, radians, sin
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from skidpad.core.arrays import Floats
 from skidpad.core.frames import RadarPoints
 from skidpad.core.geometry import Pose
+from skidpad.core.kernels.jit import Held, kernel
 from skidpad.core.specs import RadarSpec
+from skidpad.roads.kernels import LaneArrays, advance_point, project_point
 from skidpad.roads.queries import RoadMap
 
 STEP, REACH = 5.0, 160.0  # m between places along the lane, and to the last one
@@ -24,6 +26,9 @@ APPROACHED = 2.0  # m/s of closing speed, from which on a first return tells of 
 SEEN_PRIOR = 80.0  # m at which leads are expected to be seen first, before any was; our assumption
 SEEN_SHARE, SEEN_LEAST, SEEN_KEPT = 0.2, 5, 20  # quantile of so many first distances, of the newest
 FRONT = 1.9  # m from the reference point to the bumper
+
+
+PLACES = round(REACH / STEP) + 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,16 +43,36 @@ class Way:
     grade: float
 
 
+@kernel
+def trace_way(
+    map: Held[LaneArrays], x: float, y: float, z: float, yaw: float, out: Floats
+) -> tuple[int, float]:
+    """Writes the lane ahead of a pose every STEP m to (5, PLACES) s, x, y, z, curvature.
+
+    Returns the number of places up to REACH m or the lane's end, 0 off every lane, and the grade at the car.
+    """
+    here = project_point(map.value, x, y, z, True)
+    if here[0] < 0:
+        return 0, 0.0
+    n = 0
+    place = here
+    while True:
+        out[0, n], out[1, n], out[2, n] = STEP * n, place[3], place[4]
+        out[3, n], out[4, n] = place[5], place[7]
+        n += 1
+        if n == PLACES:
+            break
+        place = advance_point(map.value, here[0], here[1], n * STEP, yaw)
+        if place[0] < 0:
+            break
+    return n, (out[3, 1] - out[3, 0]) / STEP if n > 1 else 0.0
+
+
 def way_ahead(map: RoadMap, pose: Pose) -> Way | None:
     """Returns the lane ahead of a pose every STEP m, up to REACH m or its end; None off every lane."""
-    here = map.project(pose.x, pose.y, pose.z)
-    if here is None:
-        return None
-    further = map.trace_ahead(here, STEP, round(REACH / STEP), pose.yaw)
-    x, y, z, curvature = np.vstack(((here.x, here.y, here.z, here.curvature), further)).T
-    s = STEP * np.arange(len(x), dtype=np.float64)
-    grade = float((z[1] - z[0]) / STEP) if len(s) > 1 else 0.0
-    return Way(s, x, y, z, curvature, grade)
+    out = np.empty((5, PLACES))
+    n, grade = trace_way(map.held, pose.x, pose.y, pose.z, pose.yaw, out)
+    return Way(*out[:, :n], grade) if n else None
 
 
 def locate_on(way: Way, x: Floats, y: Floats) -> tuple[NDArray[np.intp], Floats]:
@@ -58,101 +83,163 @@ def locate_on(way: Way, x: Floats, y: Floats) -> tuple[NDArray[np.intp], Floats]
     return nearest, (y - way.y[k]) * np.cos(heading) - (x - way.x[k]) * np.sin(heading)
 
 
-@dataclass(frozen=True, slots=True)
-class Lead:
-    """What drives ahead in the lane: gap from bumper to return in m, speed in m/s."""
+class SightRules(NamedTuple):
+    """What holds for the sight of one stack."""
 
-    gap: float
-    speed: float
+    has_radar: bool
+    x: float  # m, mount of the radar ahead of the origin
+    y: float  # m, to its left
+    z: float  # m
+    half_fov: float  # rad, to either side
+    range: float  # m
+    known: float  # m at which leads are seen first, for studies; NaN: it is found out
+    dt: float  # s
 
 
-class Sight:
-    """Leads by the radar, and the distance at which they are seen.
+SIGHT = np.dtype(
+    [
+        ("gap", np.float64),  # m from the bumper to the lead; NaN: there is none
+        ("lead_speed", np.float64),  # m/s
+        ("unseen", np.float64),  # s since its last return
+        ("noted", np.int64),  # first distances, ever
+        ("reach", np.float64),  # m, distance of first sight
+    ],
+    align=True,
+)
 
-    known: m at which they are seen first, for studies; None: it is found out.
+
+class SightArrays(NamedTuple):
+    """What is remembered of leads, for kernels."""
+
+    memory: NDArray[np.void]  # (1,) SIGHT
+    first: Floats  # (SEEN_KEPT,) m, the newest first distances, as a ring
+    sorted: Floats  # (SEEN_KEPT,) room
+    way: Floats  # (5, PLACES) room: the lane ahead, as `trace_way`
+
+
+def sight_rules(radar: RadarSpec | None, dt: float, known: float | None = None) -> SightRules:
+    """Returns the rules of a radar; known: m at which leads are seen first, for studies."""
+    reach = nan if known is None else known
+    if radar is None:
+        return SightRules(False, 0.0, 0.0, 0.0, 0.0, 0.0, reach, dt)
+    mount, half = radar.mount, radians(radar.horizontal_fov_deg / 2.0)
+    return SightRules(True, mount.x, mount.y, mount.z, half, radar.range, reach, dt)
+
+
+def new_sight(rules: SightRules) -> SightArrays:
+    """Returns what is remembered before anything was seen."""
+    memory = np.zeros(1, SIGHT)
+    memory["gap"], memory["unseen"] = nan, inf
+    memory["reach"] = SEEN_PRIOR if isnan(rules.known) else rules.known
+    return SightArrays(memory, np.empty(SEEN_KEPT), np.empty(SEEN_KEPT), np.empty((5, PLACES)))
+
+
+@kernel
+def lose_lead(arrays: SightArrays) -> None:
+    """Forgets the lead of another place; the distances of first sight are kept."""
+    arrays.memory[0].gap, arrays.memory[0].unseen = nan, inf
+
+
+@kernel
+def look_for_lead(
+    arrays: SightArrays, r: SightRules, points: RadarPoints, n: int,
+    x: float, y: float, z: float, pitch: float, yaw: float, v: float,
+) -> bool:  # fmt: skip
+    """Notes the lead of this tick and returns whether there is one; call it once per tick.
+
+    n: places of the way ahead; x to yaw, v: pose and m/s of the ego. A lead without a return is carried on
+    for HOLD s. A return JOIN m or more beyond a held lead does not replace it. First distances of leads that
+    come nearer are noted for the reach.
     """
+    m = arrays.memory[0]
+    gap, speed = find_lead(arrays.way, r, points, n, x, y, z, pitch, yaw, v)
+    m.unseen += r.dt
+    is_held = not isnan(m.gap) and m.unseen <= HOLD
+    m.gap = max(m.gap + (m.lead_speed - v) * r.dt, 0.0) if is_held else nan
+    if isnan(gap):
+        return is_held
+    if not is_held and v - speed > APPROACHED:
+        note_first(arrays, r, gap)
+    if not is_held or gap < m.gap + JOIN:
+        m.gap, m.lead_speed, m.unseen = gap, speed, 0.0
+    return True
 
-    def __init__(self, radar: RadarSpec | None, dt: float, known: float | None = None) -> None:
-        self.radar, self.dt, self.known = radar, dt, known
-        self.lead: Lead | None = None
-        self.first_seen: deque[float] = deque(maxlen=SEEN_KEPT)
-        self.unseen = inf  # s since the last return of the lead
 
-    def reset(self) -> None:
-        """Forgets the lead of another place; the distances of first sight are kept."""
-        self.lead, self.unseen = None, inf
+@kernel
+def find_lead(
+    way: Floats, r: SightRules, points: RadarPoints, n: int,
+    x: float, y: float, z: float, pitch: float, yaw: float, v: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Returns gap in m and speed in m/s, not below 0, of the nearest radar point in the lane; NaN: none."""
+    gap, speed, nearest = nan, nan, inf
+    if not r.has_radar or n < 2:
+        return gap, speed
+    c, s, climb = cos(yaw), sin(yaw), sin(pitch)
+    for i in range(len(points.range)):
+        distance, azimuth = float(points.range[i]), float(points.azimuth[i])
+        altitude = float(points.altitude[i])
+        flat = distance * cos(altitude)
+        ahead, left = r.x + flat * cos(azimuth), r.y + flat * sin(azimuth)
+        if ahead <= FRONT or flat >= nearest:
+            continue
+        place, across = find_place(way, n, x + c * ahead - s * left, y + s * ahead + c * left)
+        above = z + r.z + distance * sin(altitude) - ahead * climb - way[3, place]
+        if abs(across) < HALF_LANE and LEAST_HEIGHT < above < MOST_HEIGHT:
+            nearest, gap = flat, max(ahead - FRONT, 0.0)
+            speed = max(v + float(points.velocity[i]) / max(cos(azimuth), 0.1), 0.0)
+    return gap, speed
 
-    def look(self, points: RadarPoints, pose: Pose, way: Way, v: float) -> Lead | None:
-        """Returns the lead of this tick, None without one; call it once per tick. v: own speed in m/s.
 
-        A lead without a return is carried on for HOLD s. A return JOIN m or more beyond a held lead does not
-        replace it. First distances of leads that come nearer are noted for `reach`.
-        """
-        found = self._find(points, pose, way, v)
-        held = self._carry_lead(v)
-        if found is None:
-            self.lead = held
-        else:
-            if held is None and v - found.speed > APPROACHED:
-                self.first_seen.append(found.gap)
-            near = held is None or found.gap < held.gap + JOIN
-            self.lead = found if near else held
-            self.unseen = 0.0 if near else self.unseen
-        return self.lead
+@kernel
+def find_place(way: Floats, n: int, x: float, y: float) -> tuple[int, float]:
+    """Returns the nearest of n >= 2 places of the way and the m to its left of a point of the world."""
+    best, least = 0, inf
+    for i in range(n):
+        dx, dy = x - way[1, i], y - way[2, i]
+        d2 = dx * dx + dy * dy
+        if d2 < least:
+            best, least = i, d2
+    k = min(best, n - 2)
+    dx, dy = way[1, k + 1] - way[1, k], way[2, k + 1] - way[2, k]
+    length = hypot(dx, dy)
+    across = ((y - way[2, k]) * dx - (x - way[1, k]) * dy) / length if length > 0.0 else inf
+    return best, across
 
-    @property
-    def reach(self) -> float:
-        """Distance in m at which leads are first seen: `known`, else the SEEN_SHARE quantile of those noted.
 
-        SEEN_PRIOR before SEEN_LEAST were noted, and half of it at least.
-        """
-        if self.known is not None:
-            return self.known
-        if len(self.first_seen) < SEEN_LEAST:
-            return SEEN_PRIOR
-        return max(float(np.quantile(self.first_seen, SEEN_SHARE)), SEEN_PRIOR / 2.0)
+@kernel
+def note_first(arrays: SightArrays, r: SightRules, gap: float) -> None:
+    """Notes at how many m a lead was seen first, and what follows for the reach.
 
-    def clear_way(self, pose: Pose, way: Way) -> float:
-        """Returns the m of lane ahead that lie in the radar's field of view; SEEN_PRIOR without a radar."""
-        if self.radar is None:
-            return SEEN_PRIOR
-        bearing = np.arctan2(way.y - pose.y, way.x - pose.x) - pose.yaw
-        bearing = np.abs((bearing + np.pi) % (2.0 * np.pi) - np.pi)
-        outside = (bearing > np.radians(self.radar.horizontal_fov_deg / 2.0)) & (way.s > 15.0)
-        seen = way.s[np.argmax(outside)] if outside.any() else self.radar.range
-        return float(min(seen, self.radar.range))
+    That is `known`, else the SEEN_SHARE quantile of the newest: SEEN_PRIOR before SEEN_LEAST were noted, and
+    half of it at least.
+    """
+    m = arrays.memory[0]
+    arrays.first[m.noted % SEEN_KEPT] = gap
+    m.noted += 1
+    n = min(m.noted, SEEN_KEPT)
+    if not isnan(r.known) or n < SEEN_LEAST:
+        return
+    for i in range(n):  # by insertion
+        value, k = arrays.first[i], i
+        while k > 0 and arrays.sorted[k - 1] > value:
+            arrays.sorted[k] = arrays.sorted[k - 1]
+            k -= 1
+        arrays.sorted[k] = value
+    at = SEEN_SHARE * (n - 1)
+    low = int(at)
+    a, b = arrays.sorted[low], arrays.sorted[min(low + 1, n - 1)]
+    m.reach = max(a + (at - low) * (b - a), SEEN_PRIOR / 2.0)
 
-    def _carry_lead(self, v: float) -> Lead | None:
-        """Returns the last lead moved on by one step, whose time counts as unseen.
 
-        None without a lead, or when it is unseen for more than HOLD s.
-        """
-        self.unseen += self.dt
-        if self.lead is None or self.unseen > HOLD:
-            return None
-        gap = self.lead.gap + (self.lead.speed - v) * self.dt
-        return Lead(max(gap, 0.0), self.lead.speed)
-
-    def _find(self, points: RadarPoints, pose: Pose, way: Way, v: float) -> Lead | None:
-        """Returns the lead at the nearest radar point in the lane, not slower than 0.
-
-        None where there is none.
-        """
-        if self.radar is None or not len(points.range) or len(way.s) < 2:
-            return None
-        mount = self.radar.mount
-        flat = points.range * np.cos(points.altitude)
-        ahead = mount.x + flat * np.cos(points.azimuth)
-        left = mount.y + flat * np.sin(points.azimuth)
-        c, s = cos(pose.yaw), sin(pose.yaw)
-        x, y = pose.x + c * ahead - s * left, pose.y + s * ahead + c * left
-        height = pose.z + mount.z + points.range * np.sin(points.altitude) - ahead * sin(pose.pitch)
-        nearest, across = locate_on(way, x, y)
-        above = height - way.z[nearest]
-        in_lane = (np.abs(across) < HALF_LANE) & (above > LEAST_HEIGHT) & (above < MOST_HEIGHT)
-        in_lane &= ahead > FRONT
-        if not in_lane.any():
-            return None
-        i = int(np.argmin(np.where(in_lane, flat, np.inf)))
-        speed = v + float(points.velocity[i]) / max(cos(float(points.azimuth[i])), 0.1)
-        return Lead(max(float(ahead[i]) - FRONT, 0.0), max(speed, 0.0))
+@kernel
+def clear_way(way: Floats, r: SightRules, n: int, x: float, y: float, yaw: float) -> float:
+    """Returns the m of n places ahead that lie in the radar's field of view; SEEN_PRIOR without a radar."""
+    if not r.has_radar:
+        return SEEN_PRIOR
+    for i in range(n):
+        if way[0, i] <= 15.0:
+            continue
+        bearing = atan2(way[2, i] - y, way[1, i] - x) - yaw
+        if abs((bearing + pi) % (2.0 * pi) - pi) > r.half_fov:
+            return min(way[0, i], r.range)
+    return r.range

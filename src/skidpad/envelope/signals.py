@@ -16,11 +16,14 @@ Sources, each looked up:
 
 from __future__ import annotations
 
-from collections import deque
-from dataclasses import dataclass
 from math import radians
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.arrays import Floats
+from skidpad.core.kernels.jit import kernel
 from skidpad.core.maths.constants import G
 from skidpad.core.maths.randomness import stream
 from skidpad.core.states import EgoEstimate, VehicleCommand
@@ -43,8 +46,7 @@ class CarSignals(NamedTuple):
     drive: float  # m/s^2 that the engine's torque asks for
 
 
-@dataclass(frozen=True, slots=True)
-class BusModel:
+class BusModel(NamedTuple):
     """Errors of the signals: standard deviations, half ranges of a run's offsets, resolutions."""
 
     wheel_noise: float = 0.02  # m/s
@@ -71,20 +73,92 @@ EXACT = BusModel(
 )  # fmt: skip
 
 
+class BusRules(NamedTuple):
+    """What holds for one bus in one run."""
+
+    model: BusModel
+    radii: tuple[float, float, float, float]  # over the nominal one, as `wheels`
+    ax: float  # m/s^2, offset
+    ay: float
+    yaw: float  # rad/s
+    steer: float  # rad
+    torque: float  # factor
+    steer_max: float  # rad at a steer of 1
+
+
+BUS = np.dtype([("sent", np.int64), ("drawn", np.int64)], align=True)
+
+
+class BusArrays(NamedTuple):
+    """What a bus remembers, for kernels."""
+
+    memory: NDArray[np.void]  # (1,) BUS: messages that were written, rows of `noise` that are used
+    sent: Floats  # (delay + 1, 10) the newest messages, as a ring
+    noise: Floats  # (BLOCK, 8) standard normal numbers
+
+
+@kernel
+def write_message(
+    arrays: BusArrays, rules: BusRules,
+    wheels: tuple[float, float, float, float], ax: float, ay: float, yaw_rate: float,
+    steer: float, brake: float, drive: float, grade: float,
+) -> CarSignals:  # fmt: skip
+    """Writes a message with errors and returns the one that is `delay` ticks old.
+
+    wheels, ax, ay, yaw_rate: of the ego, as `CarSignals`; steer, brake: of the command that is applied, as
+    shares; drive: m/s^2 that its throttle asks for; grade: of the road, uphill > 0.
+    """
+    memory, model = arrays.memory[0], rules.model
+    n = arrays.noise[memory.drawn]
+    memory.drawn += 1
+    row = arrays.sent[memory.sent % len(arrays.sent)]
+    memory.sent += 1
+    for i in range(4):
+        wheel = wheels[i] * rules.radii[i] + model.wheel_noise * n[i]
+        row[i] = round_to(wheel, model.wheel_step)
+    row[4] = round_to(ax + G * grade + rules.ax + model.a_noise * n[4], model.a_step)
+    row[5] = round_to(ay + rules.ay + model.a_noise * n[5], model.a_step)
+    row[6] = round_to(yaw_rate + rules.yaw + model.yaw_noise * n[6], model.yaw_step)
+    row[7] = round_to(steer * rules.steer_max + rules.steer, model.steer_step)
+    bar = brake * BRAKE_BAR
+    read = max(round_to(bar + model.bar_noise * n[7], model.bar_step), 0.0)
+    row[8] = read if bar > 0.0 else 0.0
+    row[9] = drive * rules.torque
+    is_full = memory.sent >= len(arrays.sent)
+    old = arrays.sent[memory.sent % len(arrays.sent) if is_full else 0]
+    return CarSignals(
+        (old[0], old[1], old[2], old[3]), old[4], old[5], old[6], old[7], old[8], old[9]
+    )
+
+
+@kernel
+def round_to(value: float, step: float) -> float:
+    """Returns the value rounded to a multiple of step; unchanged for a step of 0."""
+    return float(np.rint(value / step)) * step if step > 0.0 else value
+
+
 class CarBus:
     """The bus of one car in one run; equal seeds give equal errors."""
 
     def __init__(self, seed: int, model: BusModel | None = None, steer_max: float = 1.22) -> None:
-        self.model, self.steer_max = model or BusModel(), steer_max
-        m = self.model
-        fixed = stream(seed, "envelope/bus/offsets").uniform(-1.0, 1.0, 9).tolist()
-        self.radii = [1.0 + m.radius_offset * u for u in fixed[:4]]
-        self.ax, self.ay = m.a_offset * fixed[4], m.a_offset * fixed[5]
-        self.yaw, self.steer = m.yaw_offset * fixed[6], m.steer_offset * fixed[7]
-        self.torque = 1.0 + m.torque_offset * fixed[8]
+        m = model or BusModel()
+        u = stream(seed, "envelope/bus/offsets").uniform(-1.0, 1.0, 9).tolist()
+        a, b, c, d = (1.0 + m.radius_offset * share for share in u[:4])
+        self.rules = BusRules(
+            m, (a, b, c, d), m.a_offset * u[4], m.a_offset * u[5], m.yaw_offset * u[6],
+            m.steer_offset * u[7], 1.0 + m.torque_offset * u[8], steer_max,
+        )  # fmt: skip
         self._noise = stream(seed, "envelope/bus/noise")
-        self._block: list[list[float]] = []
-        self._sent: deque[CarSignals] = deque(maxlen=m.delay + 1)
+        self.arrays = BusArrays(np.zeros(1, BUS), np.empty((m.delay + 1, 10)), np.empty((BLOCK, 8)))
+        self.arrays.memory["drawn"] = BLOCK
+
+    def draw_noise(self) -> int:
+        """Returns for how many messages there is noise; a new block is drawn where none is left."""
+        memory = self.arrays.memory
+        if memory["drawn"][0] == BLOCK:
+            self.arrays.noise[:] = self._noise.standard_normal((BLOCK, 8))[::-1]
+            memory["drawn"] = 0
+        return BLOCK - int(memory["drawn"][0])
 
     def read(
         self, ego: EgoEstimate, command: VehicleCommand, drive: float, grade: float
@@ -93,32 +167,9 @@ class CarBus:
 
         command: the one applied; drive: m/s^2 that its throttle asks for; grade: of the road, uphill > 0.
         """
-        m, n = self.model, self._draw()
-        fl, fr, rl, rr = (
-            _round(w * r + m.wheel_noise * u, m.wheel_step)
-            for w, r, u in zip(ego.wheel_speeds, self.radii, n, strict=False)
-        )
-        bar = command.brake * BRAKE_BAR
-        self._sent.append(
-            CarSignals(
-                (fl, fr, rl, rr),
-                _round(ego.ax + G * grade + self.ax + m.a_noise * n[4], m.a_step),
-                _round(ego.ay + self.ay + m.a_noise * n[5], m.a_step),
-                _round(ego.yaw_rate + self.yaw + m.yaw_noise * n[6], m.yaw_step),
-                _round(command.steer * self.steer_max + self.steer, m.steer_step),
-                max(_round(bar + m.bar_noise * n[7], m.bar_step), 0.0) if bar > 0.0 else 0.0,
-                drive * self.torque,
-            )
-        )
-        return self._sent[0]
-
-    def _draw(self) -> list[float]:
-        """Returns the next eight standard normal numbers, drawn in blocks."""
-        if not self._block:
-            self._block = self._noise.standard_normal((BLOCK, 8)).tolist()
-        return self._block.pop()
-
-
-def _round(value: float, step: float) -> float:
-    """Returns the value rounded to a multiple of step; unchanged for a step of 0."""
-    return round(value / step) * step if step > 0.0 else value
+        self.draw_noise()
+        message: CarSignals = write_message(
+            self.arrays, self.rules, ego.wheel_speeds, ego.ax, ego.ay, ego.yaw_rate,
+            command.steer, command.brake, drive, grade,
+        )  # fmt: skip
+        return message

@@ -10,7 +10,7 @@ from skidpad.core.vocabulary import Govern, RangeModel
 from skidpad.core.weather import Weather
 from skidpad.envelope.govern import TABLE_KMH, EnvelopeSettings, govern
 from skidpad.envelope.limits import Binding
-from skidpad.physics.grip import mu_at, road_of
+from skidpad.physics.grip import road_of
 from skidpad.physics.optics import radar_range
 from skidpad.stack.interface import Stack
 
@@ -38,8 +38,7 @@ def choose_envelope(spec: RunSpec, setup: Setup) -> EnvelopeSettings | None:
     kind = Govern.ENVELOPE if own and spec.govern is Govern.NONE else spec.govern
     found = describe_envelope(kind, setup.dt, spec.seed)
     if found is not None and kind is Govern.ORACLE:
-        params = road_of(setup).params()
-        return replace(found, oracle=lambda v: float(mu_at(params, v)))
+        return replace(found, oracle=road_of(setup).params())
     if found is not None and kind is Govern.ORACLE_SIGHT:
         is_limited = setup.range_model is RangeModel.PHYSICAL
         weather = setup.weather if is_limited else Weather()

@@ -19,7 +19,7 @@ from skidpad.core.run import RunSpec
 from skidpad.core.setup import DT
 from skidpad.core.states import EgoEstimate, VehicleCommand
 from skidpad.envelope.govern import AIR_ID, RAIN_ID
-from skidpad.envelope.grip import STIFFNESS, GripEstimator
+from skidpad.envelope.grip import STIFFNESS, GripEstimator, drive_at
 from skidpad.envelope.sight import way_ahead
 from skidpad.envelope.signals import BusModel, CarBus
 from skidpad.roads.bundled import load_map
@@ -85,7 +85,7 @@ def estimate_again(
     before, rows = VehicleCommand(), []
     kept_rows = zip(kept.ego, kept.commands, kept.air, kept.grades, strict=True)
     for ego, command, (stage, air_c), grade in kept_rows:
-        drive = estimator.car.drive_at(before.throttle, ego.speed)
+        drive = drive_at(estimator.car, before.throttle, ego.speed)
         grip = estimator.update(car_bus.read(ego, before, drive, grade), stage, air_c, grade)
         rows.append((grip.value, grip.confidence))
         before = command

@@ -21,6 +21,7 @@ from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.inputs import Outside
 from skidpad.core.run import Function, Roads, RunSpec
 from skidpad.core.vocabulary import Govern, Outcome, RelocationReason, SensorLevel, TrafficStart
+from skidpad.envelope.govern import find_limits, keep_inside
 from skidpad.physics.presets import all_presets, find_weather
 from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.log_files import log_hash
@@ -131,6 +132,28 @@ def test_both_ways_give_the_same_bits() -> None:
 
 def test_both_ways_give_the_same_bits_in_many_runs() -> None:
     compare(range(8, 68))
+
+
+QUICK_WORDS = [word for word in Govern if word not in (Govern.NONE, Govern.FULL)]
+
+
+@pytest.mark.parametrize("word", QUICK_WORDS)
+def test_a_governed_stack_gives_the_same_bits(word: Govern) -> None:
+    """Also what the envelope says in each tick."""
+    k = QUICK_WORDS.index(word)
+    weather = find_weather(("icy_100", "rain-noon", "snow")[k % 3])
+    course = Roads(map=MAPS[k % 3], traffic=TrafficStart.PACK)
+    spec = adas_run(
+        3, weather, course=course, govern=word, seed=900_001 + k, duration=40.0,
+        settings={"grip": "physical"},
+    )  # fmt: skip
+    one, (other, opened) = drive_stepwise(spec), drive_quickly(spec)
+    assert opened.quick is not None, opened.why_not_quick
+    assert not first_difference(one.log, other.log)
+    assert one.readings is not None
+    assert other.readings is not None
+    assert one.readings.table.equals(other.readings.table)
+    assert opened.quick_ticks > 0.8 * len(one.log.tick)
 
 
 @pytest.mark.parametrize("scenario", NAMES)
@@ -303,14 +326,17 @@ def test_the_stepper_knows_the_truth_of_the_last_tick() -> None:
 
 def test_addresses_are_of_the_types_that_the_kernel_calls() -> None:
     """Compiled anew, the kernel asks for no machine code but that whose addresses it is given."""
-    drive_quickly(adas_run(4, duration=3.0))
+    for word in (Govern.NONE, Govern.ENVELOPE):
+        drive_quickly(adas_run(4, duration=3.0, govern=word))
     called = (
         advance, feel_motion, sense, read_road, think, find_ego, has_reason, heed_light, copy_actors,
+        find_limits, keep_inside,
     )  # fmt: skip
     known: list[Any] = [set(one.overloads) for one in called]  # type: ignore[attr-defined]
     kernel: Any = drive_ticks
     fresh = numba.njit(nogil=True, error_model="numpy")(kernel.py_func)
-    fresh.compile(kernel.signatures[0])
+    for signature in kernel.signatures:
+        fresh.compile(signature)
     assert known == [set(one.overloads) for one in called]  # type: ignore[attr-defined]
     assert all(known)
 
@@ -337,7 +363,7 @@ class Looker(Sink):
     ("spec", "reason"),
     [
         (structs.replace(adas_run(2), sensors=SensorLevel.PIXELS), "pixels"),
-        (adas_run(2, govern=Govern.ENVELOPE), "envelope"),
+        (adas_run(2, govern=Govern.FULL), "envelope"),
         (adas_run(2, settings={"wind": True, "wind_speed": 9.0}), "wind"),
         (adas_run(2, course=Roads(route_km=1.0)), "route"),
         (scenario_run("front_accident", sensors=SensorLevel.PIXELS), "pixels"),

@@ -15,7 +15,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.run import Passenger, Roads, RunSpec, Scenario
 from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.specs import RadarSpec
-from skidpad.core.states import EgoEstimate, VehicleCommand
+from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import Govern, GripModel, Outcome, RangeModel, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.envelope.govern import (
@@ -23,17 +23,17 @@ from skidpad.envelope.govern import (
     PULSE_TIME,
     SENSORS,
     V_CREEP,
-    Allowed,
-    BrakePulses,
     Envelope,
     EnvelopeSettings,
     GovernedStack,
     govern,
     lower,
+    pulse_brake,
 )
-from skidpad.envelope.grip import Grip
 from skidpad.envelope.limits import Binding
+from skidpad.physics.grip import mu_at
 from skidpad.physics.presets import preset
+from skidpad.roads.bundled import load_map
 from skidpad.sensors.outside import make_rain_sensor, make_thermometer, wiper_stage
 from skidpad.stack.configurations import numbered_driver
 
@@ -145,7 +145,7 @@ def test_a_stack_that_raises_is_the_outcome_of_its_run():
 
 
 def test_a_governed_stack_looks_like_the_stack():
-    stack = govern(Straight)((), None, {})
+    stack = govern(Straight)((), load_map("straight"), {})
     assert isinstance(stack, GovernedStack)
     assert type(stack).__name__ == "Straight"
     assert stack.told == []
@@ -177,9 +177,12 @@ def test_the_oracle_knows_the_tyres_of_the_run():
             map="figure8", specs=(), ego=ActorSetup(name="ego", type="tesla", place=Pose(0.0, 0.0)),
             weather=ice, grip=GripModel.PHYSICAL, tyres=tyres,
         )  # fmt: skip
-        return choose_envelope(RunSpec(govern=Govern.ORACLE), setup).oracle(10.0)
+        return choose_envelope(RunSpec(govern=Govern.ORACLE), setup).oracle
 
-    assert grip("summer") < grip("winter") < grip("studded")
+    summer, winter, studded = (
+        mu_at(grip(tyres), 10.0) for tyres in ("summer", "winter", "studded")
+    )
+    assert summer < winter < studded
 
 
 def test_the_oracle_of_sight_knows_how_far_the_radar_reaches_in_rain():
@@ -189,16 +192,15 @@ def test_the_oracle_of_sight_knows_how_far_the_radar_reaches_in_rain():
             weather=weather, range_model=range_model,
         )  # fmt: skip
         settings = choose_envelope(RunSpec(govern=Govern.ORACLE_SIGHT), setup)
-        return Envelope(
-            [RadarSpec("radar", Pose(2.0, 0.0, 1.0), range=100.0)], None, settings
-        ).sight.reach
+        radar = RadarSpec("radar", Pose(2.0, 0.0, 1.0), range=100.0)
+        return Envelope([radar], load_map("straight"), settings).reach
 
     rain = Weather(precipitation=100.0)
     assert reach(Weather()) == pytest.approx(100.0)
     assert reach(rain) < 99.0
     assert reach(rain, RangeModel.NONE) == pytest.approx(100.0)
     with pytest.raises(ConfigError, match="oracle-sight needs a stack with a radar"):
-        Envelope([], None, EnvelopeSettings(oracle_sight=lambda nominal: nominal))
+        Envelope([], load_map("straight"), EnvelopeSettings(oracle_sight=lambda nominal: nominal))
 
 
 def test_settings_out_of_range_are_told():
@@ -270,13 +272,10 @@ def test_watching_changes_no_drive_and_records_what_would_be_allowed():
 
 
 def test_brake_pulses_are_short_gentle_and_far_apart_and_end_where_something_is_known():
-    pulses, dt = BrakePulses(0.05), 0.05
-    ego = EgoEstimate(Pose(0.0, 0.0), 20.0, 0.0, 0.0, 0.0, (20.0,) * 4, 3)
-    unknown = Allowed(20.0, Binding.NONE, Grip(0.2, None, 0.0, 0.2), 80.0)
-    asked = [pulses.update(ego, unknown, False) for _ in range(1000)]  # 1 km
+    pulse, dt = np.zeros(2), 0.05
+    asked = [pulse_brake(pulse, 20.0, 0.0, 0.0, False, dt) for _ in range(1000)]  # 1 km
     pulsed = np.flatnonzero(asked)
     assert max(asked) == PULSE_BRAKE <= 2.0
     assert len(pulsed) * dt == pytest.approx(3 * PULSE_TIME, rel=0.1)
-    known = replace(unknown, grip=Grip(0.8, 0.8, 0.9, 0.2))
-    assert not any(pulses.update(ego, known, False) for _ in range(1000))
-    assert not any(pulses.update(ego, unknown, True) for _ in range(1000))
+    assert not any(pulse_brake(pulse, 20.0, 0.0, 0.9, False, dt) for _ in range(1000))
+    assert not any(pulse_brake(pulse, 20.0, 0.0, 0.0, True, dt) for _ in range(1000))

@@ -7,8 +7,18 @@ import numpy as np
 import pytest
 
 from grip_judging import Estimates, judge_estimates
-from skidpad.envelope.belief import CHANGE, GripBelief, prior_grip, prior_of, quantile
-from skidpad.envelope.grip import GripEstimator
+from skidpad.envelope.belief import (
+    CHANGE,
+    forget,
+    measure_confidence,
+    new_belief,
+    prior_grip,
+    prior_of,
+    quantile,
+    see_limit,
+    sum_grips,
+)
+from skidpad.envelope.grip import GripEstimator, leave_place
 from skidpad.envelope.signals import BRAKE_BAR, CarSignals
 
 G = 9.81
@@ -84,24 +94,25 @@ def test_no_information_is_not_high_grip():
 
 
 def test_belief_spreads_back_to_the_prior_with_the_distance():
-    belief, prior = GripBelief(), prior_of(0, True)
-    belief.forget(0.0, prior)
+    belief, prior = new_belief(), prior_of(0, True)
+    forget(belief, 0.0, prior)
     for _ in range(20):
-        belief.see_limit(0.12, 0.1)
-    sure, low = belief.confidence, quantile(belief.grips, 0.5)
-    belief.forget(CHANGE / 10.0, prior)
-    less = belief.confidence
-    belief.forget(10.0 * CHANGE, prior)
+        see_limit(belief, 0.12, 0.1)
+    sure, low = measure_confidence(belief), quantile(belief.grips, 0.5)
+    forget(belief, CHANGE / 10.0, prior)
+    less = measure_confidence(belief)
+    forget(belief, 10.0 * CHANGE, prior)
     assert low == pytest.approx(0.12, rel=0.1)
-    assert sure > 0.8 > less > belief.confidence == pytest.approx(0.0, abs=0.01)
+    assert sure > 0.8 > less > measure_confidence(belief) == pytest.approx(0.0, abs=0.01)
     assert belief.grips == pytest.approx(prior, abs=1e-3)
 
 
 def test_one_wild_reading_does_not_undo_what_many_have_shown():
-    belief = GripBelief()
+    belief = new_belief()
     for _ in range(20):
-        belief.see_limit(0.9, 0.1)
-    belief.see_limit(0.1, 0.1)
+        see_limit(belief, 0.9, 0.1)
+    see_limit(belief, 0.1, 0.1)
+    sum_grips(belief)
     assert quantile(belief.grips, 0.5) > 0.7
 
 
@@ -114,10 +125,10 @@ def test_water_counts_for_more_at_a_higher_speed_than_the_one_of_the_evidence():
     estimator = GripEstimator(DT)
     estimator.update(message(10.0, 0.0), 3, 15.0)
     for _ in range(60):
-        estimator.belief.see_limit(0.6, 0.1)
-    estimator.v_shown = 10.0
+        see_limit(estimator.arrays.belief, 0.6, 0.1)
+    estimator.arrays.memory["v_shown"] = 10.0
     slow = estimator.update(message(10.0, 0.0), 3, 15.0)
-    estimator.reset()
+    leave_place(estimator.arrays)
     for _ in range(40):
         fast = estimator.update(message(25.0, 0.0), 3, 15.0)
     assert slow.value > 0.5

@@ -2,6 +2,7 @@
 
 from math import inf
 
+import numpy as np
 import pytest
 
 from skidpad.envelope.limits import (
@@ -74,7 +75,8 @@ def test_a_car_that_slows_from_before_a_bend_has_its_speed_there():
     while x < 100.0:
         x, v = x + v * STEP, v - 2.0 * STEP
     assert v == pytest.approx(15.0, abs=0.02)
-    assert bends_speed([(0.0, 0.0), (100.0, 1 / 80), (200.0, 1 / 50)], 2.0, 2.0, 0.0, 0.0) < 24.0
+    ahead, curvature = np.array([0.0, 100.0, 200.0]), np.array([0.0, 1 / 80, 1 / 50])
+    assert bends_speed(ahead, curvature, 2.0, 2.0, 0.0, 0.0) < 24.0
 
 
 def test_water_floats_tyres_at_97_and_81_km_h_on_1_and_2_mm():
@@ -85,10 +87,13 @@ def test_water_floats_tyres_at_97_and_81_km_h_on_1_and_2_mm():
 
 
 def test_the_lowest_limit_wins_and_is_named():
-    limits = {Binding.SIGHT: 30.0, Binding.BEND: 20.0}
-    assert lowest(limits, 50.0) == (20.0, Binding.BEND)
-    assert lowest(limits, 10.0) == (10.0, Binding.NONE)
-    assert lowest({}, 10.0) == (10.0, Binding.NONE)
+    limits = np.full(len(Binding), inf)
+    limits[Binding.SIGHT], limits[Binding.BEND] = 30.0, 20.0
+    every = (1 << len(Binding)) - 1
+    assert lowest(limits, every, 50.0) == (20.0, Binding.BEND)
+    assert lowest(limits, every, 10.0) == (10.0, Binding.NONE)
+    assert lowest(limits, 1 << Binding.SIGHT, 50.0) == (30.0, Binding.SIGHT)
+    assert lowest(limits, 0, 10.0) == (10.0, Binding.NONE)
 
 
 @pytest.mark.parametrize("mu", [0.1, 0.34, 0.9])

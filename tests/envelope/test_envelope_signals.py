@@ -39,7 +39,7 @@ def test_noise_and_offsets_are_those_of_the_model():
     assert ax.std() == pytest.approx(m.a_noise, rel=0.1)
     assert yaw.std() == pytest.approx(m.yaw_noise, rel=0.1)
     assert 0.0 < abs(ax.mean() - EGO.ax) <= m.a_offset
-    offsets = [CarBus(seed).ax for seed in range(200)]
+    offsets = [CarBus(seed).rules.ax for seed in range(200)]
     assert -m.a_offset <= min(offsets) < -0.9 * m.a_offset < 0.9 * m.a_offset < max(offsets)
 
 
@@ -53,7 +53,7 @@ def test_signals_have_the_steps_of_the_bus():
 
 
 def test_a_message_is_late_by_a_tick():
-    bus = CarBus(1, replace(EXACT, delay=1))
+    bus = CarBus(1, EXACT._replace(delay=1))
     bus.read(EGO, VehicleCommand(), 0.0, 0.0)
     late = bus.read(replace(EGO, ax=-5.0), VehicleCommand(brake=1.0), 0.0, 0.0)
     assert (late.ax, late.brake) == (1.0, 0.0)

@@ -93,6 +93,7 @@ class LidarSpec:
 GNSS, IMU, SPEEDOMETER = "gnss", "imu", "speedometer"
 COLLISION, LANE_INVASION = "collision", "lane_invasion"
 RAIN_SENSOR, AIR_THERMOMETER = "rain_sensor", "air_thermometer"
+AIR_SENSORS = frozenset({RAIN_SENSOR, AIR_THERMOMETER})  # they change with the weather alone
 
 
 @dataclass(frozen=True, slots=True)

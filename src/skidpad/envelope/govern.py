@@ -67,7 +67,14 @@ from skidpad.envelope.sight import (
     sight_rules,
     trace_way,
 )
-from skidpad.envelope.signals import BusArrays, BusModel, BusRules, CarBus, write_message
+from skidpad.envelope.signals import (
+    BLOCK,
+    BusArrays,
+    BusModel,
+    BusRules,
+    CarBus,
+    write_message,
+)
 from skidpad.physics.grip import GripParams, mu_at
 from skidpad.roads.kernels import LaneArrays
 from skidpad.roads.queries import RoadMap
@@ -204,6 +211,7 @@ class EnvelopeArrays(NamedTuple):
     bus: BusArrays
     sight: SightArrays
     limits: Floats  # (9,) m/s by Binding, inf: none; of this tick
+    said: Floats  # (BLOCK, 8) RECORDED and `shown` of ticks, each in the row of its noise
     pulse: Floats  # m since the last brake pulse, s that are left of one
 
 
@@ -294,6 +302,9 @@ def find_limits(
             has_lead = see_lead(arrays, r, points, places, ego, v)
             reach = limit_ahead(arrays, r, places, ego, v, value, has_lead)
     speed, binding = lowest(limits, r.counted, r.most)
+    said = arrays.said[arrays.bus.memory[0].drawn - 1]
+    said[0], said[1], said[2], said[3] = speed, binding, value, sure
+    said[4], said[5], said[6], said[7] = prior, reach, v, shown
     return Told(speed, binding, value, shown, sure, prior, reach, places, grade, has_lead)
 
 
@@ -409,7 +420,7 @@ class Envelope:
         self.rules = make_rules(settings, self.bus.rules, sight_rules(radar, settings.dt, known))
         self.arrays = EnvelopeArrays(
             new_estimator(), self.bus.arrays, new_sight(self.rules.sight),
-            np.full(len(Binding), inf), np.zeros(2),
+            np.full(len(Binding), inf), np.empty((BLOCK, 8)), np.zeros(2),
         )  # fmt: skip
         self.held = hold(EnvelopeParts(self.rules, self.arrays, map.held))
         self.further: FurtherSight | None = None
@@ -422,6 +433,11 @@ class Envelope:
     def reach(self) -> float:
         """M at which leads are first seen."""
         return float(self.arrays.sight.memory["reach"][0])
+
+    def newest(self, ticks: int) -> Floats:
+        """Returns (ticks, 8) RECORDED and `shown` of the newest ticks, of one block of noise."""
+        end = int(self.bus.arrays.memory["drawn"][0])
+        return self.arrays.said[end - ticks : end]
 
     def reset(self) -> None:
         """Forgets what was seen and felt at another place.
@@ -560,6 +576,19 @@ class GovernedStack:
         if name == "inner":  # it could not be built
             raise AttributeError(name)
         return getattr(self.inner, name)
+
+    def why_not_quick(self) -> str:
+        """Returns the first reason why the envelope is asked tick by tick; "": kernels do it."""
+        further = self.envelope.further is not None or self.envelope.bridges is not None
+        return "its envelope looks for walkers, lane boundaries and bridges" if further else ""
+
+    def pass_ticks(self, ticks: int, applied: VehicleCommand) -> None:
+        """Takes in that kernels drove so many ticks; applied: the last command."""
+        *_, reach, v, shown = row = self.envelope.newest(ticks)[-1].tolist()
+        self.applied = applied
+        self.allowed = Allowed(
+            row[0], Binding(int(row[1])), make_grip(row[2], shown, row[3], row[4]), reach, v
+        )
 
     def close(self) -> None:
         """Calls the stack's `close` where it has one."""

@@ -18,6 +18,7 @@ from skidpad.core.maths.randomness import stream_key
 from skidpad.core.sensor_types import Measure, find_sensor_type
 from skidpad.core.setup import Setup
 from skidpad.core.specs import (
+    AIR_SENSORS,
     CameraSpec,
     ChannelSpec,
     EyesSpec,
@@ -122,7 +123,9 @@ class AskedSensors:
         self._placed = -1
         self._serial = next(_SERIALS)
         _OPEN[self._serial] = self
-        self.readers = {s.id: self._reader(s) for s in setup.specs if s.id in setup.asked}
+        asked = [s for s in setup.specs if s.id in setup.asked]
+        self.readers = {s.id: self._reader(s) for s in asked}
+        self._kinds = {s.id: s.kind if isinstance(s, PointSensorSpec) else "" for s in asked}
 
     def read(
         self,
@@ -142,6 +145,15 @@ class AskedSensors:
         for observe in self.observers:
             observe(tick, states, lights, braking)
         return Readings(self._serial, tick, tuple(self.readers))
+
+    @property
+    def is_air_alone(self) -> bool:
+        """Whether all that is asked for are sensors of the air, which change with the weather alone."""
+        return all(kind in AIR_SENSORS for kind in self._kinds.values())
+
+    def read_air(self) -> dict[str, float]:
+        """Returns what sensors of the air say, by their kind."""
+        return {kind: self.readers[id]() for id, kind in self._kinds.items() if kind in AIR_SENSORS}
 
     def scene(self) -> LiveScene:
         """Returns the map's surfaces with all actors where they are now."""

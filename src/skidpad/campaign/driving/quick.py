@@ -35,6 +35,8 @@ from skidpad.core.kernels.calls import find_address
 from skidpad.core.kernels.jit import Held, hold
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import LightState, Supervision
+from skidpad.envelope.belief import COLD_C
+from skidpad.envelope.govern import GovernedStack, Motion, Told, find_limits, keep_inside
 from skidpad.recording.run.ticks import TickArrays, TickLog, copy_actors
 from skidpad.sensors.object_level.objects import ObjectSuite, sense
 from skidpad.simulation.embedded.engine import EmbeddedBackend
@@ -59,6 +61,9 @@ from skidpad.stack.road import read_road
 from skidpad.stack.think import think
 
 ANOTHER_SIMULATOR = "another simulator drives"
+# of the types that kernels of the envelope take
+STILL = Motion(*(0.0,) * 9, (0.0,) * 4)
+NOTHING_TOLD = Told(0.0, 0, *(0.0,) * 5, 0, 0.0, False)
 
 
 class QuickParts(NamedTuple):
@@ -73,6 +78,7 @@ class QuickParts(NamedTuple):
     suite: ObjectSuite
     guard: GuardedStack
     stack: AdasStack
+    governed: GovernedStack | None  # what keeps the stack inside an envelope
     supervisor: Supervisor | None
     timer: Timer | None
     changed: tuple[ChangedBackend, FileChanges] | None
@@ -96,12 +102,16 @@ def find_parts(stepper: Stepper, changes: FileChanges | None = None) -> QuickPar
     sensing, supervisor = backend.sensing, stepper.supervisor
     if type(sensing) is not Objects:
         return "its sensors are pixels, or a radar with noise"
-    if type(driver) is not StackAtWheel or type(driver.stack.stack) is not AdasStack:
-        return "another stack drives, or an envelope governs ours"
-    stack, suite, timer = driver.stack.stack, sensing.suite, None
+    if type(driver) is not StackAtWheel:
+        return "another driver is at the wheel"
+    outer, suite, timer = driver.stack.stack, sensing.suite, None
+    governed = outer if isinstance(outer, GovernedStack) else None
+    stack = outer if governed is None else governed.inner
+    if type(stack) is not AdasStack:
+        return "another stack drives"
     if stack.config.dt != backend.world.dt:
         return "the steps of its stack have another length"
-    if reason := stack.why_not_quick():
+    if reason := stack.why_not_quick() or (governed and governed.why_not_quick()):
         return reason
     if not backend.has_common_frames or suite.hold_common(backend.world.states) is None:
         return "it has other sensors than the common ones, or its localisation is noisy"
@@ -120,7 +130,9 @@ def find_parts(stepper: Stepper, changes: FileChanges | None = None) -> QuickPar
         if sink.sees_all:
             return f"{type(sink).__name__} is shown each tick"
     world = backend.world
-    return QuickParts(backend, world, suite, driver.stack, stack, supervising, timer, changed)
+    return QuickParts(
+        backend, world, suite, driver.stack, stack, governed, supervising, timer, changed
+    )
 
 
 class QuickDrive:
@@ -157,6 +169,8 @@ class QuickDrive:
         if isinstance(last, str):
             return self._leave(last)
         timer, changed, driven = found.timer, found.changed, 0
+        if found.governed is not None:
+            most = min(most, found.governed.envelope.bus.draw_noise())
         if changed is not None:
             driven = self._follow_script(most, last, *changed)
         elif timer is not None and timer.left > 0:
@@ -199,6 +213,7 @@ class QuickDrive:
                 break
             driven += 1
             stepper.action = Action(VehicleCommand(*last))
+            self._tell_envelope(1, stepper.action.command)
             for sink in stepper.sinks:
                 sink.pass_ticks(1)
             stepper.words = script.step(inner.truth())
@@ -225,6 +240,7 @@ class QuickDrive:
             break
         if driven:
             stepper.action, stepper.words = Action(VehicleCommand(*last)), ()
+            self._tell_envelope(driven, stepper.action.command)
             for sink in stepper.sinks:
                 sink.pass_ticks(driven)
         return driven
@@ -268,6 +284,11 @@ class QuickDrive:
                 supervisor.pass_ticks(ticks, (lane, s, offset), standing)
         return Stop(ticks, why, touches, crossed, Request(throttle, brake, steer, handbrake))
 
+    def _tell_envelope(self, ticks: int, command: VehicleCommand) -> None:
+        """Tells the envelope, if any, what kernels drove; command: the last one."""
+        if self.parts.governed is not None:
+            self.parts.governed.pass_ticks(ticks, command)
+
     def _refuse(self, request: Request) -> None:
         """Ends the run as a command out of range does."""
         try:
@@ -279,6 +300,7 @@ class QuickDrive:
         """Returns what holds in all ticks of a call."""
         world, stack, supervisor = self.parts.world, self.parts.stack, self.parts.supervisor
         far, stuck = (inf, inf) if world.traffic is None else world.traffic.limits()
+        stage, air_c = (0, 0.0) if self.parts.governed is None else self.parts.backend.read_air()
         return Rules(
             dt=world.dt,
             substeps=world.fleet.steps,
@@ -294,6 +316,8 @@ class QuickDrive:
             stuck=stuck,
             assists=stack.assists,
             hsv_required=stack.lock.hsv_required,
+            stage=stage,
+            is_cold=air_c < COLD_C,
         )
 
     def _join(self, arrays: TickArrays) -> Held[Joined]:
@@ -302,7 +326,8 @@ class QuickDrive:
         road, lights, rules = stack.road, world.lights, self._rules(arrays)
         common = suite.hold_common(world.states)
         assert common is not None, "find_parts has asked for it"
-        parts = stack.parts(suite.most_runs, suite.most_points)
+        parts, governed = stack.parts(suite.most_runs, suite.most_points), self.parts.governed
+        inside = None if governed is None else governed.envelope.held
         if self.parts.timer is not None:  # else the world makes its own steps
             for kept, new in zip(self._clocks, lights.clocks(), strict=True):
                 kept[:] = new
@@ -312,7 +337,7 @@ class QuickDrive:
             self._lit[:] = self._stops.show(self._shown)
         known = (
             world.arena, world.states, common, road.parts, parts.held, parts.kept, parts.room,
-            road.on_highway, arrays.rows, arrays.columns,
+            road.on_highway, arrays.rows, arrays.columns, inside,
         )  # fmt: skip
         joined = self._joined
         if joined is None or rules != self._joined_by or not is_same(known, self._joined_of):
@@ -323,14 +348,15 @@ class QuickDrive:
             )  # fmt: skip
             states, map = hold(world.states), world.map.held
             held = states, map, common, road.parts, parts.held, arrays.columns
-            at = self._find_addresses(tables, *held)
-            joined = hold(Joined(at, rules, tables, world.arena, *held, road.scan.held))
+            at = self._find_addresses(tables, *held, inside)
+            joined = hold(Joined(at, rules, tables, world.arena, *held, road.scan.held, inside))
             self._joined, self._joined_by, self._joined_of = joined, rules, known
         return joined
 
     def _find_addresses(
-        self, t: Tables, states: Any, map: Any, common: Any, road: Any, stack: Any, columns: Any
-    ) -> Addresses:
+        self, t: Tables, states: Any, map: Any, common: Any, road: Any, stack: Any, columns: Any,
+        inside: Any,
+    ) -> Addresses:  # fmt: skip
         """Returns where the machine code of each kernel is for what this run holds."""
         world, lines = self.parts.world, self.parts.stack.road.scan.held
         runs, points = self.parts.suite.sample_arrays()
@@ -349,6 +375,12 @@ class QuickDrive:
             has_reason=find_address(has_reason, map, states, t.stop_lane, t.stop_s, t.shown, 0.0),
             heed_light=find_address(heed_light, t.memory, lines, t.lines, way, False, 0.0, 0.0),
             copy_actors=find_address(copy_actors, states, world.mu, columns, 0),
+            find_limits=0 if inside is None else find_address(
+                find_limits, inside, *points, STILL, 0.0, 0.0, 0.0, 0, False
+            ),
+            keep_inside=0 if inside is None else find_address(
+                keep_inside, inside, NOTHING_TOLD, 0.0, 0.0, 0.0, 0.0, False
+            ),
         )  # fmt: skip
 
 

@@ -6,7 +6,7 @@ supervisor and log keep their own machine code, so nothing of them is compiled a
 
 from __future__ import annotations
 
-from math import inf, nan
+from math import inf, isfinite, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,14 @@ from skidpad.core.arrays import Flags, Floats
 from skidpad.core.kernels.calls import call
 from skidpad.core.kernels.jit import Held, inner_kernel, kernel
 from skidpad.core.states import ActorStates
+from skidpad.envelope.govern import (
+    V_CREEP,
+    EnvelopeParts,
+    Motion,
+    Told,
+    find_limits,
+    keep_inside,
+)
 from skidpad.physics.fleet import shown_gear
 from skidpad.recording.run.ticks import APPLIED, REPORT, REQUESTED, ActorColumns, copy_actors
 from skidpad.roads.kernels import LaneArrays
@@ -51,6 +59,8 @@ class Addresses(NamedTuple):
     has_reason: int
     heed_light: int
     copy_actors: int
+    find_limits: int
+    keep_inside: int
 
 
 class Tables(NamedTuple):
@@ -91,6 +101,8 @@ class Rules(NamedTuple):
     stuck: float  # s for which they may stand
     assists: bool  # the stack stops at lights
     hsv_required: bool  # only at those whose lamp it sees
+    stage: int  # of the rain sensor, where an envelope governs the stack
+    is_cold: bool  # by the thermometer, likewise
 
 
 class Joined(NamedTuple):
@@ -107,6 +119,7 @@ class Joined(NamedTuple):
     stack: Held[Parts]
     columns: Held[ActorColumns]
     lines: Held[StopLines]
+    inside: Held[EnvelopeParts] | None  # of the envelope that governs the stack; None: none does
 
 
 class Request(NamedTuple):
@@ -204,8 +217,57 @@ def watch_ego(
 
 
 @inner_kernel
-def answer_tick(joined: Held[Joined], tick: int, felt: Felt) -> tuple[Answer, Way, Light]:
-    """Senses and lets the stack decide: what it answers, where its way is, and the light ahead."""
+def ask_envelope(
+    inside: Held[EnvelopeParts] | None, joined: Held[Joined], felt: Felt, n_radar: int,
+    last: tuple[float, float, float],
+) -> tuple[float, Told]:  # fmt: skip
+    """Returns the m/s that the stack is told not to pass, and what the envelope says; all 0 without one.
+
+    inside: of `joined`; an argument, as numba then leaves out what follows where it is None. last: throttle,
+    brake, steer of the tick before.
+    """
+    rules = joined.value.rules
+    if inside is None:
+        return rules.v_told, Told(0.0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0.0, False)
+    echoes = joined.value.sensors.value.around.radar.echoes
+    ego = Motion(
+        felt[0], felt[1], felt[2], felt[4], felt[5], felt[6], felt[7], felt[8], felt[9],
+        (felt[10], felt[11], felt[12], felt[13]),
+    )  # fmt: skip
+    told = call(
+        joined.value.at.find_limits, find_limits,
+        (
+            inside, echoes[0, :n_radar], echoes[1, :n_radar], echoes[2, :n_radar],
+            echoes[3, :n_radar], ego, last[0], last[1], last[2], rules.stage, rules.is_cold,
+        ),
+    )  # fmt: skip
+    return max(told.speed, V_CREEP) if inside.value.rules.acts else rules.v_told, told
+
+
+@inner_kernel
+def obey_envelope(
+    inside: Held[EnvelopeParts] | None, joined: Held[Joined], felt: Felt, told: Told, answer: Answer,
+) -> Answer:  # fmt: skip
+    """Returns the stack's answer, held back to what the envelope allows."""
+    if inside is None:
+        return answer
+    throttle, brake = answer[1], answer[2]
+    if inside.value.rules.acts and isfinite(felt[6]):
+        throttle, brake = call(
+            joined.value.at.keep_inside, keep_inside,
+            (inside, told, felt[6], felt[9], throttle, brake, False),
+        )  # fmt: skip
+    return (answer[0], throttle, brake, *answer[3:])
+
+
+@inner_kernel
+def answer_tick(
+    joined: Held[Joined], tick: int, felt: Felt, last: tuple[float, float, float]
+) -> tuple[Answer, Way, Light]:
+    """Senses and lets the stack decide: what it answers, where its way is, and the light ahead.
+
+    last: throttle, brake, steer of the tick before.
+    """
     at, rules, t = joined.value.at, joined.value.rules, joined.value.tables
     sensors = joined.value.sensors
     x, y, z, yaw, v = felt[0], felt[1], felt[2], felt[5], felt[6]
@@ -214,6 +276,7 @@ def answer_tick(joined: Held[Joined], tick: int, felt: Felt) -> tuple[Answer, Wa
     bumper, roof = (eyes.one, eyes.other) if rules.bumper_first else (eyes.other, eyes.one)
     b, r = (n_one, n_other) if rules.bumper_first else (n_other, n_one)
     echoes = eyes.around.radar.echoes
+    v_told, told = ask_envelope(joined.value.inside, joined, felt, n_radar, last)
     way = call(
         at.read_road, read_road,
         (t.memory, joined.value.road, t.on_highway, t.ways, x, y, z, yaw, v, True),
@@ -235,9 +298,10 @@ def answer_tick(joined: Held[Joined], tick: int, felt: Felt) -> tuple[Answer, Wa
             roof.runs[0, :r], roof.runs[1, :r], roof.runs[2, :r], roof.runs[3, :r],
             roof.runs[4, :r], roof.classes[:r],
             echoes[0, :n_radar], echoes[1, :n_radar], echoes[2, :n_radar], echoes[3, :n_radar],
-            t.on_highway, x, y, z, yaw, v, True, stop, inf, rules.v_told,
+            t.on_highway, x, y, z, yaw, v, True, stop, inf, v_told,
         ),
     )  # fmt: skip
+    answer = obey_envelope(joined.value.inside, joined, felt, told, answer)
     return answer, way, (source, state, there, stop)
 
 
@@ -292,7 +356,7 @@ def drive_ticks(
             break
         place = found
         felt = call(at.feel_motion, feel_motion, (arena, EGO))
-        answer, way, light = answer_tick(joined, tick, felt)
+        answer, way, light = answer_tick(joined, tick, felt, (throttle, brake, steer))
         throttle, brake, steer, handbrake = answer[1], answer[2], way[4], answer[3]
         if not (0.0 <= throttle <= 1.0 and 0.0 <= brake <= 1.0 and -1.0 <= steer <= 1.0):
             why = REFUSED

@@ -8,7 +8,8 @@ from math import isfinite
 from skidpad.campaign.driving.loop import Moment, Sink
 from skidpad.core.sensor_types import SensorType, find_sensor_type, read_sensor
 from skidpad.core.setup import Setup
-from skidpad.envelope.govern import GovernedStack
+from skidpad.core.specs import AIR_SENSORS
+from skidpad.envelope.govern import RECORDED, GovernedStack
 from skidpad.envelope.limits import Binding
 from skidpad.recording.run.readings import (
     RecordedSensor,
@@ -37,6 +38,9 @@ class ReadingsRecorder(Sink):
                 self._kinds[spec.id] = kind
         self._sensors = self._describe_sensors()
         self._rows: list[dict[str, float]] = []
+        # else the rows of ticks that a kernel drove follow from the envelope's record and the last row
+        others = {kind.word for kind in self._kinds.values()} - AIR_SENSORS
+        self.sees_all = self._added is not None or bool(others)
 
     @property
     def is_needed(self) -> bool:
@@ -54,6 +58,17 @@ class ReadingsRecorder(Sink):
         if self._governed is not None and self._governed.allowed is not None:
             row |= _columns(ENVELOPE, self._governed.allowed.numbers())
         self._rows.append(row)
+
+    def pass_ticks(self, ticks: int) -> None:
+        """Adds the rows of ticks that kernels drove: the air stays as it was in the last one."""
+        if self._governed is None:
+            return
+        last = self._rows[-1]
+        air = {name: value for name, value in last.items() if not name.startswith(ENVELOPE + ".")}
+        for row in self._governed.envelope.newest(ticks).tolist():
+            air["tick"] += 1
+            said = dict(zip(RECORDED, row, strict=False))
+            self._rows.append(air | _columns(ENVELOPE, said))
 
     def finish(self) -> SensorReadings:
         """Returns the table of all recorded ticks."""

@@ -15,6 +15,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Outside
 from skidpad.core.maths.randomness import stream, stream_key
 from skidpad.core.setup import ActorCommand, Setup
+from skidpad.core.specs import AIR_THERMOMETER, RAIN_SENSOR
 from skidpad.core.states import EgoEstimate, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import SensorLevel, Supervision
 from skidpad.physics.fleet import shown_gear
@@ -82,8 +83,14 @@ class EmbeddedBackend:
 
     @property
     def has_common_frames(self) -> bool:
-        """Whether frames hold the common sensors of all actors and the exact pose, nothing else."""
-        return self._noise == 0.0 and self._unseen is None and self._asked is None
+        """Whether frames hold the common sensors of all actors, the exact pose and the air alone."""
+        asks_more = self._asked is not None and not self._asked.is_air_alone
+        return self._noise == 0.0 and self._unseen is None and not asks_more
+
+    def read_air(self) -> tuple[int, float]:
+        """Returns the stage of the rain sensor and the deg C of the thermometer, 0 where not asked for."""
+        asked = {} if self._asked is None else self._asked.read_air()
+        return int(asked.get(RAIN_SENSOR, 0)), float(asked.get(AIR_THERMOMETER, 0.0))
 
     def why_not_quick(self) -> str:
         """Returns the first reason why a kernel cannot make steps of this world alone; "": it can."""

@@ -59,10 +59,10 @@ from skidpad.envelope.seen import FurtherSight
 from skidpad.envelope.sight import (
     SightArrays,
     SightRules,
-    Way,
     clear_way,
     look_for_lead,
     lose_lead,
+    make_way,
     new_sight,
     sight_rules,
     trace_way,
@@ -338,7 +338,7 @@ def limit_ahead(
         limits[Binding.LEAD] = following_speed(
             sight.gap - CLOSE, sight.lead_speed, braking, hardest, r.delay
         )
-    return reach
+    return float(reach)
 
 
 @kernel
@@ -474,7 +474,7 @@ class Envelope:
         """
         if self.further is None:
             return
-        self.further.look(frame, Way(*self.arrays.sight.way[:, : told.places], told.grade))
+        self.further.look(frame, make_way(self.arrays.sight.way, told.places, told.grade))
         set_to, limits = self.settings, self.arrays.limits
         reach, lane = self.further.walker_reach, self.further.lane_reach
         if self.further.walker is not None:

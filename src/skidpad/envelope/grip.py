@@ -273,7 +273,7 @@ def is_steady(rows: Floats) -> bool:
     for i in range(1, len(rows)):
         low, high = min(low, rows[i, ASKED]), max(high, rows[i, ASKED])
     most = max(abs(low), abs(high))
-    return most > ASK_LEAST and high - low < STEADY * most
+    return bool(most > ASK_LEAST and high - low < STEADY * most)
 
 
 @kernel

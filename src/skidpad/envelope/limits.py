@@ -146,7 +146,7 @@ def floating_speed(film_mm: float) -> float:
     """
     if film_mm < FILM_LEAST:
         return inf
-    return MPH * 26.04 * (min(film_mm, FILM_MOST) / INCH_MM) ** -0.259
+    return float(MPH * 26.04 * (min(film_mm, FILM_MOST) / INCH_MM) ** -0.259)
 
 
 @kernel

@@ -72,7 +72,13 @@ def way_ahead(map: RoadMap, pose: Pose) -> Way | None:
     """Returns the lane ahead of a pose every STEP m, up to REACH m or its end; None off every lane."""
     out = np.empty((5, PLACES))
     n, grade = trace_way(map.held, pose.x, pose.y, pose.z, pose.yaw, out)
-    return Way(*out[:, :n], grade) if n else None
+    return make_way(out, n, grade) if n else None
+
+
+def make_way(out: Floats, n: int, grade: float) -> Way:
+    """Returns n places that `trace_way` wrote."""
+    s, x, y, z, curvature = out[:, :n]
+    return Way(s, x, y, z, curvature, grade)
 
 
 def locate_on(way: Way, x: Floats, y: Floats) -> tuple[NDArray[np.intp], Floats]:
@@ -241,5 +247,5 @@ def clear_way(way: Floats, r: SightRules, n: int, x: float, y: float, yaw: float
             continue
         bearing = atan2(way[2, i] - y, way[1, i] - x) - yaw
         if abs((bearing + pi) % (2.0 * pi) - pi) > r.half_fov:
-            return min(way[0, i], r.range)
+            return float(min(way[0, i], r.range))
     return r.range

@@ -75,7 +75,6 @@ from skidpad.envelope.signals import (
     CarBus,
     write_message,
 )
-from skidpad.physics.grip import GripParams, mu_at
 from skidpad.roads.kernels import LaneArrays
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.interface import Stack
@@ -94,6 +93,7 @@ LEAD_GRIP = 1.2  # times the estimate that a lead's tyres may have
 LEAD_BRAKE = 8.0  # m/s^2 that it brakes at most
 # of brake pulses: within what drivers find comfortable, 2 m/s^2 (our assumption)
 PULSE_BRAKE, PULSE_TIME, PULSE_EVERY = 1.5, 0.8, 300.0  # m/s^2, s, m from one to the next
+ORACLE_STEP = 0.5  # m/s between values of a grip that is known, for studies
 PULSE_BELOW, PULSE_V_LEAST, PULSE_AY_MOST = 0.3, 8.0, 0.5  # confidence, m/s, m/s^2 across
 
 
@@ -110,7 +110,7 @@ class EnvelopeSettings:
         stiffness: of the tyre that the estimator was designed with.
         factor: on the estimated grip, for studies.
         table_kmh: speeds when dry, in rain, in the cold, in the place of the envelope: a rival.
-        oracle: true grip, for studies only.
+        oracle: true grip at each ORACLE_STEP m/s, for studies only.
         oracle_sight: true range in m of a radar with a nominal one, for studies only.
         limits: those that count; all but for ablations.
         rss: RSS distances with constant grip and the dry row of the table, in its place: a rival.
@@ -132,7 +132,7 @@ class EnvelopeSettings:
     stiffness: float = STIFFNESS
     factor: float = 1.0
     table_kmh: tuple[float, float, float] | None = None
-    oracle: GripParams | None = None
+    oracle: tuple[float, ...] | None = None
     oracle_sight: Callable[[float], float] | None = None
     limits: frozenset[Binding] = frozenset(Binding)
     rss: bool = False
@@ -194,8 +194,6 @@ class EnvelopeRules(NamedTuple):
     rss: bool
     rss_limits: RssParameters
     counted: int  # limits that count, as bits by Binding
-    knows_grip: bool
-    true_grip: GripParams  # for studies only
     acts: bool  # it does not only watch
     pulses: bool
     dt: float  # s
@@ -211,6 +209,7 @@ class EnvelopeArrays(NamedTuple):
     bus: BusArrays
     sight: SightArrays
     limits: Floats  # (9,) m/s by Binding, inf: none; of this tick
+    true_grip: Floats  # (n,) at each ORACLE_STEP m/s, for studies only; (0,): unknown
     said: Floats  # (BLOCK, 8) RECORDED and `shown` of ticks, each in the row of its noise
     pulse: Floats  # m since the last brake pulse, s that are left of one
 
@@ -281,8 +280,8 @@ def find_limits(
     value, shown, sure, prior = estimate_grip(
         arrays.grip, r.car, r.stiffness, r.dt, signals, stage, expected, grade
     )
-    if r.knows_grip:
-        value = mu_at(r.true_grip, v)
+    if len(arrays.true_grip) > 0:
+        value = grip_at(arrays.true_grip, v)
         shown, sure = value, 1.0
     elif r.factor != 1.0:
         value *= r.factor
@@ -306,6 +305,14 @@ def find_limits(
     said[0], said[1], said[2], said[3] = speed, binding, value, sure
     said[4], said[5], said[6], said[7] = prior, reach, v, shown
     return Told(speed, binding, value, shown, sure, prior, reach, places, grade, has_lead)
+
+
+@kernel
+def grip_at(known: Floats, v: float) -> float:
+    """Returns the grip at v in m/s between values for each ORACLE_STEP m/s, (n,); beyond them the last one."""
+    i = min(int(v / ORACLE_STEP), len(known) - 1)
+    j = min(i + 1, len(known) - 1)
+    return float(known[i] + (v / ORACLE_STEP - i) * (known[j] - known[i]))
 
 
 @kernel
@@ -420,7 +427,8 @@ class Envelope:
         self.rules = make_rules(settings, self.bus.rules, sight_rules(radar, settings.dt, known))
         self.arrays = EnvelopeArrays(
             new_estimator(), self.bus.arrays, new_sight(self.rules.sight),
-            np.full(len(Binding), inf), np.empty((BLOCK, 8)), np.zeros(2),
+            np.full(len(Binding), inf), np.array(settings.oracle or (), dtype=np.float64),
+            np.empty((BLOCK, 8)), np.zeros(2),
         )  # fmt: skip
         self.held = hold(EnvelopeParts(self.rules, self.arrays, map.held))
         self.further: FurtherSight | None = None
@@ -520,7 +528,6 @@ def make_rules(settings: EnvelopeSettings, bus: BusRules, sight: SightRules) -> 
         most=s.most, stiffness=s.stiffness, factor=s.factor, has_table=s.table_kmh is not None,
         table=(table[0] / 3.6, table[1] / 3.6, table[2] / 3.6), rss=s.rss,
         rss_limits=RssParameters(), counted=sum(1 << name for name in s.limits),
-        knows_grip=s.oracle is not None, true_grip=s.oracle or GripParams(*(0.0,) * 9),
         acts=not s.watches, pulses=s.pulses, dt=s.dt, car=Car(), bus=bus, sight=sight,
     )  # fmt: skip
 

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from skidpad.core.run import AdasDriver, RunSpec
 from skidpad.core.setup import Setup
 from skidpad.core.vocabulary import Govern, RangeModel
 from skidpad.core.weather import Weather
-from skidpad.envelope.govern import TABLE_KMH, EnvelopeSettings, govern
+from skidpad.envelope.govern import ORACLE_STEP, TABLE_KMH, EnvelopeSettings, govern
 from skidpad.envelope.limits import Binding
-from skidpad.physics.grip import road_of
+from skidpad.physics.grip import mu_at, road_of
 from skidpad.physics.optics import radar_range
 from skidpad.stack.interface import Stack
 
 FIXED_KMH = 80.0
+ORACLE_SPEEDS = np.arange(0.0, 60.0, ORACLE_STEP)  # m/s
 
 
 def apply_envelope(stack: type[Stack], spec: RunSpec, setup: Setup) -> type[Stack]:
@@ -38,7 +41,8 @@ def choose_envelope(spec: RunSpec, setup: Setup) -> EnvelopeSettings | None:
     kind = Govern.ENVELOPE if own and spec.govern is Govern.NONE else spec.govern
     found = describe_envelope(kind, setup.dt, spec.seed)
     if found is not None and kind is Govern.ORACLE:
-        return replace(found, oracle=road_of(setup).params())
+        params = road_of(setup).params()
+        return replace(found, oracle=tuple(float(mu_at(params, v)) for v in ORACLE_SPEEDS))
     if found is not None and kind is Govern.ORACLE_SIGHT:
         is_limited = setup.range_model is RangeModel.PHYSICAL
         weather = setup.weather if is_limited else Weather()

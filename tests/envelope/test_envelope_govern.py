@@ -27,11 +27,11 @@ from skidpad.envelope.govern import (
     EnvelopeSettings,
     GovernedStack,
     govern,
+    grip_at,
     lower,
     pulse_brake,
 )
 from skidpad.envelope.limits import Binding
-from skidpad.physics.grip import mu_at
 from skidpad.physics.presets import preset
 from skidpad.roads.bundled import load_map
 from skidpad.sensors.outside import make_rain_sensor, make_thermometer, wiper_stage
@@ -180,7 +180,7 @@ def test_the_oracle_knows_the_tyres_of_the_run():
         return choose_envelope(RunSpec(govern=Govern.ORACLE), setup).oracle
 
     summer, winter, studded = (
-        mu_at(grip(tyres), 10.0) for tyres in ("summer", "winter", "studded")
+        grip_at(np.array(grip(tyres)), 10.0) for tyres in ("summer", "winter", "studded")
     )
     assert summer < winter < studded
 

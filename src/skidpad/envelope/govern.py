@@ -309,7 +309,7 @@ def find_limits(
 
 @kernel
 def grip_at(known: Floats, v: float) -> float:
-    """Returns the grip at v in m/s between values for each ORACLE_STEP m/s, (n,); beyond them the last one."""
+    """Returns the grip at v in m/s from (n,) values for each ORACLE_STEP m/s; beyond them the last one."""
     i = min(int(v / ORACLE_STEP), len(known) - 1)
     j = min(i + 1, len(known) - 1)
     return float(known[i] + (v / ORACLE_STEP - i) * (known[j] - known[i]))

@@ -46,7 +46,7 @@ EVENTS_PER_KM = (pl.col("serious_contacts") + pl.col("road_departures")).sum() /
 def read_drivers(folder: Path) -> dict[str, pl.DataFrame]:
     """Returns the runs of each driver of a map's family of campaigns.
 
-    Of weathers in which everything moved alike the first is kept, named after all: "icy_100, icy_30".
+    Of weathers in which everything moved alike one is kept, named after all: "icy_100, icy_30".
     """
     own = pl.read_parquet(folder / "results.parquet")
     found = {
@@ -60,30 +60,47 @@ def read_drivers(folder: Path) -> dict[str, pl.DataFrame]:
         if file.is_file():
             found[name] = pl.read_parquet(file)
     names = name_alike(found)
-    return {
-        driver: runs.filter(pl.col("weather").is_in(list(names))).with_columns(
-            pl.col("weather").replace(names)
-        )
-        for driver, runs in found.items()
-    }
+    return {driver: keep_alike_once(runs, names) for driver, runs in found.items()}
+
+
+def keep_alike_once(runs: pl.DataFrame, names: dict[str, str]) -> pl.DataFrame:
+    """Returns the runs of one weather of each group, that with most seeds, named after the group."""
+    kept: dict[str, pl.DataFrame] = {}
+    for weather, name in names.items():
+        some = runs.filter(pl.col("weather") == weather)
+        if name not in kept or len(some) > len(kept[name]):
+            kept[name] = some.with_columns(pl.lit(name).alias("weather"))
+    return pl.concat(kept.values())
 
 
 def name_alike(drivers: dict[str, pl.DataFrame]) -> dict[str, str]:
-    """Returns the names of groups of weathers in which each driver moved alike, by their first one.
+    """Returns for each weather the name of its group: all in which each driver moved alike.
 
-    Drivers that lack a weather of the bare stack have no say.
+    They are held against each other over the seeds that both have, one at least. Drivers that lack a weather
+    of the bare stack have no say.
     """
     weathers = drivers[BARE]["weather"].unique(maintain_order=True).to_list()
-    asked = [t for t in drivers.values() if set(weathers) <= set(t["weather"])]
-    groups: dict[tuple[str, ...], list[str]] = {}
+    asked = {n: t for n, t in drivers.items() if set(weathers) <= set(t["weather"])}
+    moved: dict[str, dict[tuple[str, int], str]] = {w: {} for w in weathers}
+    for name, runs in asked.items():
+        for weather, seed, motion in runs.select("weather", "seed", "motion_hash").iter_rows():
+            if weather in moved:
+                moved[weather][name, seed] = motion
+    groups: list[list[str]] = []
     for weather in weathers:
-        moved = tuple(
-            pl.concat(
-                t.filter(pl.col("weather") == weather).sort("seed")["motion_hash"] for t in asked
-            )
-        )
-        groups.setdefault(moved, []).append(weather)
-    return {group[0]: ", ".join(group) for group in groups.values()}
+        alike = (group for group in groups if is_alike(moved[group[0]], moved[weather]))
+        group = next(alike, None)
+        if group is None:
+            groups.append([weather])
+        else:
+            group.append(weather)
+    return {weather: ", ".join(group) for group in groups for weather in group}
+
+
+def is_alike(one: dict[tuple[str, int], str], other: dict[tuple[str, int], str]) -> bool:
+    """Returns whether two weathers have the same motion in every run that both have, one at least."""
+    common = one.keys() & other.keys()
+    return bool(common) and all(one[run] == other[run] for run in common)
 
 
 def events(runs: pl.DataFrame) -> int:

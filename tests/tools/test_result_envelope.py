@@ -76,6 +76,23 @@ def test_weathers_in_which_all_moved_alike_count_once(tmp_path):
     assert proof.events(proof.read_drivers(folder)["bare"]) == 36
 
 
+def test_a_weather_with_one_seed_joins_its_group_and_a_rival_may_have_any_of_them(tmp_path):
+    """As --distinct drives them: the first seed of each weather, the rest of one alone."""
+    folder = tmp_path / "envelope-figure8"
+    write_runs(folder, {"3": 3, "5": 0})
+    runs = pl.read_parquet(folder / "results.parquet")
+    other = pl.col("weather").replace({"snow": "blizzard"})
+    once = runs.filter(weather="snow", seed=SEEDS[0]).with_columns(other)
+    pl.concat([once, runs]).write_parquet(folder / "results.parquet")
+    write_runs(tmp_path / "envelope-figure8-table", {"3": 2})
+    table = pl.read_parquet(tmp_path / "envelope-figure8-table" / "results.parquet")
+    table.with_columns(other).write_parquet(tmp_path / "envelope-figure8-table" / "results.parquet")
+    drivers = dict(proof.cells(folder))["blizzard, snow"]
+    assert {n: proof.events(t) for n, t in drivers.items()} == {
+        "bare": 36, "envelope": 0, "table of three speeds": 24,
+    }  # fmt: skip
+
+
 def test_goals_are_judged_over_the_maps_that_are_driven(tmp_path):
     for name in proof.MAPS[:2]:
         write_runs(tmp_path / name, {"3": 3, "5": 0}, speed=36.0)

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError
+from skidpad.core.kernels.jit import kernel
 from skidpad.roads.edge import LEVEL
 from skidpad.roads.queries import LanePoint, RoadMap
 
@@ -31,10 +33,7 @@ class Journey:
                 f"the road from the start ends; got {length / 1000.0:g}"
             )
         self.length = length
-        self.places: list[tuple[float, float, float]] = [
-            (start.x, start.y, start.z),
-            *((x, y, z) for x, y, z, _ in further.tolist()),
-        ]
+        self.places = np.vstack(((start.x, start.y, start.z), further[:, :3]))  # (n, 3)
         self.reached = 0  # index of the furthest place that the car came by
 
     def follow(self, x: float, y: float, z: float) -> float:
@@ -43,13 +42,7 @@ class Journey:
         Call it in each tick. A car that is beside the way comes no further, one that turns back keeps
         what it had.
         """
-        best, least = self.reached, NEAR
-        for k in range(self.reached, min(self.reached + WINDOW, len(self.places))):
-            px, py, pz = self.places[k]
-            distance = hypot(px - x, py - y)
-            if distance < least and abs(pz - z) < LEVEL:
-                best, least = k, distance
-        self.reached = best
+        self.reached = come_by(self.places, self.reached, x, y, z)
         return self.progress
 
     @property
@@ -61,6 +54,20 @@ class Journey:
     def is_done(self) -> bool:
         """Whether the car has come to the end."""
         return self.reached == len(self.places) - 1
+
+
+@kernel
+def come_by(places: Floats, reached: int, x: float, y: float, z: float) -> int:
+    """Returns the index of the furthest of (n, 3) places that a car at x, y, z in m has come by.
+
+    reached: the one before, among whose next ones it is looked for.
+    """
+    best, least = reached, NEAR
+    for k in range(reached, min(reached + WINDOW, len(places))):
+        distance = hypot(places[k, 0] - x, places[k, 1] - y)
+        if distance < least and abs(places[k, 2] - z) < LEVEL:
+            best, least = k, distance
+    return best
 
 
 def progress_along(

@@ -11,9 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf
+from types import NoneType
 from typing import Any, NamedTuple
 
-from skidpad.campaign.driving.loop import Stepper, Timer, Unsupervised
+import numpy as np
+
+from skidpad.campaign.driving.loop import Arrival, Stepper, Timer, Unsupervised
 from skidpad.campaign.driving.outdoors import ChangedBackend, FileChanges
 from skidpad.campaign.driving.quick_kernel import (
     DONE,
@@ -33,6 +36,7 @@ from skidpad.campaign.driving.run_setup import StackAtWheel
 from skidpad.core.errors import StackError
 from skidpad.core.kernels.calls import find_address
 from skidpad.core.kernels.jit import Held, hold
+from skidpad.core.setup import ActorCommand
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import LightState, Supervision
 from skidpad.envelope.belief import COLD_C
@@ -60,6 +64,7 @@ from skidpad.stack.perception.lights import heed_light
 from skidpad.stack.road import read_road
 from skidpad.stack.think import think
 
+NO_WAY = np.zeros((0, 3))
 ANOTHER_SIMULATOR = "another simulator drives"
 # of the types that kernels of the envelope take
 STILL = Motion(*(0.0,) * 9, (0.0,) * 4)
@@ -69,8 +74,9 @@ NOTHING_TOLD = Told(0.0, 0, *(0.0,) * 5, 0, 0.0, False)
 class QuickParts(NamedTuple):
     """What of a run takes part in its quick way.
 
-    timer: counts the ticks of a run without a script. changed: the backend of one with a script, which is
-    asked in each tick, and the file's changes.
+    timer: counts the ticks of a run whose world a kernel steps; None: it is stepped here, as a script is
+    asked or patches, wind or roll-over are looked at in each tick. way: of a run that ends with it.
+    changed: the backend of one with a script, and the file's changes.
     """
 
     backend: EmbeddedBackend
@@ -81,6 +87,7 @@ class QuickParts(NamedTuple):
     governed: GovernedStack | None  # what keeps the stack inside an envelope
     supervisor: Supervisor | None
     timer: Timer | None
+    way: Arrival | None
     changed: tuple[ChangedBackend, FileChanges] | None
 
 
@@ -104,7 +111,7 @@ def find_parts(stepper: Stepper, changes: FileChanges | None = None) -> QuickPar
         return "its sensors are pixels, or a radar with noise"
     if type(driver) is not StackAtWheel:
         return "another driver is at the wheel"
-    outer, suite, timer = driver.stack.stack, sensing.suite, None
+    outer, suite, timer, way = driver.stack.stack, sensing.suite, None, None
     governed = outer if isinstance(outer, GovernedStack) else None
     stack = outer if governed is None else governed.inner
     if type(stack) is not AdasStack:
@@ -119,19 +126,16 @@ def find_parts(stepper: Stepper, changes: FileChanges | None = None) -> QuickPar
         return "another supervisor looks on, or a person is at the controls"
     supervising = supervisor if isinstance(supervisor, Supervisor) else None
     if changed is None:
-        if reason := backend.why_not_quick():
-            return reason
-        if type(script) is not Timer or script.script is not None:
-            return "a script or the end of a route is followed in each tick"
-        timer = script
-    elif supervising is not None:
-        return "a script is played, and a supervisor looks on"
+        if type(script) is not Timer or type(script.script) not in (Arrival, NoneType):
+            return "a script is followed in each tick"
+        if backend.steps_alone:
+            timer, way = script, script.script
     for sink in stepper.sinks:
         if sink.sees_all:
             return f"{type(sink).__name__} is shown each tick"
     world = backend.world
     return QuickParts(
-        backend, world, suite, driver.stack, stack, governed, supervising, timer, changed
+        backend, world, suite, driver.stack, stack, governed, supervising, timer, way, changed
     )
 
 
@@ -152,6 +156,7 @@ class QuickDrive:
         self._shown: dict[int, LightState] = {}  # of the next two
         self._lines = parts.stack.road.scan.show(self._shown)
         self._lit = self._stops.show(self._shown)
+        self._reached = np.zeros(1, dtype=np.int64)
         self._joined: Held[Joined] | None = None
         self._joined_by: Rules | None = None
         self._joined_of: tuple[object, ...] = ()
@@ -168,12 +173,12 @@ class QuickDrive:
         self.parts, last = found, self._last_request()
         if isinstance(last, str):
             return self._leave(last)
-        timer, changed, driven = found.timer, found.changed, 0
+        timer, driven = found.timer, 0
         if found.governed is not None:
             most = min(most, found.governed.envelope.bus.draw_noise())
-        if changed is not None:
-            driven = self._follow_script(most, last, *changed)
-        elif timer is not None and timer.left > 0:
+        if timer is None:
+            driven = self._step_world(most, last)
+        elif not timer.ended:
             driven = self._drive_alone(min(most, timer.left), last)
         if driven:
             self.stepper.truth = found.backend.truth()
@@ -191,22 +196,21 @@ class QuickDrive:
         self.reason = self.reason or reason
         return 0
 
-    def _follow_script(
-        self, most: int, last: Request, backend: ChangedBackend, changes: FileChanges
-    ) -> int:
-        """Drives ticks of a script: it and the world step, then sensors, stack and log are one call."""
+    def _step_world(self, most: int, last: Request) -> int:
+        """Drives ticks in which the world steps here, with its script; the rest of each is one call."""
         stepper, world, script = self.stepper, self.parts.world, self.stepper.script
         arrays, driven, inner = self.log.reserve(1), 0, self.parts.backend
         joined, shown = self._join(arrays), world.lights.by_id
         while driven < min(most, arrays.left) and not script.ended:
             assert stepper.action is not None
-            changed = backend.make_step(stepper.action.command, stepper.words)
-            if changed or not (
-                changes.is_silent and world.is_quiet and world.lights.by_id is shown
-            ):
+            silent = self._make_step(stepper.action.command, stepper.words)
+            if not (silent and world.is_quiet and world.lights.by_id is shown):
                 stepper.next_frame = inner.read_frame()
                 break
             stop = self._call(joined, arrays.at + driven, last, True, 1)
+            if stop.why == UNUSUAL:
+                stepper.next_frame = inner.read_frame()
+                break
             last = stop.request
             if stop.why == REFUSED:
                 self._refuse(last)
@@ -219,8 +223,16 @@ class QuickDrive:
             stepper.words = script.step(inner.truth())
         return driven
 
+    def _make_step(self, command: VehicleCommand, words: Sequence[ActorCommand]) -> bool:
+        """Steps the world; returns whether no script changes anything in this tick."""
+        if self.parts.changed is None:
+            self.parts.backend.make_step(command, words)
+            return True
+        backend, changes = self.parts.changed
+        return not backend.make_step(command, words) and changes.is_silent
+
     def _drive_alone(self, n: int, last: Request) -> int:
-        """Drives up to n ticks of a run without a script; the world steps in the kernel, too."""
+        """Drives up to n ticks of a run whose world steps in the kernel, too."""
         stepper, world = self.stepper, self.parts.world
         arrays, lights, driven, begun = self.log.reserve(n), world.lights, 0, False
         while driven < n:
@@ -270,9 +282,12 @@ class QuickDrive:
         """
         world, supervisor = self.parts.world, self.parts.supervisor
         grace, stood = (0, 0) if supervisor is None else (supervisor.grace, supervisor.standing)
-        told = drive_ticks(joined, begun, world.tick, n, at, grace, stood, *last)
-        ticks, why, touches, crossed, throttle, brake, steer, handbrake = told[:8]
-        lane, s, offset, standing = told[8:]
+        way = self.parts.way
+        if way is not None:
+            self._reached[0] = way.journey.reached
+        found = drive_ticks(joined, begun, world.tick, n, at, grace, stood, *last)
+        ticks, why, touches, crossed, throttle, brake, steer, handbrake = found[:8]
+        lane, s, offset, standing = found[8:]
         steps = ticks + (why in (UNUSUAL, REFUSED)) - begun
         if steps:
             world.pass_ticks(steps)
@@ -280,6 +295,9 @@ class QuickDrive:
         if ticks:
             if self.parts.timer is not None:
                 self.parts.timer.left -= ticks
+            if way is not None:
+                way.journey.reached = int(self._reached[0])
+                way.ended = way.journey.is_done
             if supervisor is not None:
                 supervisor.pass_ticks(ticks, (lane, s, offset), standing)
         return Stop(ticks, why, touches, crossed, Request(throttle, brake, steer, handbrake))
@@ -324,6 +342,7 @@ class QuickDrive:
         """Returns what the kernel is given; it is held anew when a part of it is another object."""
         world, suite, stack = self.parts.world, self.parts.suite, self.parts.stack
         road, lights, rules = stack.road, world.lights, self._rules(arrays)
+        places = NO_WAY if self.parts.way is None else self.parts.way.journey.places
         common = suite.hold_common(world.states)
         assert common is not None, "find_parts has asked for it"
         parts, governed = stack.parts(suite.most_runs, suite.most_points), self.parts.governed
@@ -337,14 +356,14 @@ class QuickDrive:
             self._lit[:] = self._stops.show(self._shown)
         known = (
             world.arena, world.states, common, road.parts, parts.held, parts.kept, parts.room,
-            road.on_highway, arrays.rows, arrays.columns, inside,
+            road.on_highway, arrays.rows, arrays.columns, inside, places,
         )  # fmt: skip
         joined = self._joined
         if joined is None or rules != self._joined_by or not is_same(known, self._joined_of):
             tables = Tables(
                 stack.memory, parts.samples, parts.history, parts.kept, road.ways, parts.room,
                 road.on_highway, self._lines, arrays.ticks, arrays.rows, *self._clocks,
-                self._stops.lane, self._stops.s, self._lit,
+                self._stops.lane, self._stops.s, self._lit, places, self._reached,
             )  # fmt: skip
             states, map = hold(world.states), world.map.held
             held = states, map, common, road.parts, parts.held, arrays.columns

@@ -26,6 +26,7 @@ from skidpad.envelope.govern import (
 )
 from skidpad.physics.fleet import shown_gear
 from skidpad.recording.run.ticks import APPLIED, REPORT, REQUESTED, ActorColumns, copy_actors
+from skidpad.roads.journeys import come_by
 from skidpad.roads.kernels import LaneArrays
 from skidpad.sensors.object_level.objects import Common, sense
 from skidpad.simulation.recovery import WRONG_WAY_DOT, find_ego, has_reason, is_slow
@@ -40,7 +41,7 @@ from skidpad.stack.road import RoadParts, read_road
 from skidpad.stack.think import Answer, Light, Parts, think, write_report
 
 # why the kernel came back
-DONE = 0  # all ticks that were asked for are driven
+DONE = 0  # all ticks that were asked for are driven, or the ego has come to the end of its way
 MOVED = 1  # actors have moved, and Python is to look after the traffic before they settle
 STEPPED = 2  # the world has made its step, in which something happened
 UNUSUAL = 3  # the tick has begun, and the supervisor may have something to do in it
@@ -82,6 +83,8 @@ class Tables(NamedTuple):
     stop_lane: NDArray[np.int64]  # of each signal of a light
     stop_s: Floats  # m along that lane
     shown: NDArray[np.uint8]  # LightState there
+    way: Floats  # (n, 3) places of the ego's way; n = 0: it has no end
+    reached: NDArray[np.int64]  # (1,) index of the furthest one that it came by
 
 
 class Rules(NamedTuple):
@@ -325,6 +328,15 @@ def write_tick(
     call(at.copy_actors, copy_actors, (states, rows.mu, joined.value.columns, k))
 
 
+@inner_kernel
+def has_arrived(t: Tables, felt: Felt) -> bool:
+    """Follows the ego along its way, and returns whether it has come to the end."""
+    if len(t.way) == 0:
+        return False
+    t.reached[0] = come_by(t.way, t.reached[0], felt[0], felt[1], felt[2])
+    return t.reached[0] == len(t.way) - 1
+
+
 @kernel
 def drive_ticks(
     joined: Held[Joined], begun: bool, tick: int, n: int, k: int, grace: int, standing: int,
@@ -364,6 +376,8 @@ def drive_ticks(
         standing = standing + 1 if stands and not (rules.holding >> answer[0]) & 1 else 0
         write_tick(joined, k + done, tick, felt, answer, way, light)
         done += 1
+        if has_arrived(joined.value.tables, felt):
+            break
     return (
         done, why, touches, crossed, throttle, brake, steer, handbrake, *place, standing,
     )  # fmt: skip

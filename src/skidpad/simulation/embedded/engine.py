@@ -92,12 +92,12 @@ class EmbeddedBackend:
         asked = {} if self._asked is None else self._asked.read_air()
         return int(asked.get(RAIN_SENSOR, 0)), float(asked.get(AIR_THERMOMETER, 0.0))
 
-    def why_not_quick(self) -> str:
-        """Returns the first reason why a kernel cannot make steps of this world alone; "": it can."""
+    @property
+    def steps_alone(self) -> bool:
+        """Whether a kernel can make the steps of this world: no patches, wind or roll-over, but traffic."""
         w = self.world
-        if w.patches is not None or w.zones or w.gusts is not None or w.conditions.roll_over:
-            return "patches, wind or roll-over are looked at in each tick"
-        return "the world has no traffic" if w.traffic is None else ""
+        is_looked_at = w.patches is not None or w.zones or w.gusts is not None
+        return not (is_looked_at or w.conditions.roll_over or w.traffic is None)
 
     def truth(self) -> WorldTruth:
         """Returns the ground truth of the present tick."""

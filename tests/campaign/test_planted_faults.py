@@ -16,6 +16,8 @@ from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.campaign.runs.run import OpenRun
 from skidpad.core.kernels.calls import call, find_address
 from skidpad.core.run import RunSpec
+from skidpad.core.vocabulary import Govern
+from skidpad.envelope.govern import Told, find_limits, keep_inside
 from skidpad.recording.run.log_files import log_hash
 from skidpad.recording.run.ticks import copy_actors
 from skidpad.sensors.object_level.objects import sense
@@ -29,6 +31,7 @@ from support.runs import adas_run
 
 Faulty = Callable[..., Any]
 LEAD = adas_run(4, duration=15.0)
+GOVERNED = adas_run(4, "icy_100", duration=15.0, govern=Govern.ENVELOPE)
 LIGHTS = adas_run(4, duration=32.0)
 
 
@@ -129,6 +132,30 @@ def copy_wrong(address: int) -> Faulty:
     return faulty
 
 
+def limit_wrong(address: int) -> Faulty:
+    def faulty(
+        parts, distance, azimuth, altitude, velocity, ego, throttle, brake, steer, stage, is_cold
+    ):
+        found = call(
+            address, find_limits,
+            (
+                parts, distance, azimuth, altitude, velocity, ego, throttle, brake, steer, stage,
+                is_cold,
+            ),
+        )  # fmt: skip
+        return Told(flip(found[0]), *found[1:])
+
+    return faulty
+
+
+def keep_wrong(address: int) -> Faulty:
+    def faulty(parts, told, v, ay, throttle, brake, reverse):
+        found = call(address, keep_inside, (parts, told, v, ay, throttle, brake, reverse))
+        return found[0], flip(found[1])
+
+    return faulty
+
+
 FAULTS: dict[str, tuple[Any, Callable[[int], Faulty], RunSpec]] = {
     "advance": (advance, move_wrong, LEAD),
     "feel_motion": (feel_motion, feel_wrong, LEAD),
@@ -139,11 +166,15 @@ FAULTS: dict[str, tuple[Any, Callable[[int], Faulty], RunSpec]] = {
     "has_reason": (has_reason, explain_wrong, LEAD),
     "heed_light": (heed_light, heed_wrong, LIGHTS),
     "copy_actors": (copy_actors, copy_wrong, LEAD),
+    "find_limits": (find_limits, limit_wrong, GOVERNED),
+    "keep_inside": (keep_inside, keep_wrong, GOVERNED),
 }
 
 
 def drive(spec: RunSpec, quickly: bool) -> tuple[str, tuple[object, ...], int]:
-    """Drives a run; returns the hash of its log, what its supervisor remembers, and the quick ticks.
+    """Drives a run; returns the hash of its log, what is remembered besides, and the quick ticks.
+
+    That is what the supervisor remembers, and what the envelope, if any, said in each tick.
 
     On roads an ego below 5 m/s counts as stuck after a second.
     """
@@ -158,10 +189,12 @@ def drive(spec: RunSpec, quickly: bool) -> tuple[str, tuple[object, ...], int]:
     if isinstance(stage.supervisor, Supervisor):
         memory = tuple(v for k, v in vars(stage.supervisor).items() if k in ("_last", "standing"))
     run = opened.finish()
+    if run.readings is not None:
+        memory = *memory, run.readings.table.hash_rows().to_list()
     return log_hash(run.log), memory, run.quick_ticks
 
 
-@pytest.mark.parametrize("spec", [LEAD, LIGHTS], ids=["roads", "lights"])
+@pytest.mark.parametrize("spec", [LEAD, LIGHTS, GOVERNED], ids=["roads", "lights", "governed"])
 def test_without_a_fault_both_ways_are_the_same(spec: RunSpec) -> None:
     one, other = drive(spec, False), drive(spec, True)
     assert one[:2] == other[:2]

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import inf
-from types import NoneType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -126,10 +125,11 @@ def find_parts(stepper: Stepper, changes: FileChanges | None = None) -> QuickPar
         return "another supervisor looks on, or a person is at the controls"
     supervising = supervisor if isinstance(supervisor, Supervisor) else None
     if changed is None:
-        if type(script) is not Timer or type(script.script) not in (Arrival, NoneType):
+        ending = script.script if type(script) is Timer else script
+        if type(script) is not Timer or not (ending is None or type(ending) is Arrival):
             return "a script is followed in each tick"
         if backend.steps_alone:
-            timer, way = script, script.script
+            timer, way = script, ending
     for sink in stepper.sinks:
         if sink.sees_all:
             return f"{type(sink).__name__} is shown each tick"

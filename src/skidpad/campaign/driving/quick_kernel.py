@@ -334,7 +334,7 @@ def has_arrived(t: Tables, felt: Felt) -> bool:
     if len(t.way) == 0:
         return False
     t.reached[0] = come_by(t.way, t.reached[0], felt[0], felt[1], felt[2])
-    return t.reached[0] == len(t.way) - 1
+    return bool(t.reached[0] == len(t.way) - 1)
 
 
 @kernel

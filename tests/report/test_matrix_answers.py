@@ -49,14 +49,23 @@ def test_the_first_answer_names_the_safest_functions_in_each_weather_and_how_sur
 
 @pytest.mark.req("R-7")
 def test_where_chance_may_explain_every_difference_the_first_sentence_says_so(tmp_path):
-    """Before any configuration is named as the one with fewest crashes."""
+    """No configuration is named then: that would read as a rank."""
     first = told(campaign(tmp_path, lambda config, kind: metrics(barriers=2)))[0]
-    assert first.sentence.startswith(
+    assert first.sentence == (
         "10 seeds are too few to rank the configurations: every difference between two of them may be "
-        "chance. Of the configurations, fewest crashes: in clear sky configurations 1 to 4 alike with "
-        "2.00 per run; "
+        "chance. All configurations lie within these crashes per run: 2.00 in clear sky; 2.00 in heavy "
+        "rain."
     )
     assert list(first.lines) == []
+
+
+def test_too_few_seeds_name_no_configuration_as_the_one_with_fewest_crashes(tmp_path):
+    first = told(campaign(tmp_path, clear_cut, seeds=2))[0]
+    assert first.sentence == (
+        "All configurations lie within these crashes per run: 0.00 to 7.00 in clear sky; "
+        "0.00 to 7.00 in heavy rain."
+    )
+    assert first.lines[0].startswith("2 seeds per cell cannot tell two configurations apart")
 
 
 @pytest.mark.req("R-7")

@@ -87,17 +87,24 @@ def _functions(matrix: Matrix) -> Answer:
     best = {g: min(r, key=lambda c: r[c].rate) for g, r in judged.items() if r}
     parts = [_fewest(g, judged[g], judged[g][c].rate) for g, c in best.items()]
     without = _without_crashes(judged)
-    fewest = without or [f"Of the configurations, fewest {EVENTS}: {'; '.join(parts)}."]
-    sentence = f"{fewest[0]}{_beside_reference(rates, judged)}"
     least = seeds_for_verdict(len(differences))
-    if len(matrix.comparison_configs) < 2:
+    several = len(matrix.comparison_configs) > 1
+    is_sure = matrix.seeds >= least and any(d.is_sure for d in differences.values())
+    if without:
+        first = without[0]
+    elif several and not is_sure:  # a name beside "too few to rank" would read as a rank
+        first = _spread(judged)
+    else:
+        first = f"Of the configurations, fewest {EVENTS}: {'; '.join(parts)}."
+    sentence = f"{first}{_beside_reference(rates, judged)}"
+    if not several:
         lines = without[1:]
     elif matrix.seeds < least:
         lines = [*without[1:], _too_few_seeds(matrix.seeds, least)]
     elif without:
         lines = without[1:]
     else:
-        if not any(d.is_sure for d in differences.values()):
+        if not is_sure:
             sentence = (
                 f"{count_text(matrix.seeds, 'seed')} are too few to rank the configurations: every "
                 f"difference between two of them may be chance. {sentence}"
@@ -136,6 +143,17 @@ def _fewest(group: WeatherGroup, rates: dict[str, Rate], least: float) -> str:
     all_alike = len(found) == len(rates) > 1
     named = f"{config_list(found)} alike" if all_alike else functions_list(found)
     return f"in {group.name} {named} with {least:.2f} per run"
+
+
+def _spread(judged: dict[WeatherGroup, dict[str, Rate]]) -> str:
+    """Returns a sentence with the least and the largest rate in each weather, without a name."""
+    told = []
+    for group, rates in judged.items():
+        found = sorted({f"{rate.rate:.2f}" for rate in rates.values()}, key=float)
+        if found:
+            ends = found[0] if len(found) == 1 else f"{found[0]} to {found[-1]}"
+            told.append(f"{ends} in {group.name}")
+    return f"All configurations lie within these {EVENTS} per run: {'; '.join(told)}."
 
 
 def _beside_reference(

@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app, main
-from skidpad.core.errors import FileError
+from skidpad.core.errors import FileError, InputError
 from skidpad.roads import carla_import
 from skidpad.roads.bundled import FOLDER, load_map
 from skidpad.roads.carla_import import find_road_files
@@ -157,6 +157,33 @@ def test_road_files_are_taken_out_of_a_carla(tmp_path: Path, layout) -> None:
     assert "not taken: Broken: not XML" in result.output
     assert f"skidpad carla-server --maps {out} --map Town03" in result.output
     assert {"Town03", "Town12", "Town12_Opt"} <= set(MapStore(out).names())
+
+
+def test_an_import_from_a_place_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:
+    result = RUNNER.invoke(app, ["map", "import-carla", str(tmp_path / "none")])
+    assert isinstance(result.exception, InputError)
+    assert str(result.exception) == (
+        f"{tmp_path / 'none'} is not there: give a CARLA folder, package or image"
+    )
+
+
+def test_a_road_file_that_cannot_be_read_is_named_and_the_others_are_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain_open, out = Path.open, tmp_path / "maps"
+
+    def refuse(self: Path, *args, **kwargs):
+        if self.name == "Town12.xodr":
+            raise PermissionError(13, "Permission denied", str(self))
+        return plain_open(self, *args, **kwargs)
+
+    source = folder(tmp_path)
+    monkeypatch.setattr(Path, "open", refuse)
+    result = RUNNER.invoke(app, ["map", "import-carla", str(source), "--out", str(out)])
+    assert result.exit_code == 0, result.output
+    assert [p.name for p in out.iterdir()] == ["Town03.xodr"]
+    place = f"{LAYOUT}/Town12/OpenDrive/Town12.xodr"
+    assert f"not taken: {place}: it cannot be read: Permission denied" in result.output
 
 
 def test_an_import_overwrites_nothing(tmp_path: Path) -> None:

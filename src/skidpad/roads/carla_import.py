@@ -51,8 +51,11 @@ class RoadFiles(NamedTuple):
 def find_road_files(source: Path) -> RoadFiles:
     """Returns the OpenDRIVE files of a folder or archive.
 
-    FileError for what is neither, is damaged, holds none, or more than TOTAL_MAX bytes or FILES_MAX files.
+    A file of a folder that cannot be read is left out. FileError for what is not there or neither, is
+    damaged, holds none, or more than TOTAL_MAX bytes or FILES_MAX files.
     """
+    if not source.exists():
+        raise FileError(f"{source} is not there: give a CARLA folder, package or image")
     search = _Search(source)
     try:
         search.run()
@@ -95,8 +98,7 @@ class _Search:
         if self.source.is_dir():
             for file in sorted(self.source.rglob(f"*{SUFFIX}")):
                 if file.is_file():
-                    with file.open("rb") as stream:
-                        self._take("", file.relative_to(self.source).as_posix(), stream)
+                    self._take_file(file)
         elif self.source.suffix == ZIPPED:
             with zipfile.ZipFile(self.source) as archive:
                 for name in archive.namelist():
@@ -106,6 +108,15 @@ class _Search:
         else:
             with self.source.open("rb") as stream, self._open(stream, "") as tar:
                 self._read_tar(tar, "")
+
+    def _take_file(self, file: Path) -> None:
+        """Takes a file of the folder; one that cannot be read is left out."""
+        path = file.relative_to(self.source).as_posix()
+        try:
+            with file.open("rb") as stream:
+                self._take("", path, stream)
+        except OSError as error:
+            self.left_out.append(f"{path}: it cannot be read: {error.strerror}")
 
     def join_layers(self) -> dict[PurePosixPath, bytes]:
         """Returns the contents by path, of an image with upper layers over lower ones."""

@@ -20,6 +20,7 @@ from skidpad.campaign.takeover.desk import Desk, Recorded
 from skidpad.campaign.workers.pool import local
 from skidpad.cockpit.bridge import ASLEEP_AFTER
 from skidpad.cockpit.hud import TIERS
+from skidpad.cockpit.replay import RecordedRun
 from skidpad.core.inputs import Functions, Lamps, Method, Pedals, Sky, Timed, Wheel
 from skidpad.core.run import Function
 from skidpad.core.vocabulary import GripModel, RangeModel
@@ -52,6 +53,12 @@ FINGER = """([name, type, x, y]) => { const pad = document.querySelector(`[data-
     const box = pad.getBoundingClientRect(); pad.setPointerCapture = () => {};
     pad.dispatchEvent(new PointerEvent(type, { bubbles: true, cancelable: true, pointerId: 7,
     clientX: box.left + x * box.width, clientY: box.top + y * box.height })); }"""
+INKS = """c => { const d = c.getContext('2d').getImageData(0, 90, c.width, c.height - 90).data, found = {};
+    const has = (r, g, b) => { for (let i = 0; i < d.length; i += 4)
+        if (i % (4 * c.width) > 1000  // right of the name
+            && Math.abs(d[i] - r) + Math.abs(d[i + 1] - g) + Math.abs(d[i + 2] - b) < 20) return true;
+        return false; };
+    return { gap: has(0x4f, 0xce, 0x7f), grip: has(0xf2, 0xb4, 0x41) }; }"""
 PAUSED = "() => document.querySelector('.cockpit').dataset.paused === 'true'"
 FACT = """name => [...document.querySelectorAll('.cockpit dt')]
     .find(dt => dt.textContent === name)?.nextElementSibling.textContent"""
@@ -236,6 +243,10 @@ def test_a_run_is_scrubbed_through_in_a_browser(browser, stored, tmp_path):
         until(page, PAUSED)
         line = page.locator(".line canvas")
         line.scroll_into_view_if_needed()
+        # under the time line: the gap, where one is in the way, and the grip of the tyres, as logged
+        kept = page.evaluate(f"({INKS})(document.querySelector('.line canvas'))")
+        assert kept["gap"] == any(v is not None for v in RecordedRun(stored).curves().gap)
+        assert kept["grip"]
         box = line.bounding_box()
         page.mouse.click(box["x"] + 0.25 * box["width"], box["y"] + 20)
         until_fact(page, "time", "1.50 s")

@@ -17,7 +17,7 @@ from skidpad.cockpit.again import drive_again, list_changes
 from skidpad.cockpit.channel_source import ChannelSource
 from skidpad.cockpit.companion import Companion
 from skidpad.cockpit.feed import Feed
-from skidpad.cockpit.indicators import every, least_of, ttc_ahead
+from skidpad.cockpit.indicators import NEAR, every, least_of, measure_ahead
 from skidpad.cockpit.opening import open_source
 from skidpad.cockpit.replay import RecordedRun
 from skidpad.cockpit.replaying import Replayer
@@ -110,6 +110,10 @@ def test_a_recording_of_channels_is_shown_moment_by_moment(tmp_path):
     assert line["speed"] == pytest.approx([72.0] * MOMENTS)
     # the truck ahead is as fast; the walker stands 40 m ahead and comes 2 m nearer every 0.1 s
     assert line["ttc"][-1] == pytest.approx((40.0 - 22.0 - 2.25 - 0.45) / 20.0, abs=0.1)
+    # the walker is the nearer one at last, the truck (25 m, 1.2 * 4.5 m long) at first
+    assert line["gap"][-1] == pytest.approx(40.0 - 22.0 - 2.25 - 0.45, abs=0.3)
+    assert line["gap"][0] == pytest.approx(25.0 - 2.25 - 2.7, abs=0.3)
+    assert line["grip"] == pytest.approx([0.7] * MOMENTS)
 
 
 def test_what_a_monitor_found_stands_on_the_time_line(tmp_path):
@@ -148,17 +152,21 @@ def test_the_time_line_shows_how_near_a_crash_it_was():
     others = [straight(44.0, 0.5, 0.0), straight(34.0, 3.0, 0.0), straight(-24.0, 0.0, 40.0)]
     present = np.ones((2, 4), dtype=np.bool_)
     # 40 m from bumper to bumper, then 20 m; nobody beside or behind counts
-    assert ttc_ahead([ego, *others], present) == pytest.approx([2.0, 1.0])
+    ahead = measure_ahead([ego, *others], present)
+    assert ahead.ttc == pytest.approx([2.0, 1.0])
+    assert ahead.gap == pytest.approx([40.0, 20.0])
     present[1, 1] = False
-    assert ttc_ahead([ego, *others], present) == pytest.approx([2.0, np.inf])
-    assert ttc_ahead([ego], present[:, :1]) == pytest.approx([np.inf, np.inf])
+    ahead = measure_ahead([ego, *others], present)
+    assert ahead.ttc == pytest.approx([2.0, np.inf])
+    assert ahead.gap == pytest.approx([40.0, np.inf])
+    assert measure_ahead([ego], present[:, :1]).ttc == pytest.approx([np.inf, np.inf])
     # a short dip is shown, however long the run was
     long = np.full(3500, np.inf)
     long[1234] = 0.72
-    shown = least_of(long)
+    shown = least_of(long, NEAR)
     assert len(shown) == len(long[every(len(long))])
     assert [v for v in shown if v is not None] == [0.7]
-    assert least_of(long[:0]) == []
+    assert least_of(long[:0], NEAR) == []
 
 
 def test_without_the_truth_the_first_channel_is_shown(tmp_path):

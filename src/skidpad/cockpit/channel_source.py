@@ -16,7 +16,8 @@ import polars as pl
 from skidpad.campaign.driving.loop import Moment
 from skidpad.campaign.runs.stored import read_segment
 from skidpad.campaign.user_files import with_kept_map
-from skidpad.cockpit.indicators import every, least_of, ttc_ahead
+from skidpad.cockpit.hud import round_value
+from skidpad.cockpit.indicators import FAR, NEAR, every, least_of, measure_ahead
 from skidpad.cockpit.marks import RADAR_MOUNT
 from skidpad.cockpit.source import Curves, Said, Seat, Source
 from skidpad.core.arrays import Floats
@@ -146,7 +147,7 @@ class ChannelSource(Source):
         return self._seat
 
     def curves(self) -> Curves:
-        """Returns speed, time to collision and what the monitor found along the time; tiers are None."""
+        """Returns speed, gap, grip and what the monitor found along the time; tiers are None."""
         part = every(self.ticks)
         v = np.hypot(self._state[part, 0, 3], self._state[part, 0, 4])
         none = np.zeros(self.ticks)
@@ -155,8 +156,11 @@ class ChannelSource(Source):
         for i, (length, width) in enumerate(sizes):
             x, y, yaw, vx, vy = self._state[:, i].T
             bodies.append(Body(x, y, yaw, vx, vy, none, none, length, width))
-        ttc = least_of(ttc_ahead(bodies, self._present))
-        return Curves(np.round(v * 3.6, 1).tolist(), [None] * len(v), ttc, *self._judged[::-1])
+        ahead = measure_ahead(bodies, self._present)
+        near = least_of(ahead.ttc, NEAR), least_of(ahead.gap, FAR)
+        grip = [round_value(world.mu) for world in self.worlds[part]]
+        speed = np.round(v * 3.6, 1).tolist()
+        return Curves(speed, [None] * len(v), *near, grip, *self._judged[::-1])
 
     def moment(self, k: int) -> Moment:
         """Returns moment k, 0 <= k < ticks; radar points are what the driving channel reports of others."""

@@ -59,8 +59,8 @@ export default {
       <g v-for="(w, i) in wheels" :key="i"><rect :ref="'w' + i" :x="w[0]" :y="w[1]" width="11" height="20" rx="3"/>
       <text :ref="'m' + i" :x="w[0] + 5.5" :y="w[1] + 29"></text></g></svg><small>friction</small></div>
     <ul ref="events" class="events"></ul></div>
-  <div class="strips"><canvas ref="strip" width="900" height="120"></canvas></div>
-  <div class="line" v-if="timeline"><canvas ref="line" width="1200" height="70" @pointerdown="seek"
+  <div class="strips"><canvas ref="strip"></canvas></div>
+  <div class="line" v-if="timeline"><canvas ref="line" @pointerdown="seek"
     @pointermove="$event.buttons && seek($event)"></canvas></div>
 </div>`,
   data: () => ({ helpShown: false, touchpads: ["steer", "brake", "throttle"], wheels: [[4, 10], [45, 10], [4, 48], [45, 48]], ...layout() }),
@@ -197,35 +197,46 @@ export default {
       const H = this.history; if (H.length && (h.t < H[H.length - 1][0] || h.t - H[H.length - 1][0] > 5)) H.length = 0;
       const envelope = (name) => ((h.added || []).find(([k]) => k.startsWith("Speed envelope") && k.endsWith(`, ${name}`)) || [])[1];
       const limit = envelope("speed mps") === undefined ? null : 3.6 * envelope("speed mps"), by = envelope("binding");
-      H.push([h.t, h.motion.speed_kmh, h.stack.distance, limit]); while (H.length && h.t - H[0][0] > STRIP_SECONDS) H.shift();
-      const c = this.$refs.strip, g = c.getContext("2d"), w = c.width, half = c.height / 2;
-      g.clearRect(0, 0, w, c.height); g.font = "12px sans-serif";
-      const curve = (i, most, top, ink, name) => { g.strokeStyle = "#303944"; g.strokeRect(0.5, top + 0.5, w - 1, half - 4);
+      H.push([h.t, h.motion.speed_kmh, h.stack.distance, limit, h.motion.grip]); while (H.length && h.t - H[0][0] > STRIP_SECONDS) H.shift();
+      const [g, w, high] = this.fit(this.$refs.strip), part = high / 3; g.font = "12px sans-serif";
+      const curve = (i, most, row, ink, name) => { const top = row * part; g.strokeStyle = "#303944"; g.strokeRect(0.5, top + 0.5, w - 1, part - 4);
         g.strokeStyle = ink; g.lineWidth = 1.6; g.beginPath(); let pen = false;
-        for (const row of H) { const v = row[i]; if (v === null) { pen = false; continue; }
-          const x = w - (h.t - row[0]) / STRIP_SECONDS * w, y = top + (half - 6) * (1 - Math.min(v / most, 1)) + 1;
+        for (const one of H) { const v = one[i]; if (v === null) { pen = false; continue; }
+          const x = w - (h.t - one[0]) / STRIP_SECONDS * w, y = top + (part - 6) * (1 - Math.min(v / most, 1)) + 1;
           if (pen) g.lineTo(x, y); else g.moveTo(x, y); pen = true; }
         g.stroke(); g.lineWidth = 1; g.fillStyle = ink; g.fillText(name, 6, top + 14); };
       if (limit !== null) curve(3, 160, 0, "#ff8552", ""), g.fillText(`envelope: ${Math.round(limit)} km/h${by && by !== "none" ? `, ${by}` : ""}`, w - 190, 14);
-      curve(1, 160, 0, "#4d9dff", "speed, 0 to 160 km/h"); curve(2, 80, half, "#4fce7f", "distance, 0 to 80 m");
+      curve(1, 160, 0, "#4d9dff", "speed, 0 to 160 km/h"); curve(2, 80, 1, "#4fce7f", "distance, 0 to 80 m"); curve(4, 1, 2, "#f2b441", "grip, 0 to 1");
+    },
+    fit(c) {  // as many pixels as the screen has for it; drawn in pixels of the page
+      const k = window.devicePixelRatio || 1, w = c.clientWidth, high = c.clientHeight;
+      if (c.width !== Math.round(w * k) || c.height !== Math.round(high * k)) { c.width = Math.round(w * k); c.height = Math.round(high * k); }
+      const g = c.getContext("2d"); g.setTransform(k, 0, 0, k, 0, 0); g.clearRect(0, 0, w, high); return [g, w, high];
     },
     line(h) {
-      const c = this.$refs.line, g = c.getContext("2d"), T = this.timeline, n = Math.max(T.last - T.first, 1);
-      const x = (tick) => (tick - T.first) / n * c.width; g.clearRect(0, 0, c.width, c.height);
-      g.fillStyle = "#1d232b"; g.fillRect(0, 0, c.width, c.height); g.strokeStyle = "#4d9dff"; g.beginPath();
-      const most = Math.max(...T.speed, 1); T.speed.forEach((v, i) => g.lineTo(i / Math.max(T.speed.length - 1, 1) * c.width, 48 - 40 * v / most)); g.stroke();
-      g.fillStyle = "#ff8552"; const wide = c.width / T.ttc.length + 1;
-      T.ttc.forEach((v, i) => { if (v === null || v >= T.near) return; const high = 48 * (1 - v / T.near); g.fillRect(i / T.ttc.length * c.width, 50 - high, wide, high); });
-      T.tier.forEach((v, i) => { if (v === null) return; g.fillStyle = `hsl(${v * 27}, 60%, 50%)`; g.fillRect(i / T.tier.length * c.width, 52, c.width / T.tier.length + 1, 6); });
+      const [g, w, high] = this.fit(this.$refs.line), T = this.timeline, n = Math.max(T.last - T.first, 1);
+      const x = (tick) => (tick - T.first) / n * w, at = (i, all) => i / Math.max(all.length - 1, 1) * w;
+      g.fillStyle = "#1d232b"; g.fillRect(0, 0, w, high); g.font = "11px sans-serif";
+      const curve = (values, most, top, bottom, ink) => {  // gaps where there is no value
+        g.strokeStyle = ink; g.beginPath(); let pen = false;
+        values.forEach((v, i) => { if (v === null) { pen = false; return; } const y = bottom - (bottom - top) * Math.min(v / most, 1);
+          if (pen) g.lineTo(at(i, values), y); else g.moveTo(at(i, values), y); pen = true; }); g.stroke(); };
+      const most = Math.max(...T.speed, 1); curve(T.speed, most, 8, 48, "#4d9dff");
+      g.fillStyle = "#ff8552"; const wide = w / T.ttc.length + 1;
+      T.ttc.forEach((v, i) => { if (v === null || v >= T.near) return; const bar = 48 * (1 - v / T.near); g.fillRect(i / T.ttc.length * w, 50 - bar, wide, bar); });
+      T.tier.forEach((v, i) => { if (v === null) return; g.fillStyle = `hsl(${v * 27}, 60%, 50%)`; g.fillRect(i / T.tier.length * w, 52, w / T.tier.length + 1, 6); });
       const inks = { crash: "#ff5b52", "put back": "#f2b441", marking: "#b58cff", notice: "#9aa5b1", hazard: "#ff4fa3" };
       for (const [first, last] of T.hazards) { g.fillStyle = inks.hazard; g.fillRect(x(first), 0, Math.max(x(last) - x(first), 3), 5); }
       const worst = Math.max(...T.violated, 1);
-      T.violated.forEach((v, i) => { if (v) { g.fillStyle = `rgba(255, 79, 163, ${0.25 + 0.75 * v / worst})`; g.fillRect(i / T.violated.length * c.width, 52, c.width / T.violated.length + 1, 6); } });
+      T.violated.forEach((v, i) => { if (v) { g.fillStyle = `rgba(255, 79, 163, ${0.25 + 0.75 * v / worst})`; g.fillRect(i / T.violated.length * w, 52, w / T.violated.length + 1, 6); } });
       for (const [tick, kind] of T.events) { g.fillStyle = inks[kind] || "#fff"; g.fillRect(x(tick) - 1.5, kind === "crash" ? 0 : 30, 3, kind === "crash" ? 62 : 22); }
-      g.fillStyle = "#fff"; g.fillRect(x(h.tick) - 1, 0, 2, c.height);
-      g.font = "11px sans-serif"; g.fillStyle = "#4d9dff"; g.fillText(`speed, 0 to ${Math.round(most)} km/h`, 6, 68);
-      g.fillStyle = "#ff8552"; g.fillText(`time to collision, below ${T.near} s`, 150, 68);
-      if (T.violated.length || T.hazards.length) { g.fillStyle = inks.hazard; g.fillText(`hazards above, below indicators beyond their bounds, up to ${Math.max(...T.violated, 0)}`, 340, 68); }
+      g.fillStyle = "#4d9dff"; g.fillText(`speed, 0 to ${Math.round(most)} km/h`, 6, 70);
+      g.fillStyle = "#ff8552"; g.fillText(`time to collision, below ${T.near} s`, 150, 70);
+      if (T.violated.length || T.hazards.length) { g.fillStyle = inks.hazard; g.textAlign = "right"; g.fillText(`hazards above, indicators beyond bounds below, up to ${Math.max(...T.violated, 0)}`, w - 6, 14); g.textAlign = "left"; }
+      const rows = [[T.gap, T.far, "#4fce7f", `gap to what is ahead, 0 to ${T.far} m`], [T.grip, 1, "#f2b441", "grip of the tyres, 0 to 1"]];
+      rows.forEach(([values, top, ink, name], i) => { const y = 76 + 42 * i; g.strokeStyle = "#303944"; g.strokeRect(0.5, y + 0.5, w - 1, 39);
+        curve(values, top, y + 2, y + 38, ink); g.fillStyle = ink; g.fillText(name, 6, y + 13); });
+      g.fillStyle = "#fff"; g.fillRect(x(h.tick) - 1, 0, 2, high);
     },
     seek(e) {
       const box = e.target.getBoundingClientRect(), T = this.timeline;

@@ -20,7 +20,8 @@ from skidpad.campaign.driving.loop import Moment
 from skidpad.campaign.runs.road import load_road
 from skidpad.campaign.runs.stored import read_run
 from skidpad.campaign.takeover.desk import beam_of
-from skidpad.cockpit.indicators import every, least_of, ttc_ahead
+from skidpad.cockpit.hud import mean_grip, round_value
+from skidpad.cockpit.indicators import FAR, NEAR, every, least_of, measure_ahead
 from skidpad.cockpit.source import Curves, Said, Seat, index_at
 from skidpad.core.arrays import Floats
 from skidpad.core.errors import FileError
@@ -199,12 +200,15 @@ class RecordedRun:
         return None
 
     def curves(self) -> Curves:
-        """Returns speed, tier and time to collision along the time, of about CURVE moments."""
+        """Returns speed, tier, time to collision, gap and grip along the time, of about CURVE moments."""
         log, part = self.log, every(len(self.log))
         tiers = [None if isnan(v) else int(v) for v in log.report.tier[part].tolist()]
         bodies = [body(log, i) for i in range(len(log.table))]
-        ttc = ttc_ahead(bodies, np.column_stack([together(log, 0, i) for i in range(len(bodies))]))
-        return Curves(np.round(log.v_ego[part] * 3.6, 1).tolist(), tiers, least_of(ttc))
+        there = np.column_stack([together(log, 0, i) for i in range(len(bodies))])
+        ahead = measure_ahead(bodies, there)
+        grip = [round_value(mean_grip(mu)) for mu in log.mu[part, 0]]
+        speed = np.round(log.v_ego[part] * 3.6, 1).tolist()
+        return Curves(speed, tiers, least_of(ahead.ttc, NEAR), least_of(ahead.gap, FAR), grip)
 
 
 def told_of(event: Any) -> tuple[str, str] | None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from skidpad.campaign.driving.loop import Moment
-from skidpad.cockpit.indicators import NEAR
+from skidpad.cockpit.indicators import FAR, NEAR
 from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import LampSwitch, Outside
@@ -51,6 +51,8 @@ class Curves(NamedTuple):
     speed: list[float]  # km/h
     tier: list[int | None]  # that acted
     ttc: list[float | None]  # s, the least up to the next one, to what is in the ego's way
+    gap: list[float | None]  # m, bumper to bumper, the least up to the next one, to the same
+    grip: list[float | None]  # mean friction of the ego's tyres; None: not recorded
     violated: Sequence[int] = ()  # indicators of a monitor beyond their bounds; (): none looked on
     hazards: Sequence[
         tuple[int, int, str]
@@ -140,13 +142,14 @@ def _speed_before(source: Source, tick: int) -> float:
 
 
 def timeline(source: Source) -> dict[str, Any]:
-    """Returns what the page draws along the time: speed, time to collision, events, tiers, hazards."""
+    """Returns what the page draws along the time: speed, gap, grip, time to collision, events, tiers."""
     return {
         "first": source.tick(0),
         "last": source.tick(source.ticks - 1),
         "step": source.step,
         "dt": DT,
         "near": NEAR,
+        "far": FAR,
         **source.curves()._asdict(),
         "events": source.marks,
     }

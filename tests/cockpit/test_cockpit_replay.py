@@ -1,5 +1,6 @@
 """A stored run as moments again, as films, and the sentences for folders that are none."""
 
+import json
 import re
 import shutil
 from dataclasses import replace
@@ -306,6 +307,20 @@ def test_a_drive_by_hand_is_scored_and_compared(driven):
     assert "judges campaigns" in str(judged.exception)
 
 
+def test_the_worst_crash_of_a_campaign_is_the_one_at_the_highest_closing_speed(tmp_path):
+    def driven(k, crashes, impact):
+        metrics = {"fatal_collisions": crashes, "max_impact_kmh": impact}
+        line = {"run": f"2_clear-noon-00{k}", "key": {"outcome": "completed"}, "metrics": metrics}
+        return json.dumps(line) + "\n"
+
+    lines_of = [driven(1, 0, None), driven(2, 1, 55.0), driven(3, 1, 20.0), driven(4, 1, None)]
+    (tmp_path / "ledger.jsonl").write_text("".join(lines_of))
+    assert standing(tmp_path).worst_crash == "2_clear-noon-002"
+    # where no speed is known it is the newest one
+    (tmp_path / "ledger.jsonl").write_text(driven(2, 1, None) + driven(3, 1, None))
+    assert standing(tmp_path).worst_crash == "2_clear-noon-003"
+
+
 def test_how_a_campaign_stands(tmp_path):
     cells = [adas_run(2, "clear-noon", duration=1.0, seed=s, vehicles=2) for s in (1, 2)]
     Campaign(RECIPE, cells).run(tmp_path, local(1))
@@ -315,7 +330,7 @@ def test_how_a_campaign_stands(tmp_path):
         "adas: 2 of 2 runs done",
         "2 completed",
         "2_clear-noon: 2 of 2 without a crash, 95 % 0.16 to 1.00",
-        "last crash: none",
+        "worst crash: none",
     ]
     done = CliRunner().invoke(app, ["watch", str(tmp_path), "--once"])
     assert done.output.splitlines() == lines(now)
@@ -325,5 +340,5 @@ def test_how_a_campaign_stands(tmp_path):
     first = first.replace('"fatal_collisions":0', '"fatal_collisions":1')
     ledger.write_text(text + first.replace("-001", "-003") + "\n" + '{"torn')
     now = standing(tmp_path)
-    assert (now.done, now.last_crash) == (3, "2_clear-noon-003")
+    assert (now.done, now.worst_crash) == (3, "2_clear-noon-003")
     assert (tmp_path / RUNS).is_dir()

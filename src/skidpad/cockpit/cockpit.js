@@ -235,7 +235,8 @@ export default {
       if (T.violated.length || T.hazards.length) { g.fillStyle = inks.hazard; g.textAlign = "right"; g.fillText(`hazards above, indicators beyond bounds below, up to ${Math.max(...T.violated, 0)}`, w - 6, 14); g.textAlign = "left"; }
       const rows = [[T.gap, T.far, "#4fce7f", `gap to what is ahead, 0 to ${T.far} m`], [T.grip, 1, "#f2b441", "grip of the tyres, 0 to 1"]];
       rows.forEach(([values, top, ink, name], i) => { const y = 76 + 42 * i; g.strokeStyle = "#303944"; g.strokeRect(0.5, y + 0.5, w - 1, 39);
-        curve(values, top, y + 2, y + 38, ink); g.fillStyle = ink; g.fillText(name, 6, y + 13); });
+        curve(values, top, y + 2, y + 38, ink);
+        g.fillStyle = "#1d232bd0"; g.fillRect(3, y + 3, g.measureText(name).width + 6, 14); g.fillStyle = ink; g.fillText(name, 6, y + 13); });
       g.fillStyle = "#fff"; g.fillRect(x(h.tick) - 1, 0, 2, high);
     },
     seek(e) {

@@ -32,6 +32,7 @@ FATAL = (
     "collisions",
     "contacts",
 )  # columns that count crashes, first one there
+IMPACTS = ("max_impact_kmh", "impact_kmh")  # columns with the closing speed at a contact
 LEFT_OUT = (Outcome.CRASHED.value, Outcome.TIMEOUT.value, Outcome.AGENT_ERROR.value)
 
 
@@ -70,7 +71,7 @@ class Standing:
     planned: int | None  # None: the campaign does not say
     outcomes: dict[str, int]
     cells: tuple[Cell, ...]
-    last_crash: str  # name of the run; "": none yet
+    worst_crash: str  # name of the run with the hardest one; "": none yet
     picture: Path | None = None  # of that crash, if one was taken
 
 
@@ -85,16 +86,16 @@ def standing(folder: Path) -> Standing:
     cells: dict[str, list[bool]] = {}
     for one in counted:
         cells.setdefault(cell_of(one.run), []).append(not has_crashed(one))
-    crashes = [one.run for one in in_order if has_crashed(one)]
-    last = crashes[-1] if crashes else ""
-    run = inside(folder / RUNS, last) if last else None
+    crashed = [one for one in in_order if has_crashed(one)]
+    worst = max(reversed(crashed), key=impact_of).run if crashed else ""
+    run = inside(folder / RUNS, worst) if worst else None
     return Standing(
         command=str(identity.get("command", "adas")),
         done=len(lines),
         planned=identity.get("runs"),
         outcomes=dict(sorted(Counter(one.key.outcome for one in lines).items())),
         cells=tuple(_cell(name, good) for name, good in sorted(cells.items())),
-        last_crash=last,
+        worst_crash=worst,
         picture=None if run is None else last_snapshot(run),
     )
 
@@ -106,6 +107,12 @@ def has_crashed(line: Line) -> bool:
     metrics = line.metrics or {}
     counts = [metrics[name] for name in FATAL if metrics.get(name) is not None]
     return bool(counts) and counts[0] > 0
+
+
+def impact_of(line: Line) -> float:
+    """Returns the largest closing speed in km/h at a contact of a run; -1 where it is not known."""
+    metrics = line.metrics or {}
+    return max((metrics[name] for name in IMPACTS if metrics.get(name) is not None), default=-1.0)
 
 
 def _cell(name: str, good: list[bool]) -> Cell:
@@ -123,7 +130,7 @@ def lines(now: Standing) -> list[str]:
         f"{c.name}: {c.good} of {c.runs} {GOOD}, 95 % {c.low:.2f} to {c.high:.2f}"
         for c in now.cells
     ]
-    told.append(f"last crash: {now.last_crash or 'none'}")
+    told.append(f"worst crash: {now.worst_crash or 'none'}")
     return told
 
 
@@ -159,7 +166,9 @@ def build(folder: Path) -> Callable[[], None]:
             head = lines(now)
             said.text = f"{head[0]}; {head[1]}"
             crash.text = head[-1] + (
-                f"  (skidpad replay {folder / 'runs' / now.last_crash})" if now.last_crash else ""
+                f"  (skidpad replay {folder / RUNS / now.worst_crash} begins before it)"
+                if now.worst_crash
+                else ""
             )
             if now.picture != shown[0]:
                 picture.set_source("" if now.picture is None else as_address(now.picture))

@@ -269,7 +269,7 @@ def watch(
     pages: Pages,
     once: Annotated[bool, typer.Option("--once", help="Print how it stands and end.")] = False,
 ) -> None:
-    """Watch a campaign while it runs: progress, results so far with intervals, the last crash."""
+    """Watch a campaign while it runs: progress, results so far with intervals, the worst crash."""
     if not folder.is_dir():
         raise FileError(f"{folder} is not the folder of a campaign")
     from skidpad.cockpit.watching import lines, serve_watch, standing

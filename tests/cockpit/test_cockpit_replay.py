@@ -308,16 +308,21 @@ def test_a_drive_by_hand_is_scored_and_compared(driven):
 
 
 def test_the_worst_crash_of_a_campaign_is_the_one_at_the_highest_closing_speed(tmp_path):
-    def driven(k, crashes, impact):
+    def write_line(k, crashes, impact):
         metrics = {"fatal_collisions": crashes, "max_impact_kmh": impact}
         line = {"run": f"2_clear-noon-00{k}", "key": {"outcome": "completed"}, "metrics": metrics}
         return json.dumps(line) + "\n"
 
-    lines_of = [driven(1, 0, None), driven(2, 1, 55.0), driven(3, 1, 20.0), driven(4, 1, None)]
+    lines_of = [
+        write_line(1, 0, None),
+        write_line(2, 1, 55.0),
+        write_line(3, 1, 20.0),
+        write_line(4, 1, None),
+    ]
     (tmp_path / "ledger.jsonl").write_text("".join(lines_of))
     assert standing(tmp_path).worst_crash == "2_clear-noon-002"
     # where no speed is known it is the newest one
-    (tmp_path / "ledger.jsonl").write_text(driven(2, 1, None) + driven(3, 1, None))
+    (tmp_path / "ledger.jsonl").write_text(write_line(2, 1, None) + write_line(3, 1, None))
     assert standing(tmp_path).worst_crash == "2_clear-noon-003"
 
 

@@ -93,7 +93,7 @@ def _functions(matrix: Matrix) -> Answer:
     if without:
         first = without[0]
     elif several and not is_sure:  # a name beside "too few to rank" would read as a rank
-        first = _spread(judged)
+        first = _range_sentence(judged)
     else:
         first = f"Of the configurations, fewest {EVENTS}: {'; '.join(parts)}."
     sentence = f"{first}{_beside_reference(rates, judged)}"
@@ -145,7 +145,7 @@ def _fewest(group: WeatherGroup, rates: dict[str, Rate], least: float) -> str:
     return f"in {group.name} {named} with {least:.2f} per run"
 
 
-def _spread(judged: dict[WeatherGroup, dict[str, Rate]]) -> str:
+def _range_sentence(judged: dict[WeatherGroup, dict[str, Rate]]) -> str:
     """Returns a sentence with the least and the largest rate in each weather, without a name."""
     told = []
     for group, rates in judged.items():

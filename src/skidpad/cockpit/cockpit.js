@@ -218,9 +218,9 @@ export default {
       const x = (tick) => (tick - T.first) / n * w, at = (i, all) => i / Math.max(all.length - 1, 1) * w;
       g.fillStyle = "#1d232b"; g.fillRect(0, 0, w, high); g.font = "11px sans-serif";
       const curve = (values, most, top, bottom, ink) => {  // gaps where there is no value
-        g.strokeStyle = ink; g.beginPath(); let pen = false;
+        g.strokeStyle = ink; g.lineWidth = 2; g.beginPath(); let pen = false;
         values.forEach((v, i) => { if (v === null) { pen = false; return; } const y = bottom - (bottom - top) * Math.min(v / most, 1);
-          if (pen) g.lineTo(at(i, values), y); else g.moveTo(at(i, values), y); pen = true; }); g.stroke(); };
+          if (pen) g.lineTo(at(i, values), y); else g.moveTo(at(i, values), y); pen = true; }); g.stroke(); g.lineWidth = 1; };
       const most = Math.max(...T.speed, 1); curve(T.speed, most, 8, 48, "#4d9dff");
       g.fillStyle = "#ff8552"; const wide = w / T.ttc.length + 1;
       T.ttc.forEach((v, i) => { if (v === null || v >= T.near) return; const bar = 48 * (1 - v / T.near); g.fillRect(i / T.ttc.length * w, 50 - bar, wide, bar); });

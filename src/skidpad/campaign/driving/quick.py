@@ -9,7 +9,7 @@ stepper then drives that tick. `find_parts` says which runs have no quick way.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from math import inf
 from typing import Any, NamedTuple
 
@@ -68,6 +68,34 @@ ANOTHER_SIMULATOR = "another simulator drives"
 # of the types that kernels of the envelope take
 STILL = Motion(*(0.0,) * 9, (0.0,) * 4)
 NOTHING_TOLD = Told(0.0, 0, *(0.0,) * 5, 0, 0.0, False)
+
+Returned = tuple[int, int, int, int, float, float, float, bool, int, float, float, int]
+
+
+class Call(NamedTuple):
+    """A call of `drive_ticks`; whatever makes it hands back what that gives."""
+
+    joined: Held[Joined]
+    begun: bool
+    tick: int
+    n: int
+    at: int  # first row in the log
+    grace: int
+    standing: int
+    last: Request
+
+
+Calls = Generator[Call, Returned, int]  # ends with the ticks that were driven
+
+
+def make_calls(calls: Calls) -> int:
+    """Makes all calls in this process and returns how many ticks were driven."""
+    try:
+        call = next(calls)
+        while True:
+            call = calls.send(drive_ticks(*call[:-1], *call.last))
+    except StopIteration as end:
+        return int(end.value)
 
 
 class QuickParts(NamedTuple):
@@ -161,10 +189,10 @@ class QuickDrive:
         self._joined_by: Rules | None = None
         self._joined_of: tuple[object, ...] = ()
 
-    def drive(self, most: int) -> int:
-        """Drives up to `most` ticks and returns how many; the stepper drives the one after them.
+    def drive(self, most: int) -> Calls:
+        """Asks for calls that drive up to `most` ticks; the stepper drives the one after them.
 
-        0 where the next tick is the stepper's.
+        Ends with how many were driven, 0 where the next tick is the stepper's.
         """
         # anew, as surroundings, functions and random streams may be others since the last call
         found = find_parts(self.stepper, self.changes)
@@ -179,7 +207,7 @@ class QuickDrive:
         if timer is None:
             driven = self._step_world(most, last)
         elif not timer.ended:
-            driven = self._drive_alone(min(most, timer.left), last)
+            driven = yield from self._drive_alone(min(most, timer.left), last)
         if driven:
             self.stepper.truth = found.backend.truth()
         elif not self.stepper.script.ended:
@@ -207,7 +235,8 @@ class QuickDrive:
             if not (silent and world.is_quiet and world.lights.by_id is shown):
                 stepper.next_frame = inner.read_frame()
                 break
-            stop = self._call(joined, arrays.at + driven, last, True, 1)
+            call = self._describe(joined, arrays.at + driven, last, True, 1)
+            stop = self._note(call, drive_ticks(*call[:-1], *last))
             if stop.why == UNUSUAL:
                 stepper.next_frame = inner.read_frame()
                 break
@@ -231,14 +260,15 @@ class QuickDrive:
         backend, changes = self.parts.changed
         return not backend.make_step(command, words) and changes.is_silent
 
-    def _drive_alone(self, n: int, last: Request) -> int:
+    def _drive_alone(self, n: int, last: Request) -> Calls:
         """Drives up to n ticks of a run whose world steps in the kernel, too."""
         stepper, world = self.stepper, self.parts.world
         arrays, lights, driven, begun = self.log.reserve(n), world.lights, 0, False
         while driven < n:
             shown = lights.by_id
             joined = self._join(arrays)
-            stop = self._call(joined, arrays.at + driven, last, begun, n - driven)
+            call = self._describe(joined, arrays.at + driven, last, begun, n - driven)
+            stop = self._note(call, (yield call))
             last, driven = stop.request, driven + stop.ticks
             if stop.why in (MOVED, STEPPED):
                 world.finish_step(stop.touches, stop.crossed, settled=stop.why == STEPPED)
@@ -275,8 +305,8 @@ class QuickDrive:
         c = action.command
         return Request(c.throttle, c.brake, c.steer, c.handbrake)
 
-    def _call(self, joined: Held[Joined], at: int, last: Request, begun: bool, n: int) -> Stop:
-        """Drives up to n ticks and notes those that are whole.
+    def _describe(self, joined: Held[Joined], at: int, last: Request, begun: bool, n: int) -> Call:
+        """Returns the call that drives up to n ticks.
 
         at: their first row in the log. begun: the world has made the step of the first one already.
         """
@@ -285,10 +315,14 @@ class QuickDrive:
         way = self.parts.way
         if way is not None:
             self._reached[0] = way.journey.reached
-        found = drive_ticks(joined, begun, world.tick, n, at, grace, stood, *last)
+        return Call(joined, begun, world.tick, n, at, grace, stood, last)
+
+    def _note(self, call: Call, found: Returned) -> Stop:
+        """Notes the ticks of a call that are whole."""
+        world, supervisor, way = self.parts.world, self.parts.supervisor, self.parts.way
         ticks, why, touches, crossed, throttle, brake, steer, handbrake = found[:8]
         lane, s, offset, standing = found[8:]
-        steps = ticks + (why in (UNUSUAL, REFUSED)) - begun
+        steps = ticks + (why in (UNUSUAL, REFUSED)) - call.begun
         if steps:
             world.pass_ticks(steps)
             world.lights.set_clocks(self._clocks.elapsed)

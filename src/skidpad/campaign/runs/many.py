@@ -18,7 +18,7 @@ from skidpad.stack.interface import Stack, VectorStack
 
 T = TypeVar("T")
 Described = RunSpec | Mapping[str, Any]
-CPU = "cpu"
+CPU, CUDA = "cpu", "cuda"
 DEFAULTS = {name: value for name, value in (drive.__kwdefaults__ or {}).items() if name != "out"}
 
 
@@ -52,7 +52,9 @@ def drive_many(
         runs: run values, as `skidpad.Scenario(...).spec` is one, or mappings of what `skidpad.drive` takes.
             Runs whose `stack` is the same `VectorStack`, an object, are driven by it together.
         workers: processes; 1 drives in this one.
-        device: "cpu". There is no other one yet.
+        device: "cpu", or "cuda" for a graphics card (extra `gpu`). Runs that have a quick way are then driven
+            on the card together, all others on the CPU. On a card the first ticks are those of the CPU to
+            1e-9; content hashes are not those of the CPU.
         judge: is called with each run where it was driven, and its value stands in the list in place of
             the run. With workers it is a function of a module. Logs are not kept then.
 
@@ -67,14 +69,16 @@ def drive_many(
         >>> runs = drive_many([{"stack": 2, "seed": s, "sensors": "objects"} for s in range(1, 9)])
         >>> [len(run.log.contacts) for run in runs]
     """
-    if device != CPU:
-        raise ConfigError(
-            f"device must be 'cpu', got {device!r}: runs are not driven on a graphics card"
-        )
+    if device not in (CPU, CUDA):
+        raise ConfigError(f"device must be 'cpu' or 'cuda', got {device!r}")
     if workers < 1:
         raise ConfigError(f"workers must be at least 1, got {workers}")
     vectors = [_vector_of(one) for one in runs]
     described = [_describe(one) for one in runs]
+    if device == CUDA:
+        if any(vector is not None for vector in vectors):
+            raise ConfigError("a stack that drives several runs together needs device='cpu'")
+        return _drive_on_card(described, judge, workers)
     drive_one = partial(_drive_one, judge)
     if workers == 1:
         with share_setups():
@@ -92,6 +96,34 @@ def drive_many(
             raise BackendError(f"run {k} ({specs[k].name}): {last_line(finished.detail)}")
         found[k] = finished.value
     return [found[k] for k in range(len(specs))]
+
+
+def _drive_on_card(
+    described: Sequence[tuple[RunSpec, type[Stack] | None]],
+    judge: Callable[[Run], Any] | None,
+    workers: int,
+) -> list[Any]:
+    """Drives runs on the card, in this process or in parts by several that share it."""
+    from skidpad.campaign.runs.card import drive_on_card  # it imports numba's CUDA
+    from skidpad.core.kernels.card import require_card
+
+    require_card()
+    if workers == 1:
+        with share_setups():
+            return drive_on_card(described, judge)
+    size = -(-len(described) // workers)
+    parts = [described[first : first + size] for first in range(0, len(described), size)]
+    drive_part = partial(drive_on_card, judge=judge)
+    jobs = [
+        Job(str(k), drive_part, part, 3600.0 + sum(spec.deadline_s for spec, _ in part))
+        for k, part in enumerate(parts)
+    ]
+    found: dict[int, list[Any]] = {}
+    for finished in run_jobs(jobs, workers):
+        if finished.failure is not None:
+            raise BackendError(f"runs of worker {finished.job.key}: {last_line(finished.detail)}")
+        found[int(finished.job.key)] = finished.value
+    return [one for k in range(len(parts)) for one in found[k]]
 
 
 def _vector_of(one: Described) -> VectorStack | None:

@@ -17,7 +17,13 @@ from skidpad.campaign.driving.backends import make_backend
 from skidpad.campaign.driving.drivers import describe_driver
 from skidpad.campaign.driving.loop import Driver, Moment, Sink, Stepper
 from skidpad.campaign.driving.outdoors import ChangedBackend, FileChanges, branch_backend
-from skidpad.campaign.driving.quick import ANOTHER_SIMULATOR, QuickDrive, find_parts
+from skidpad.campaign.driving.quick import (
+    ANOTHER_SIMULATOR,
+    Calls,
+    QuickDrive,
+    find_parts,
+    make_calls,
+)
 from skidpad.campaign.driving.readings import ReadingsRecorder
 from skidpad.campaign.driving.run_setup import (
     StackAtWheel,
@@ -379,7 +385,11 @@ class OpenRun:
 
     def drive(self, most: int) -> int:
         """Drives up to `most` ticks, the quick way where there is one; returns how many, 0 at the end."""
-        ticks = 0 if self.quick is None else self.quick.drive(most)
+        return make_calls(self.ask(most))
+
+    def ask(self, most: int) -> Calls:
+        """Asks for the compiled calls that `drive` makes, and drives the other ticks; ends as it does."""
+        ticks = 0 if self.quick is None else (yield from self.quick.drive(most))
         self.quick_ticks += ticks
         if ticks and self.stepper is not None and self.stepper.next_frame is None:
             return ticks

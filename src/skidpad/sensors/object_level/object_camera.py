@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -208,7 +209,7 @@ def _face_runs(
     covered: px by column of BIN px, rows from there down are hidden. Returns the next free column.
     """
     span = np.hypot(x1 - x0, y1 - y0)
-    strips = min(max(int(np.ceil(span / STRIP)), MIN_STRIPS), MAX_STRIPS)
+    strips = min(max(ceil(span / STRIP), MIN_STRIPS), MAX_STRIPS)
     # Strip edges and centre at mid-height give the columns; a strip begins where the last one ended.
     _, _, end = _column(camera, box, x0, y0)
     for k in range(strips):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -177,7 +178,7 @@ def cast_radar(
             vy += states.vy[hit] + states.yaw_rate[hit] * hx
         right, down = rays.right[k], rays.down[k]
         out[0, n], out[1, n] = best, np.arctan2(-right, 1.0)
-        out[2, n] = np.arctan2(-down, np.sqrt(1.0 + right * right))
+        out[2, n] = np.arctan2(-down, sqrt(1.0 + right * right))
         out[3, n] = vx * dx + vy * dy
         n += 1
     return n
@@ -206,7 +207,7 @@ def _aim(beam: Beam, tick: int, rotation: Floats, reach: float, rays: Rays) -> b
         rays.ends[b] = 0
     for k in range(n):
         right, down = direction(beam, tick, k)
-        fx = 1.0 / np.sqrt(1.0 + right * right + down * down)
+        fx = 1.0 / sqrt(1.0 + right * right + down * down)
         fy, fz = -right * fx, -down * fx
         dx = rotation[0, 0] * fx + rotation[0, 1] * fy + rotation[0, 2] * fz
         dy = rotation[1, 0] * fx + rotation[1, 1] * fy + rotation[1, 2] * fz

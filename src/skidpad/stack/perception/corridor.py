@@ -151,7 +151,7 @@ def percentile(values: NDArray[np.float32], n: int, fraction: float) -> float:
     fraction: 0 to 1; n >= 1.
     """
     position = fraction * (n - 1)
-    k = int(np.floor(position))
+    k = floor(position)
     low = select(values, n, k)
     if k + 1 >= n:
         return low

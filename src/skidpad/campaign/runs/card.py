@@ -1,0 +1,388 @@
+"""Many runs on a graphics card: their ticks in launches of one kernel, all else as on the CPU.
+
+Runs begin on the CPU. Those with a quick way ask for calls of `drive_ticks`; here the calls of all runs are
+answered together by that very function, compiled for the card, a thread for each world. After each launch
+of up to `ROWS` ticks the log's rows come back. A world in which something happened comes back too: the run
+does what it does on the CPU, and asks for its next call. A run without a quick way is driven on the CPU.
+
+A card has a fingerprint of its own: its sines differ from the CPU's in their last digits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numba
+import numpy as np
+from numba import cuda
+from numpy.typing import NDArray
+
+from skidpad.campaign.driving import quick_kernel
+from skidpad.campaign.driving.quick import Call, Calls, Returned
+from skidpad.campaign.driving.quick_kernel import DONE, drive_ticks
+from skidpad.campaign.runs.run import OpenRun, Run
+from skidpad.core.errors import OutputError
+from skidpad.core.kernels.batch import (
+    FLOATS,
+    INTS,
+    Leaves,
+    call_directly,
+    find_leaves,
+    name_stores,
+    write_taker,
+)
+from skidpad.core.kernels.card import SIMULATED, Stores, find_view, keep_apart, move_bytes
+from skidpad.core.kernels.jit import hold, kernel_hash, user_cache
+from skidpad.core.run import RunSpec
+from skidpad.physics.contact import resolve_contacts
+from skidpad.physics.vehicle import step_vehicles
+from skidpad.recording.files import write_bytes
+from skidpad.roads.kernels import project_kernel, sample_kernel
+from skidpad.sensors.object_level.object_camera import see_boxes
+from skidpad.sensors.object_level.object_radar import cast_radar, find_slope
+from skidpad.simulation.recovery import find_ego, has_reason
+from skidpad.simulation.world.ground import settle
+from skidpad.simulation.world.step import advance
+from skidpad.simulation.world.touch import cross_markings
+from skidpad.simulation.world.traffic.driver import drive_all
+from skidpad.stack.interface import Stack
+from skidpad.stack.perception.lights import heed_light
+from skidpad.stack.road import read_road
+from skidpad.stack.think import think
+
+ROWS = 64  # ticks of a launch
+MOST = 4096  # worlds at once
+THREADS = 1 if SIMULATED else 64  # of a block
+INTERLEAVED = (
+    not SIMULATED
+)  # values element by element, so that neighbouring threads read neighbours
+LOGS = {
+    "tables.ticks": 0, "tables.rows": 0, "columns.actors": 1, "columns.present": 0, "columns.mu": 0,
+}  # fmt: skip
+WORK = frozenset(
+    {
+        "sensors.one.runs", "sensors.one.classes", "sensors.other.runs", "sensors.other.classes",
+        "tables.room",
+    }
+)  # fmt: skip
+FIXED = ("sensors.around.walls.", "sensors.around.posts.")  # of a map, never written
+LAUNCH = """
+def launch(t, ints, floats, n, {names}):
+    b = cuda.grid(1)
+    if b < ints.shape[0] and ints[b, 2] > 0:
+        joined = take(t, b, {names})
+        told = drive(
+            joined, ints[b, 0] != 0, ints[b, 1], min(ints[b, 2], n), 0, ints[b, 3], ints[b, 4],
+            floats[b, 0], floats[b, 1], floats[b, 2], ints[b, 5] != 0,
+        )
+        ints[b, 6], ints[b, 7], ints[b, 8], ints[b, 9] = told[0], told[1], told[2], told[3]
+        floats[b, 0], floats[b, 1], floats[b, 2] = told[4], told[5], told[6]
+        ints[b, 5], ints[b, 10] = told[7], told[8]
+        floats[b, 3], floats[b, 4], ints[b, 4] = told[9], told[10], told[11]
+"""
+APART = (
+    project_kernel, sample_kernel, see_boxes, cast_radar, find_slope, drive_all, step_vehicles,
+    resolve_contacts, settle, cross_markings, think, read_road, heed_light, find_ego, has_reason, advance,
+)  # fmt: skip
+BEGUN, TICK, LEFT, GRACE, STANDING, HANDBRAKE, TICKS, WHY, TOUCHES, CROSSED, LANE = range(11)
+
+
+class Stages:
+    """Seconds that each stage of runs on a card took."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self.ticks, self.launches, self.events = 0, 0, 0
+
+    @contextmanager
+    def time(self, stage: str) -> Iterator[None]:
+        """Counts what is done within it for a stage."""
+        begin = perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[stage] = self.seconds.get(stage, 0.0) + perf_counter() - begin
+
+
+class World:
+    """A run on its way, and the call that it asks for; None: it is over."""
+
+    def __init__(self, number: int, run: OpenRun) -> None:
+        self.number, self.run = number, run
+        self._calls = _drive_to_end(run)
+        self.call: Call | None = next(self._calls, None)
+        self.driven = 0  # ticks of the present call
+        self._joined: object = None
+        self._leaves: Leaves | None = None
+        self.numbers: tuple[NDArray[Any], ...] = ()
+        self.moves: NDArray[np.int64] | None = None
+        self.kind: object = None
+
+    @property
+    def leaves(self) -> Leaves:
+        """Returns what the kernel is given of this world, and sets `kind`: what worlds have in common."""
+        assert self.call is not None
+        if self._leaves is None or self.call.joined is not self._joined:
+            leaves = _intern(find_leaves(self.call.joined))
+            own = zip(leaves.paths, leaves.arrays, strict=True)
+            shapes = tuple(a.shape for path, a in own if path not in LOGS)
+            self._joined, self._leaves = self.call.joined, leaves
+            self.numbers, self.moves = leaves.number_arrays(), None
+            self.kind = leaves.source, shapes, tuple(a.dtype for a in leaves.arrays)
+        return self._leaves
+
+    def answer(self, told: Returned) -> None:
+        """Hands the run what its call gave, and takes the next one."""
+        self.driven = 0
+        try:
+            self.call = self._calls.send(told)
+        except StopIteration:
+            self.call = None
+
+
+_FIXED: dict[bytes, NDArray[Any]] = {}  # by what is in them
+
+
+def _intern(leaves: Leaves) -> Leaves:
+    """Returns leaves whose arrays of the map are the very ones of other worlds on it."""
+    arrays = list(leaves.arrays)
+    for k, path in enumerate(leaves.paths):
+        if path.startswith(FIXED):
+            content = sha256(arrays[k].tobytes()).digest()
+            arrays[k] = _FIXED.setdefault(content, arrays[k])
+    return leaves._replace(arrays=tuple(arrays))
+
+
+def _drive_to_end(run: OpenRun) -> Calls:
+    """Asks for all calls of a run."""
+    ticks = 0
+    while driven := (yield from run.ask(1_000_000)):
+        ticks += driven
+    return ticks
+
+
+def drive_on_card(
+    described: Sequence[tuple[RunSpec, type[Stack] | None]],
+    judge: Callable[[Run], Any] | None = None,
+    stages: Stages | None = None,
+    most: int = MOST,
+) -> list[Any]:
+    """Drives runs on the card and returns them in their order, or what `judge` makes of them.
+
+    most: runs at once.
+    """
+    stages = Stages() if stages is None else stages
+    found: list[Any] = []
+    for first in range(0, len(described), most):
+        found += _drive_some(described[first : first + most], judge, stages)
+    return found
+
+
+def _drive_some(
+    described: Sequence[tuple[RunSpec, type[Stack] | None]],
+    judge: Callable[[Run], Any] | None,
+    stages: Stages,
+) -> list[Any]:
+    """Drives runs that are on the card at the same time."""
+    with stages.time("set-up"):
+        worlds = [World(k, OpenRun(spec, kind)) for k, (spec, kind) in enumerate(described)]
+    going = [world for world in worlds if world.call is not None]
+    while going:  # again where a world has changed its kind on the way
+        kinds: dict[object, list[World]] = {}
+        with stages.time("set-up"):
+            for world in going:
+                _ = world.leaves
+                kinds.setdefault(world.kind, []).append(world)
+        for group in kinds.values():
+            Group(group, stages).drive()
+        going = [world for world in going if world.call is not None]
+    found = []
+    for world in worlds:
+        with stages.time("judging"):
+            world.run.close()
+            driven = world.run.finish()
+            found.append(driven if judge is None else judge(driven))
+    return found
+
+
+class Group:
+    """Worlds of one kind on the card, until each is over or of another kind."""
+
+    def __init__(self, worlds: Sequence[World], stages: Stages) -> None:
+        self.worlds, self.stages = list(worlds), stages
+        leaves = [world.leaves for world in worlds]
+        self.kind = worlds[0].kind
+        dtypes = {a.dtype for a in leaves[0].arrays} | {FLOATS, INTS}
+        ordered = tuple(sorted(dtypes, key=repr))
+        with stages.time("compiling"):
+            self.kernel = find_kernel(leaves[0].source, ordered, KeyLeaves(leaves[0]))
+        with stages.time("copying"):
+            self.stores = Stores(leaves, ordered, LOGS, ROWS, WORK, INTERLEAVED)
+        n = len(worlds)
+        self.ints = np.zeros((n, LANE + 1), np.int64)
+        self.floats = np.zeros((n, 5))
+
+    def drive(self) -> None:
+        """Drives all worlds until none is left on the card."""
+        self._send(range(len(self.worlds)))
+        while self.ints[:, LEFT].any():
+            going = np.flatnonzero(self.ints[:, LEFT])
+            self._launch()
+            self._take_rows(going)
+            ended = [int(b) for b in going if self._note(int(b))]
+            self._answer(ended)
+            self._send([b for b in ended if self._stays(self.worlds[b])])
+
+    def _stays(self, world: World) -> bool:
+        """Tells whether a world has another call for the card."""
+        if world.call is None:
+            return False
+        known, leaves = world.moves, world.leaves
+        return world.moves is known or (world.kind == self.kind and self.stores.has_shared(leaves))
+
+    def _launch(self) -> None:
+        """Drives up to ROWS ticks of all worlds."""
+        stages, stores = self.stages, self.stores
+        with stages.time("compiling" if not stages.launches else "card"):
+            ints, floats = cuda.to_device(self.ints), cuda.to_device(self.floats)
+            blocks = -(-len(self.worlds) // THREADS)
+            self.kernel[blocks, THREADS](stores.table, ints, floats, ROWS, *stores.data)
+            cuda.synchronize()
+            self.ints[:], self.floats[:] = ints.copy_to_host(), floats.copy_to_host()
+        stages.launches += 1
+
+    def _take_rows(self, going: NDArray[np.int64]) -> None:
+        """Copies rows of the log into the runs'."""
+        stores = self.stores
+        with self.stages.time("log"):
+            logs = stores.fetch(stores.log, going)
+            for j, b in enumerate(going.tolist()):
+                world, ticks = self.worlds[b], int(self.ints[b, TICKS])
+                assert world.call is not None
+                self.stages.ticks += ticks
+                if ticks:
+                    stores.copy_rows(logs, j, world.leaves, world.call.at + world.driven, ticks)
+
+    def _note(self, b: int) -> bool:
+        """Tells whether the call of a world is answered; if not, the next launch goes on with it."""
+        row, world = self.ints[b], self.worlds[b]
+        ticks = int(row[TICKS])
+        world.driven += ticks
+        row[LEFT] -= ticks
+        if row[WHY] != DONE or row[LEFT] == 0 or ticks < ROWS:  # less, as the way may have ended
+            row[LEFT] = 0
+            return True
+        row[TICK] += ticks - row[BEGUN]
+        row[BEGUN], row[GRACE] = 0, row[GRACE] - ticks
+        return False
+
+    def _answer(self, ended: Sequence[int]) -> None:
+        """Takes the state of worlds from the card, and lets their runs go on to the next call."""
+        if not ended:
+            return
+        stores, stages = self.stores, self.stages
+        stages.events += len(ended)
+        with stages.time("copying"):
+            states = stores.fetch(stores.state, np.array(ended))
+            for j, b in enumerate(ended):
+                move_bytes(self._moves(self.worlds[b]), _bases(states, j), True)
+        with stages.time("events"):
+            for b in ended:
+                row, drawn, world = self.ints[b].tolist(), self.floats[b].tolist(), self.worlds[b]
+                world.answer(
+                    (
+                        world.driven, row[WHY], row[TOUCHES], row[CROSSED], *drawn[:3],
+                        row[HANDBRAKE] != 0, row[LANE], drawn[3], drawn[4], row[STANDING],
+                    )
+                )  # fmt: skip
+
+    def _send(self, which: Sequence[int]) -> None:
+        """Copies worlds with their calls to the card."""
+        if not which:
+            return
+        stores = self.stores
+        with self.stages.time("copying"):
+            states = stores.make_states(len(which))
+            for j, b in enumerate(which):
+                world = self.worlds[b]
+                call = world.call
+                assert call is not None
+                move_bytes(self._moves(world), _bases(states, j), False)
+                row, last = self.ints[b], call.last
+                row[BEGUN], row[TICK], row[LEFT] = call.begun, call.tick, call.n
+                row[GRACE], row[STANDING] = call.grace, call.standing
+                row[HANDBRAKE] = last.handbrake
+                self.floats[b, :3] = last.throttle, last.brake, last.steer
+            stores.send(np.array(which), states)
+
+    def _moves(self, world: World) -> NDArray[np.int64]:
+        """Returns what is copied of a world."""
+        leaves = world.leaves
+        if world.moves is None:
+            world.moves = self.stores.list_moves(world.numbers, leaves)
+        return world.moves
+
+
+def _bases(states: Sequence[NDArray[Any]], j: int) -> NDArray[np.int64]:
+    """Returns the addresses of state j in each region."""
+    return np.array([s.ctypes.data + j * s.strides[0] for s in states], np.int64)
+
+
+class KeyLeaves:
+    """Leaves of which the source decides; for a cache."""
+
+    def __init__(self, leaves: Leaves) -> None:
+        self.leaves = leaves
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, KeyLeaves) and other.leaves.source == self.leaves.source
+
+    def __hash__(self) -> int:
+        return hash(self.leaves.source)
+
+
+@cache
+def find_kernel(source: str, dtypes: tuple[np.dtype[Any], ...], key: KeyLeaves) -> Any:
+    """Returns the kernel of a launch for values of this source; its machine code is kept on the disk."""
+    del source
+    leaves, names = key.leaves, name_stores(dtypes)
+    text = write_taker(leaves, dtypes)
+    space: dict[str, Any] = {**leaves.classes, "view": find_view(), "uint64": np.uint64}
+    if SIMULATED:  # the CPU's own machine code
+        space["Inside"] = hold
+        exec(text, space)
+        space["drive"] = drive_ticks
+    else:
+        exec(text, space)
+        keep_apart(APART)
+        compiled = numba.njit(error_model="numpy")
+        space["take"] = compiled(space["take"])
+        space["drive"] = call_directly(drive_ticks, compiled)
+    space["cuda"], launch = cuda, LAUNCH.format(names=names)
+    file = _keep_text(text + launch)
+    exec(compile(launch, file or "<launch>", "exec"), space)
+    return cuda.jit(space["launch"], cache=bool(file))
+
+
+def _keep_text(text: str) -> str:
+    """Returns the file with this text in the user's cache, beside which numba keeps machine code; "": none.
+
+    Its folder is named after all files of the kernels, so that what an edit has made stale is not found.
+    """
+    about = f"{kernel_hash(Path(quick_kernel.__file__))}-{sha256(text.encode()).hexdigest()[:16]}"
+    file = user_cache() / "card" / about / "launch.py"
+    if SIMULATED:
+        return ""
+    try:
+        if not file.exists():
+            file.parent.mkdir(parents=True, exist_ok=True)
+            write_bytes(file, text.encode())
+    except (OSError, OutputError):
+        return ""
+    return str(file)

@@ -112,8 +112,8 @@ def judge_badly(run):
 
 def test_what_cannot_be_is_said_in_a_sentence():
     one = {"stack": 2, **ROAD}
-    with pytest.raises(ConfigError, match="device must be 'cpu', got 'cuda'"):
-        skidpad.drive_many([one], device="cuda")
+    with pytest.raises(ConfigError, match="device must be 'cpu' or 'cuda', got 'tpu'"):
+        skidpad.drive_many([one], device="tpu")
     with pytest.raises(ConfigError, match="workers must be at least 1, got 0"):
         skidpad.drive_many([one], workers=0)
     with pytest.raises(ConfigError, match="unknown weather 'icy'"):

@@ -10,6 +10,7 @@ A card has a fingerprint of its own: its sines differ from the CPU's in their la
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
@@ -58,6 +59,7 @@ from skidpad.stack.think import think
 
 ROWS = 64  # ticks of a launch
 MOST = 4096  # worlds at once
+MANY = 1_000_000  # ticks, more than a run has
 THREADS = 1 if SIMULATED else 64  # of a block
 INTERLEAVED = (
     not SIMULATED
@@ -160,9 +162,11 @@ def _intern(leaves: Leaves) -> Leaves:
 
 
 def _drive_to_end(run: OpenRun) -> Calls:
-    """Asks for all calls of a run."""
-    ticks = 0
-    while driven := (yield from run.ask(1_000_000)):
+    """Asks for all calls of a run; one whose stack an envelope governs is driven on the CPU."""
+    ticks, driven = 0, 1
+    while driven:
+        governed = run.quick is not None and run.quick.parts.governed is not None
+        driven = run.drive(MANY) if governed else (yield from run.ask(MANY))
         ticks += driven
     return ticks
 
@@ -367,6 +371,8 @@ def find_kernel(source: str, dtypes: tuple[np.dtype[Any], ...], key: KeyLeaves) 
     space["cuda"], launch = cuda, LAUNCH.format(names=names)
     file = _keep_text(text + launch)
     exec(compile(launch, file or "<launch>", "exec"), space)
+    if file and "NUMBA_CACHE_DIR" not in os.environ:
+        numba.config.CACHE_DIR = str(Path(file).parent)
     return cuda.jit(space["launch"], cache=bool(file))
 
 

@@ -92,7 +92,7 @@ def point_at(typing: Any, address: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         return builder.inttoptr(values[0], context.get_value_type(signature.return_type))
 
-    return types.CPointer(types.uint8)(types.int64), generate
+    return types.CPointer(types.uint8)(types.int64), generate  # type: ignore[attr-defined]
 
 
 @kernel

@@ -167,18 +167,32 @@ def test_an_import_from_a_place_that_is_not_there_is_one_sentence(tmp_path: Path
     )
 
 
-def test_a_road_file_that_cannot_be_read_is_named_and_the_others_are_taken(
+def refuse(monkeypatch: pytest.MonkeyPatch, method: str, name: str) -> None:
+    """Denies what a method of Path does with files of this name, as to a user without the right."""
+    plain = getattr(Path, method)
+
+    def denied(self: Path, *args, **kwargs):
+        if self.name == name:
+            raise PermissionError(13, "Permission denied", str(self))
+        return plain(self, *args, **kwargs)
+
+    monkeypatch.setattr(Path, method, denied)
+
+
+def test_an_import_from_an_unreadable_folder_is_one_sentence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    plain_open, out = Path.open, tmp_path / "maps"
+    refuse(monkeypatch, "stat", "carla.tar")
+    with pytest.raises(FileError, match=r"cannot be read as a CARLA folder .*Permission denied"):
+        find_road_files(tmp_path / "carla.tar")
 
-    def refuse(self: Path, *args, **kwargs):
-        if self.name == "Town12.xodr":
-            raise PermissionError(13, "Permission denied", str(self))
-        return plain_open(self, *args, **kwargs)
 
-    source = folder(tmp_path)
-    monkeypatch.setattr(Path, "open", refuse)
+@pytest.mark.parametrize("method", ["open", "is_file"])
+def test_a_road_file_that_cannot_be_read_is_named_and_the_others_are_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, method: str
+) -> None:
+    source, out = folder(tmp_path), tmp_path / "maps"
+    refuse(monkeypatch, method, "Town12.xodr")
     result = RUNNER.invoke(app, ["map", "import-carla", str(source), "--out", str(out)])
     assert result.exit_code == 0, result.output
     assert [p.name for p in out.iterdir()] == ["Town03.xodr"]

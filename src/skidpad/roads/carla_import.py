@@ -54,10 +54,10 @@ def find_road_files(source: Path) -> RoadFiles:
     A file of a folder that cannot be read is left out. FileError for what is not there or neither, is
     damaged, holds none, or more than TOTAL_MAX bytes or FILES_MAX files.
     """
-    if not source.exists():
-        raise FileError(f"{source} is not there: give a CARLA folder, package or image")
     search = _Search(source)
     try:
+        if not source.exists():
+            raise FileError(f"{source} is not there: give a CARLA folder, package or image")
         search.run()
     except BROKEN as error:
         raise FileError(f"{source} cannot be read as a CARLA folder or archive: {error}") from error
@@ -97,8 +97,7 @@ class _Search:
         """Reads the whole source once, without unpacking it anywhere."""
         if self.source.is_dir():
             for file in sorted(self.source.rglob(f"*{SUFFIX}")):
-                if file.is_file():
-                    self._take_file(file)
+                self._take_file(file)
         elif self.source.suffix == ZIPPED:
             with zipfile.ZipFile(self.source) as archive:
                 for name in archive.namelist():
@@ -110,11 +109,12 @@ class _Search:
                 self._read_tar(tar, "")
 
     def _take_file(self, file: Path) -> None:
-        """Takes a file of the folder; one that cannot be read is left out."""
+        """Takes what is a file of the folder; one that cannot be read is left out."""
         path = file.relative_to(self.source).as_posix()
         try:
-            with file.open("rb") as stream:
-                self._take("", path, stream)
+            if file.is_file():
+                with file.open("rb") as stream:
+                    self._take("", path, stream)
         except OSError as error:
             self.left_out.append(f"{path}: it cannot be read: {error.strerror}")
 

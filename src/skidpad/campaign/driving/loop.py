@@ -1,11 +1,11 @@
 """The one loop: world, driver, supervisor, script, sinks. Everything that Skidpad finds out begins here.
 
-    each tick:  phase   = supervisor.observe(truth)        who drives now: the driver, or recovery
+    each tick:  frame, truth = backend.step(command)       the first tick has those of the start
+                phase   = supervisor.observe(truth)        who drives now: the driver, or recovery
                 command = driver.act(frame)                no driver is given the truth
                 action  = supervisor.act(command)
                 each sink sees the moment                  logs, recordings, snapshots, clocks
                 words   = script.step(truth)               what other actors are told, and the end
-                step the world
 
 What the sinks keep is the only result. Whatever is said about a drive later is computed from it.
 """

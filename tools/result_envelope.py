@@ -59,48 +59,56 @@ def read_drivers(folder: Path) -> dict[str, pl.DataFrame]:
         file = folder.with_name(f"{folder.name}-{govern}") / "results.parquet"
         if file.is_file():
             found[name] = pl.read_parquet(file)
+    found = {driver: complete_twins(runs) for driver, runs in found.items()}
     names = name_alike(found)
     return {driver: keep_alike_once(runs, names) for driver, runs in found.items()}
 
 
+def complete_twins(runs: pl.DataFrame) -> pl.DataFrame:
+    """Returns one driver's runs with every weather whole, where --distinct drove one seed of those alike.
+
+    A weather with fewer seeds takes the runs of another one that moved alike in all seeds of both.
+    """
+    by_weather = {str(w): t for (w,), t in runs.group_by("weather", maintain_order=True)}
+    moved = {w: dict(zip(t["seed"], t["motion_hash"], strict=True)) for w, t in by_weather.items()}
+    whole = []
+    for weather, own in by_weather.items():
+        twins = [
+            w
+            for w in by_weather
+            if moved[weather].items() <= moved[w].items() and len(moved[w]) > len(own)
+        ]
+        most = by_weather[max(twins, key=lambda w: len(moved[w]))] if twins else own
+        whole.append(most.with_columns(pl.lit(weather).alias("weather")))
+    return pl.concat(whole)
+
+
 def keep_alike_once(runs: pl.DataFrame, names: dict[str, str]) -> pl.DataFrame:
-    """Returns the runs of one weather of each group, that with most seeds, named after the group."""
+    """Returns the runs of the first weather of each group that the driver has, named after the group."""
     kept: dict[str, pl.DataFrame] = {}
     for weather, name in names.items():
         some = runs.filter(pl.col("weather") == weather)
-        if name not in kept or len(some) > len(kept[name]):
+        if name not in kept and len(some):
             kept[name] = some.with_columns(pl.lit(name).alias("weather"))
-    return pl.concat(kept.values())
+    return pl.concat(kept.values()) if kept else runs.clear()
 
 
 def name_alike(drivers: dict[str, pl.DataFrame]) -> dict[str, str]:
     """Returns for each weather the name of its group: all in which each driver moved alike.
 
-    They are held against each other over the seeds that both have, one at least. Drivers that lack a weather
-    of the bare stack have no say.
+    Drivers that lack a weather of the bare stack have no say.
     """
     weathers = drivers[BARE]["weather"].unique(maintain_order=True).to_list()
-    asked = {n: t for n, t in drivers.items() if set(weathers) <= set(t["weather"])}
-    moved: dict[str, dict[tuple[str, int], str]] = {w: {} for w in weathers}
-    for name, runs in asked.items():
-        for weather, seed, motion in runs.select("weather", "seed", "motion_hash").iter_rows():
-            if weather in moved:
-                moved[weather][name, seed] = motion
-    groups: list[list[str]] = []
+    asked = [t for t in drivers.values() if set(weathers) <= set(t["weather"])]
+    groups: dict[tuple[str, ...], list[str]] = {}
     for weather in weathers:
-        alike = (group for group in groups if is_alike(moved[group[0]], moved[weather]))
-        group = next(alike, None)
-        if group is None:
-            groups.append([weather])
-        else:
-            group.append(weather)
-    return {weather: ", ".join(group) for group in groups for weather in group}
-
-
-def is_alike(one: dict[tuple[str, int], str], other: dict[tuple[str, int], str]) -> bool:
-    """Returns whether two weathers have the same motion in every run that both have, one at least."""
-    common = one.keys() & other.keys()
-    return bool(common) and all(one[run] == other[run] for run in common)
+        moved = tuple(
+            pl.concat(
+                t.filter(pl.col("weather") == weather).sort("seed")["motion_hash"] for t in asked
+            )
+        )
+        groups.setdefault(moved, []).append(weather)
+    return {weather: ", ".join(group) for group in groups.values() for weather in group}
 
 
 def events(runs: pl.DataFrame) -> int:

@@ -93,6 +93,21 @@ def test_a_weather_with_one_seed_joins_its_group_and_a_rival_may_have_any_of_the
     }  # fmt: skip
 
 
+def test_a_driver_that_moved_alike_alone_is_whole_in_both_weathers(tmp_path):
+    """--distinct decides for each configuration: the envelope is driven once, the bare stack twice."""
+    folder = tmp_path / "envelope-figure8"
+    write_runs(folder, {"3": 3, "5": 0})
+    runs = pl.read_parquet(folder / "results.parquet")
+    other = runs.filter(weather="snow").with_columns(pl.lit("blizzard").alias("weather"))
+    bare = other.filter(config="3").with_columns(pl.lit("x").alias("motion_hash"))
+    once = other.filter(config="5", seed=SEEDS[0])
+    pl.concat([runs, bare, once]).write_parquet(folder / "results.parquet")
+    found = dict(proof.cells(folder))
+    assert {w: len(t["envelope"]) for w, t in found.items()} == dict.fromkeys(
+        ("snow", "blizzard", "clear-noon"), len(SEEDS)
+    )
+
+
 def test_goals_are_judged_over_the_maps_that_are_driven(tmp_path):
     for name in proof.MAPS[:2]:
         write_runs(tmp_path / name, {"3": 3, "5": 0}, speed=36.0)

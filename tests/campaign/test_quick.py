@@ -479,14 +479,16 @@ def test_a_supervisor_of_another_class_is_asked_in_each_tick() -> None:
     assert "another supervisor" in opened.why_not_quick
 
 
-def test_a_command_out_of_range_ends_the_run_as_it_does_stepwise() -> None:
+@pytest.mark.parametrize("govern", [Govern.NONE, Govern.ENVELOPE])
+def test_a_command_out_of_range_ends_the_run_as_it_does_stepwise(govern: Govern) -> None:
     found = []
     for quickly in (False, True):
-        opened = OpenRun(adas_run(2, duration=5.0))
+        opened = OpenRun(adas_run(2, duration=5.0, govern=govern))
         for _ in range(20):
             opened.step()
         assert opened.driver is not None
-        stack: Any = opened.driver.stack.stack
+        outer: Any = opened.driver.stack.stack
+        stack: Any = outer if govern is Govern.NONE else outer.inner
         stack.memory["steady_integral"] = np.nan  # from which the next brake follows
         while opened.drive(100) if quickly else opened.step() is not None:
             pass
@@ -496,3 +498,6 @@ def test_a_command_out_of_range_ends_the_run_as_it_does_stepwise() -> None:
     assert one.outcome == other.outcome == Outcome.AGENT_ERROR
     assert one.error.splitlines()[-1] == other.error.splitlines()[-1]
     assert not first_difference(one.log, other.log)
+    if one.readings is not None:
+        assert other.readings is not None
+        assert one.readings.table.equals(other.readings.table)

@@ -26,8 +26,10 @@ from skidpad.envelope.govern import (
     Envelope,
     EnvelopeSettings,
     GovernedStack,
+    find_limits,
     govern,
     grip_at,
+    keep_inside,
     lower,
     pulse_brake,
 )
@@ -83,6 +85,36 @@ def test_a_falling_limit_is_approached_with_the_stated_deceleration_at_most():
     braked = lower(VehicleCommand(1.0), 30.0, 5.0, 2.0, 11.0)
     assert braked.throttle == 0.0
     assert braked.brake * 11.0 == pytest.approx(2.0)
+
+
+class Whole(Straight):
+    """Commands in whole numbers, as a stack may give them."""
+
+    def tick(self, frame):
+        return VehicleCommand(throttle=1, brake=0, steer=0)
+
+
+class Nothing(Straight):
+    """Gives no number."""
+
+    def tick(self, frame):
+        return VehicleCommand(throttle=None)
+
+
+def test_a_command_of_other_types_needs_no_kernels_of_its_own_and_none_is_refused_in_a_sentence():
+    governed_run(Straight, 2.0)
+    before = len(find_limits.overloads), len(keep_inside.overloads)
+    assert governed_run(Whole, 2.0, share=1).outcome is Outcome.COMPLETED
+    assert (len(find_limits.overloads), len(keep_inside.overloads)) == before
+    refused = governed_run(Nothing, 2.0)
+    assert refused.outcome is Outcome.AGENT_ERROR
+    assert "throttle" in refused.error
+
+
+def test_limits_that_do_not_count_are_those_of_the_envelope_alone():
+    """A rival is its own limit."""
+    run = governed_run(Straight, 25.0, table_kmh=(50.0, 40.0, 30.0), limits=frozenset())
+    assert np.asarray(run.log.ego.speed).max() * 3.6 < 51.0
 
 
 def governed_run(kind, duration, weather="clear-noon", vehicles=0, **settings):

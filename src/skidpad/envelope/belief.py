@@ -45,7 +45,7 @@ RAIN_PRIORS = (
 COLD_PRIOR = ((0.12, 0.25, 0.25), (0.3, 0.3, 0.5), (0.7, 0.25, 0.25))
 
 
-def prior_of(stage: int, is_cold: bool) -> Floats:
+def _make_prior(stage: int, is_cold: bool) -> Floats:
     """Returns the (n,) probabilities of the n grips in GRIP before any evidence.
 
     stage: of the rain sensor, 0 (dry) to 3, index into RAIN_PRIORS; is_cold: below COLD_C.
@@ -60,8 +60,14 @@ def prior_of(stage: int, is_cold: bool) -> Floats:
     return p
 
 
-# of all stages, those of the cold from len(RAIN_PRIORS) on
-PRIORS = np.array([prior_of(i, cold) for cold in (False, True) for i in range(len(RAIN_PRIORS))])
+COLD = len(RAIN_PRIORS)  # row of PRIORS from which on those of the cold stand
+PRIORS = np.array([_make_prior(i, cold) for cold in (False, True) for i in range(COLD)])
+
+
+def prior_of(stage: int, is_cold: bool) -> Floats:
+    """Returns the row of PRIORS for a stage of the rain sensor, 0 (dry) to 3; is_cold: below COLD_C."""
+    row: Floats = PRIORS[stage + COLD if is_cold else stage]
+    return row
 
 
 @kernel

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import inf, isfinite, nan
+from math import inf, isfinite, isnan, nan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,7 +30,7 @@ from skidpad.core.specs import (
 )
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.vocabulary import Supervision
-from skidpad.envelope.belief import BRIDGE_K, COLD_C, PRIORS, RAIN_PRIORS, prior_grip
+from skidpad.envelope.belief import BRIDGE_K, COLD, COLD_C, PRIORS, prior_grip
 from skidpad.envelope.bridges import BridgesAhead
 from skidpad.envelope.grip import (
     STIFFNESS,
@@ -93,6 +93,9 @@ LEAD_GRIP = 1.2  # times the estimate that a lead's tyres may have
 LEAD_BRAKE = 8.0  # m/s^2 that it brakes at most
 # of brake pulses: within what drivers find comfortable, 2 m/s^2 (our assumption)
 PULSE_BRAKE, PULSE_TIME, PULSE_EVERY = 1.5, 0.8, 300.0  # m/s^2, s, m from one to the next
+EVERY = (1 << len(Binding)) - 1  # limits as bits
+# settings that kernels take as they are, as floats: each other type would be another kernel
+PLAIN = ("share", "lateral_share", "delay", "approach", "most", "stiffness", "factor", "dt")
 ORACLE_STEP = 0.5  # m/s between values of a grip that is known, for studies
 PULSE_BELOW, PULSE_V_LEAST, PULSE_AY_MOST = 0.3, 8.0, 0.5  # confidence, m/s, m/s^2 across
 
@@ -112,7 +115,7 @@ class EnvelopeSettings:
         table_kmh: speeds when dry, in rain, in the cold, in the place of the envelope: a rival.
         oracle: true grip at each ORACLE_STEP m/s, for studies only.
         oracle_sight: true range in m of a radar with a nominal one, for studies only.
-        limits: those that count; all but for ablations.
+        limits: those of the envelope that count; all but for ablations.
         rss: RSS distances with constant grip and the dry row of the table, in its place: a rival.
         watches: it records what it would allow and leaves the stack alone.
         pulses: it brakes a little where nothing is known of the grip.
@@ -194,6 +197,7 @@ class EnvelopeRules(NamedTuple):
     rss: bool
     rss_limits: RssParameters
     counted: int  # limits that count, as bits by Binding
+    is_rival: bool  # a table or RSS in the place of the envelope
     acts: bool  # it does not only watch
     pulses: bool
     dt: float  # s
@@ -276,7 +280,7 @@ def find_limits(
         arrays.bus, r.bus, ego.wheels, ego.ax, ego.ay, ego.yaw_rate, steer, brake,
         drive_at(r.car, throttle, v), grade,
     )  # fmt: skip
-    expected = PRIORS[stage + len(RAIN_PRIORS) if is_cold else stage]
+    expected = PRIORS[stage + COLD if is_cold else stage]
     value, shown, sure, prior = estimate_grip(
         arrays.grip, r.car, r.stiffness, r.dt, signals, stage, expected, grade
     )
@@ -285,7 +289,7 @@ def find_limits(
         shown, sure = value, 1.0
     elif r.factor != 1.0:
         value *= r.factor
-    reach, has_lead = 0.0, False
+    reach, has_lead = 0.0, not isnan(arrays.sight.memory[0].gap)
     if r.has_table:
         limits[Binding.TABLE] = r.table[2 if is_cold else min(stage, 1)]
     elif r.rss:
@@ -310,7 +314,9 @@ def find_limits(
 @kernel
 def grip_at(known: Floats, v: float) -> float:
     """Returns the grip at v in m/s from (n,) values for each ORACLE_STEP m/s; beyond them the last one."""
-    i = min(int(v / ORACLE_STEP), len(known) - 1)
+    if not isfinite(v):
+        return nan
+    i = min(max(int(v / ORACLE_STEP), 0), len(known) - 1)
     j = min(i + 1, len(known) - 1)
     return float(known[i] + (v / ORACLE_STEP - i) * (known[j] - known[i]))
 
@@ -447,6 +453,10 @@ class Envelope:
         end = int(self.bus.arrays.memory["drawn"][0])
         return self.arrays.said[end - ticks : end]
 
+    def drop_tick(self) -> None:
+        """Takes back the row of a tick whose command was refused: it is not part of the run."""
+        self.bus.arrays.memory["drawn"] -= 1
+
     def reset(self) -> None:
         """Forgets what was seen and felt at another place.
 
@@ -463,10 +473,11 @@ class Envelope:
         stage, air_c = read_sensor(frame, RAIN_ID, int), read_sensor(frame, AIR_ID, float)
         self.bus.draw_noise()
         told: Told = find_limits(
-            self.held, *frame.radar, read_motion(frame), applied.throttle, applied.brake,
-            applied.steer, stage, air_c < COLD_C,
+            self.held, *frame.radar, read_motion(frame), *read_pedals(applied),
+            float(applied.steer), stage, air_c < COLD_C,
         )  # fmt: skip
-        if told.places and (self.further is not None or self.bridges is not None):
+        looks_further = self.further is not None or self.bridges is not None
+        if told.places and looks_further and not self.rules.is_rival:
             self._limit_by_further_sight(frame, told)
             self._limit_by_bridge(frame, told, stage, air_c)
             rules = self.rules
@@ -521,24 +532,31 @@ class Envelope:
 
 def make_rules(settings: EnvelopeSettings, bus: BusRules, sight: SightRules) -> EnvelopeRules:
     """Returns the settings as kernels take them."""
-    s = settings
+    s, is_rival = settings, settings.rss or settings.table_kmh is not None
     table = s.table_kmh or (0.0, 0.0, 0.0)
     return EnvelopeRules(
-        share=s.share, lateral_share=s.lateral_share, delay=s.delay, approach=s.approach,
-        most=s.most, stiffness=s.stiffness, factor=s.factor, has_table=s.table_kmh is not None,
+        **{name: float(getattr(s, name)) for name in PLAIN}, has_table=s.table_kmh is not None,
         table=(table[0] / 3.6, table[1] / 3.6, table[2] / 3.6), rss=s.rss,
-        rss_limits=RssParameters(), counted=sum(1 << name for name in s.limits),
-        acts=not s.watches, pulses=s.pulses, dt=s.dt, car=Car(), bus=bus, sight=sight,
+        rss_limits=RssParameters(),
+        counted=EVERY if is_rival else sum(1 << name for name in s.limits),
+        is_rival=is_rival, acts=not s.watches, pulses=s.pulses, car=Car(), bus=bus, sight=sight,
     )  # fmt: skip
 
 
 def read_motion(frame: SensorFrame) -> Motion:
-    """Returns the ego's motion as kernels take it."""
+    """Returns the ego's motion as kernels take it: floats, as each other type is another kernel."""
     ego, pose = frame.ego, frame.ego.pose
-    return Motion(
-        pose.x, pose.y, pose.z, pose.pitch, pose.yaw, ego.speed, ego.yaw_rate, ego.ax, ego.ay,
-        ego.wheel_speeds,
-    )  # fmt: skip
+    fl, fr, rl, rr = map(float, ego.wheel_speeds)
+    moved = pose.x, pose.y, pose.z, pose.pitch, pose.yaw, ego.speed, ego.yaw_rate, ego.ax, ego.ay
+    return Motion(*map(float, moved), (fl, fr, rl, rr))
+
+
+def read_pedals(command: VehicleCommand) -> tuple[float, float]:
+    """Returns throttle and brake as floats; NaN for what is no number."""
+    try:
+        return float(command.throttle), float(command.brake)
+    except (TypeError, ValueError):
+        return nan, nan
 
 
 def lower(
@@ -620,10 +638,11 @@ class GovernedStack:
             tell(max(told.speed, V_CREEP))
         command = self.inner.tick(frame)
         acts = driven and rules.acts and isinstance(command, VehicleCommand)
-        if acts and isfinite(frame.ego.speed):
+        pedals = read_pedals(command) if acts else (nan, nan)
+        if isfinite(sum(pedals) + frame.ego.speed):  # the guard refuses what is no number
             throttle, brake = keep_inside(
-                self.envelope.held, told, frame.ego.speed, frame.ego.ay,
-                command.throttle, command.brake, command.reverse,
+                self.envelope.held, told, float(frame.ego.speed), float(frame.ego.ay), *pedals,
+                bool(command.reverse),
             )  # fmt: skip
             if throttle != command.throttle or brake > command.brake:
                 command = replace(command, throttle=throttle, brake=brake)

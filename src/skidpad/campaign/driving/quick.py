@@ -343,6 +343,8 @@ class QuickDrive:
 
     def _refuse(self, request: Request) -> None:
         """Ends the run as a command out of range does."""
+        if self.parts.governed is not None:
+            self.parts.governed.envelope.drop_tick()
         try:
             self.parts.guard.check(VehicleCommand(*request), self.parts.world.tick)
         except StackError as failure:
@@ -352,7 +354,9 @@ class QuickDrive:
         """Returns what holds in all ticks of a call."""
         world, stack, supervisor = self.parts.world, self.parts.stack, self.parts.supervisor
         far, stuck = (inf, inf) if world.traffic is None else world.traffic.limits()
-        stage, air_c = (0, 0.0) if self.parts.governed is None else self.parts.backend.read_air()
+        governed = self.parts.governed
+        governs = governed is not None and governed.envelope.rules.acts  # and tells it anew
+        stage, air_c = (0, 0.0) if governed is None else self.parts.backend.read_air()
         return Rules(
             dt=world.dt,
             substeps=world.fleet.steps,
@@ -363,7 +367,7 @@ class QuickDrive:
             stuck_time=inf if supervisor is None else supervisor.settings.stuck_time,
             holding=sum(1 << tier for tier in HOLDING),
             reach=LIGHT_REACH,
-            v_told=stack.v_told,
+            v_told=inf if governs else stack.v_told,
             far=far,
             stuck=stuck,
             assists=stack.assists,

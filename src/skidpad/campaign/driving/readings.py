@@ -40,7 +40,8 @@ class ReadingsRecorder(Sink):
         self._rows: list[dict[str, float]] = []
         # else the rows of ticks that a kernel drove follow from the envelope's record and the last row
         others = {kind.word for kind in self._kinds.values()} - AIR_SENSORS
-        self.sees_all = self._added is not None or bool(others)
+        follows = self._governed is not None and self._added is None and not others
+        self.sees_all = not follows
 
     @property
     def is_needed(self) -> bool:
@@ -61,8 +62,7 @@ class ReadingsRecorder(Sink):
 
     def pass_ticks(self, ticks: int) -> None:
         """Adds the rows of ticks that kernels drove: the air stays as it was in the last one."""
-        if self._governed is None:
-            return
+        assert self._governed is not None, "else it sees all"
         last = self._rows[-1]
         air = {name: value for name, value in last.items() if not name.startswith(ENVELOPE + ".")}
         for row in self._governed.envelope.newest(ticks).tolist():

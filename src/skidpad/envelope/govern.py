@@ -547,8 +547,10 @@ def read_motion(frame: SensorFrame) -> Motion:
     """Returns the ego's motion as kernels take it: floats, as each other type is another kernel."""
     ego, pose = frame.ego, frame.ego.pose
     fl, fr, rl, rr = map(float, ego.wheel_speeds)
-    moved = pose.x, pose.y, pose.z, pose.pitch, pose.yaw, ego.speed, ego.yaw_rate, ego.ax, ego.ay
-    return Motion(*map(float, moved), (fl, fr, rl, rr))
+    return Motion(
+        float(pose.x), float(pose.y), float(pose.z), float(pose.pitch), float(pose.yaw),
+        float(ego.speed), float(ego.yaw_rate), float(ego.ax), float(ego.ay), (fl, fr, rl, rr),
+    )  # fmt: skip
 
 
 def read_pedals(command: VehicleCommand) -> tuple[float, float]:

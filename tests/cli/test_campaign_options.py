@@ -1,5 +1,7 @@
 """What all campaigns take and show: the same options, a line per cell, one sentence beforehand."""
 
+from dataclasses import replace
+
 import pytest
 import typer
 from typer.core import TyperOption
@@ -8,7 +10,7 @@ from typer.testing import CliRunner
 from skidpad.campaign.workers.worker import Finished
 from skidpad.cli.main import app
 from skidpad.cli.options.campaigns import CampaignOptions, Estimate
-from skidpad.core.errors import OutputError
+from skidpad.core.errors import InputError, OutputError
 from skidpad.core.vocabulary import Outcome
 from support.toy_campaign import campaign
 
@@ -122,3 +124,77 @@ def test_a_plan_says_which_runs_go_the_quick_way(words, told, tmp_path):
     for line in told:
         assert line in done.output
     assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("play front_accident --seeds 3", "one file is one run"),
+        ("play front_accident --grip none,physical", "one file is one run"),
+        ("play {folder}/broken.xosc --weather rain-noon", "broken.xosc"),
+        ("adas --weather rain-noon --seeds 2 --until-halfwidth 0.9", "--until-halfwidth"),
+        (
+            "adas --weather rain-noon --seeds 2 --until-halfwidth 0.1 --distinct",
+            "exclude each other",
+        ),
+    ],
+)
+def test_a_plan_refuses_what_the_command_refuses(words, told, tmp_path):
+    (tmp_path / "broken.xosc").write_text("<OpenSCENARIO>")
+    asked = [*words.format(folder=tmp_path).split(), "--out", str(tmp_path / "out")]
+    for more in ([], ["--plan"]):
+        done = CliRunner().invoke(app, [*asked, *more])
+        assert isinstance(done.exception, InputError), done.output
+        assert told in str(done.exception)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_single_file_with_checkpoints_can_be_planned(tmp_path):
+    words = [
+        "play",
+        "front_accident",
+        "--checkpoints",
+        "5",
+        "--plan",
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
+    assert "1 run planned, nothing was driven" in done.output
+
+
+@pytest.mark.parametrize(
+    ("distinct", "halfwidth", "total"),
+    [
+        (False, None, "8 runs planned"),
+        (True, None, "at most 8 runs planned"),
+        (False, 0.1, "at most 8 runs planned"),
+    ],
+)
+def test_a_plan_of_what_may_end_early_gives_an_upper_limit(
+    distinct, halfwidth, total, tmp_path, capsys
+):
+    how = CampaignOptions(out=tmp_path / "out", plan=True, until_halfwidth=halfwidth)
+    with pytest.raises(typer.Exit):
+        how(replace(campaign(), distinct=distinct), str)
+    assert capsys.readouterr().out.splitlines()[-1] == f"{total}, nothing was driven"
+
+
+def test_a_plan_names_stacks_that_cannot_begin_and_fails(tmp_path):
+    code = tmp_path / "mine.py"
+    code.write_text(
+        "class NoWeights:\n"
+        "    def __init__(self):\n"
+        "        raise RuntimeError('no weights')\n"
+        "    def tick(self, frame):\n"
+        "        pass\n"
+    )
+    words = ["--sensors", "objects", "--weather", "rain-noon,clear-noon", "--seeds", "2", "--plan"]
+    done = CliRunner().invoke(
+        app, ["adas", "--stack", f"{code}:NoWeights", *words, "--out", str(tmp_path / "out")]
+    )
+    assert done.exit_code == 1, done.output
+    assert done.output.count("2 runs, cannot be driven: ") == 2
+    assert "could not be built" in done.output
+    assert "quick way" not in done.output

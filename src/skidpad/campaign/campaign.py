@@ -21,7 +21,7 @@ import msgspec
 from skidpad.campaign.recipes.recipe import Driven, M, Recipe, T, Task, cell_of
 from skidpad.campaign.user_files import keep_files
 from skidpad.campaign.workers.worker import Finished, Job, Runner
-from skidpad.core.errors import ConfigError, require_range
+from skidpad.core.errors import ConfigError, StackError, require_range
 from skidpad.core.text.wording import count_text
 from skidpad.core.vocabulary import Outcome
 from skidpad.evidence.statistics import clopper_pearson
@@ -244,16 +244,20 @@ class Campaign(Generic[T, K, M]):
         """Returns True when a run went well by its recipe, None where it does not count."""
         return None if entry.metrics is None else self.recipe.success(entry.metrics)
 
-    def plan(self) -> Iterator[tuple[str, int, str]]:
+    def plan(self) -> Iterator[tuple[str, int, str | StackError]]:
         """Yields each cell, how many runs it has, and why its first one is driven tick by tick.
 
-        "" where it has a quick way. Worlds are built, and nothing is driven.
+        "" where it has a quick way, the error of a stack that cannot begin. Worlds are built, and
+        nothing is driven.
         """
         firsts = {cell_of(t.name): t for t in reversed(self.tasks)}
         with TemporaryDirectory() as folder:
             keep_files(Path(folder), self.files)
             for cell, runs in Counter(cell_of(t.name) for t in self.tasks).items():
-                yield cell, runs, self.recipe.why_not_quick(Path(folder), firsts[cell])
+                try:
+                    yield cell, runs, self.recipe.why_not_quick(Path(folder), firsts[cell])
+                except StackError as error:
+                    yield cell, runs, error
 
     def estimate(self) -> Estimate:
         """Drives up to PROBES runs in this process, for PROBING_S s; returns the CPU time per run."""

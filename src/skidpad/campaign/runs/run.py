@@ -322,13 +322,16 @@ def find_reason(spec: RunSpec) -> str:
     """Returns the first reason why a run is driven tick by tick; "": it has a quick way.
 
     Its world is built, and nothing is driven; another simulator than the embedded one is not asked.
+    Raises StackError where the stack cannot begin.
     """
     if spec.backend.backend != BackendKind.EMBEDDED:
         return ANOTHER_SIMULATOR
     opened = OpenRun(spec)
     try:
         opened.begin()
-        return str(opened.failure or opened.why_not_quick)
+        if opened.failure is not None:
+            raise opened.failure
+        return opened.why_not_quick
     finally:
         opened.close()
 

@@ -48,7 +48,8 @@ class Driving(Struct, frozen=True, kw_only=True):
     plan: Annotated[
         bool,
         Meta(
-            description="Print cells and runs, and which go the quick way; drive and write nothing."
+            description="Print cells and runs, those that --resume has included, and which go the "
+            "quick way; drive and write nothing."
         ),
     ] = False
 
@@ -72,18 +73,19 @@ class CampaignOptions(Driving, frozen=True, kw_only=True):
         """Drives the campaign under a progress bar and prints what `report` says of its folder.
 
         parts: further campaigns by the folder below its own, driven after it. Returns the summary of the
-        campaign itself; ends with exit code 1 when none of its runs has a result, and with 0 after a plan.
+        campaign itself; ends with exit code 1 when none of its runs has a result, and after a plan with
+        0, or 1 where a stack cannot begin.
         """
-        if self.plan:
-            for name, part in {"": campaign, **parts}.items():
-                print_plan(part, name and f"{name}: ")
-            raise typer.Exit
         from dataclasses import replace
 
         from skidpad.cli.output.tables import fit_terminal
         from skidpad.core.text.wording import count_text
 
         campaign = replace(campaign, until_halfwidth=self.until_halfwidth)
+        if self.plan:
+            planned = {"": campaign, **parts}.items()
+            good = [print_plan(part, name and f"{name}: ") for name, part in planned]
+            raise typer.Exit(0 if all(good) else 1)
         identities = {".": campaign.identity()} | {n: c.identity() for n, c in parts.items()}
         out = next_folder(self.out, identities) if self.or_next else self.out
         summary = self._run(campaign, out, out)
@@ -177,17 +179,24 @@ class Estimate(Struct, frozen=True, kw_only=True):
 How = CampaignOptions | Estimate
 
 
-def print_plan(campaign: Campaign[Any, Any, Any], name: str) -> None:
+def print_plan(campaign: Campaign[Any, Any, Any], name: str) -> bool:
     """Prints a line for each cell: its runs, and if they go the quick way, else the first reason.
 
-    name: text before each line, as it stands.
+    name: text before each line, as it stands. Returns False where a stack cannot begin.
     """
+    from skidpad.core.errors import StackError
     from skidpad.core.text.wording import count_text
 
+    good = True
     for cell, runs, reason in campaign.plan():
-        quick = f"no, {reason}" if reason else "yes"
-        typer.echo(f"{name}{cell}: {count_text(runs, 'run')}, quick way: {quick}")
-    typer.echo(f"{name}{count_text(len(campaign.tasks), 'run')} planned, nothing was driven")
+        told = f"quick way: no, {reason}" if reason else "quick way: yes"
+        if isinstance(reason, StackError):
+            good, told = False, f"cannot be driven: {reason}"
+        typer.echo(f"{name}{cell}: {count_text(runs, 'run')}, {told}")
+    most = "at most " * (campaign.distinct or campaign.until_halfwidth is not None)
+    total = count_text(len(campaign.tasks), "run")
+    typer.echo(f"{name}{most}{total} planned, nothing was driven")
+    return good
 
 
 def next_folder(out: Path, identities: Mapping[str, dict[str, Any]]) -> Path:

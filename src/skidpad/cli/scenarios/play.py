@@ -87,25 +87,37 @@ def play(
         return
     if out is None:
         raise ConfigError("play needs --out DIR for the run, or --check, or --tree")
-    from skidpad.campaign.runs.play import run_to
     from skidpad.scenarios.reading.distributions import is_distribution
 
-    if file.is_dir() or is_distribution(file) or driving.plan:
+    how = CampaignOptions(out=out, **structs.asdict(driving))
+    if file.is_dir() or is_distribution(file):
         if checkpoints is not None:
             raise ConfigError("--checkpoints is for a single file: of a folder, rerun one run")
-        how = CampaignOptions(out=out, **structs.asdict(driving))
         _drive_all(how, template, cross, file, seeds, expected)
         return
     runs = play_runs(template, cross, [file], seeds)
     if len(runs) > 1:
         raise ConfigError("one file is one run: several weathers, grips or seeds take a folder")
     try:
-        driven = run_to(runs[0], out, checkpoints)
+        _drive_one(how, runs[0], checkpoints, expected)
     except PatchError as error:
         raise tuned.name_surface(error) from None
+
+
+def _drive_one(
+    how: CampaignOptions, run: RunSpec, checkpoints: float | None, expected: Expected
+) -> None:
+    """Drives one run, prints its verdict, and exits with 1 for a bad one; only plans it if asked to."""
+    from skidpad.campaign.campaign import Campaign
+    from skidpad.campaign.recipes.files import RECIPE
+    from skidpad.campaign.runs.play import run_to
+
+    if how.plan:
+        how(Campaign(RECIPE, [run]), played_report)
+    driven = run_to(run, how.out, checkpoints)
     if driven.error:
         typer.echo(driven.error.strip().split("\n")[-1], err=True)
-    played, text = expected.conclude(out)
+    played, text = expected.conclude(how.out)
     typer.echo(text)
     exit_by_verdicts(played)
 

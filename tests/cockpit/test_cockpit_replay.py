@@ -307,9 +307,9 @@ def test_a_drive_by_hand_is_scored_and_compared(driven):
     assert "judges campaigns" in str(judged.exception)
 
 
-def test_the_worst_crash_of_a_campaign_is_the_one_at_the_highest_closing_speed(tmp_path):
-    def write_line(k, crashes, impact):
-        metrics = {"fatal_collisions": crashes, "max_impact_kmh": impact}
+def test_the_worst_crash_of_a_campaign_is_a_roll_over_or_the_one_at_the_highest_speed(tmp_path):
+    def write_line(k, crashes, impact, **more):
+        metrics = {"fatal_collisions": crashes, "max_impact_kmh": impact, **more}
         line = {"run": f"2_clear-noon-00{k}", "key": {"outcome": "completed"}, "metrics": metrics}
         return json.dumps(line) + "\n"
 
@@ -321,6 +321,12 @@ def test_the_worst_crash_of_a_campaign_is_the_one_at_the_highest_closing_speed(t
     ]
     (tmp_path / "ledger.jsonl").write_text("".join(lines_of))
     assert standing(tmp_path).worst_crash == "2_clear-noon-002"
+    # a car on its side is worse than any contact
+    rolled = write_line(5, 1, None, roll_overs=1)
+    ended = write_line(6, 0, None).replace("completed", "roll_over")
+    for name, roll_over in (("2_clear-noon-005", rolled), ("2_clear-noon-006", ended)):
+        (tmp_path / "ledger.jsonl").write_text(roll_over + "".join(lines_of))
+        assert standing(tmp_path).worst_crash == name
     # where no speed is known it is the newest one
     (tmp_path / "ledger.jsonl").write_text(write_line(2, 1, None) + write_line(3, 1, None))
     assert standing(tmp_path).worst_crash == "2_clear-noon-003"
@@ -346,4 +352,14 @@ def test_how_a_campaign_stands(tmp_path):
     ledger.write_text(text + first.replace("-001", "-003") + "\n" + '{"torn')
     now = standing(tmp_path)
     assert (now.done, now.worst_crash) == (3, "2_clear-noon-003")
+    assert lines(now)[-1] == "worst crash: 2_clear-noon-003"  # its folder is not there
+    run = tmp_path / RUNS / "2_clear-noon-003"
+    run.mkdir()
+    assert lines(standing(tmp_path))[-1] == (
+        f"worst crash: 2_clear-noon-003  (skidpad replay {run} begins before its fastest crash)"
+    )
+    spaced = tmp_path.rename(tmp_path.parent / "two words")
+    once = CliRunner().invoke(app, ["watch", str(spaced), "--once"]).output
+    assert f"skidpad replay '{spaced / RUNS / run.name}' begins" in once
+    spaced.rename(tmp_path)
     assert (tmp_path / RUNS).is_dir()

@@ -8,7 +8,9 @@ import webbrowser
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import msgspec
@@ -32,7 +34,7 @@ FATAL = (
     "collisions",
     "contacts",
 )  # columns that count crashes, first one there
-IMPACTS = ("max_impact_kmh", "impact_kmh")  # columns with the closing speed at a contact
+IMPACTS = ("max_impact_kmh", "impact_kmh")  # columns: closing speed, largest or of first contact
 LEFT_OUT = (Outcome.CRASHED.value, Outcome.TIMEOUT.value, Outcome.AGENT_ERROR.value)
 
 
@@ -72,7 +74,8 @@ class Standing:
     outcomes: dict[str, int]
     cells: tuple[Cell, ...]
     worst_crash: str  # name of the run with the hardest one; "": none yet
-    picture: Path | None = None  # of that crash, if one was taken
+    picture: Path | None = None  # the last one that was taken in that run
+    replay: str = ""  # command that replays that run from before its fastest crash; "": not kept
 
 
 def standing(folder: Path) -> Standing:
@@ -97,6 +100,7 @@ def standing(folder: Path) -> Standing:
         cells=tuple(_cell(name, good) for name, good in sorted(cells.items())),
         worst_crash=worst,
         picture=None if run is None else last_snapshot(run),
+        replay=f"skidpad replay {quote(str(run))}" if run is not None and run.is_dir() else "",
     )
 
 
@@ -110,8 +114,14 @@ def has_crashed(line: Line) -> bool:
 
 
 def impact_of(line: Line) -> float:
-    """Returns the largest closing speed in km/h at a contact of a run; -1 where it is not known."""
+    """Returns the closing speed in km/h by which crashes are ranked; -1 where it is not known.
+
+    The largest of the run; of `grip`, that of the first contact. Infinite where the ego lay on its
+    side, which ranks above every contact.
+    """
     metrics = line.metrics or {}
+    if line.key.outcome == Outcome.ROLL_OVER.value or (metrics.get("roll_overs") or 0) > 0:
+        return inf
     return max((metrics[name] for name in IMPACTS if metrics.get(name) is not None), default=-1.0)
 
 
@@ -130,7 +140,8 @@ def lines(now: Standing) -> list[str]:
         f"{c.name}: {c.good} of {c.runs} {GOOD}, 95 % {c.low:.2f} to {c.high:.2f}"
         for c in now.cells
     ]
-    told.append(f"worst crash: {now.worst_crash or 'none'}")
+    begins = f"  ({now.replay} begins before its fastest crash)" if now.replay else ""
+    told.append(f"worst crash: {now.worst_crash or 'none'}{begins}")
     return told
 
 
@@ -165,11 +176,8 @@ def build(folder: Path) -> Callable[[], None]:
                 return
             head = lines(now)
             said.text = f"{head[0]}; {head[1]}"
-            crash.text = head[-1] + (
-                f"  (skidpad replay {folder / RUNS / now.worst_crash} begins before it)"
-                if now.worst_crash
-                else ""
-            )
+            pictured = "; last picture of that run" if now.picture else ""
+            crash.text = head[-1] + pictured
             if now.picture != shown[0]:
                 picture.set_source("" if now.picture is None else as_address(now.picture))
                 shown[0] = now.picture

@@ -53,10 +53,38 @@ def test_where_chance_may_explain_every_difference_the_first_sentence_says_so(tm
     first = told(campaign(tmp_path, lambda config, kind: metrics(barriers=2)))[0]
     assert first.sentence == (
         "10 seeds are too few to rank the configurations: every difference between two of them may be "
-        "chance. All configurations lie within these crashes per run: 2.00 in clear sky; 2.00 in heavy "
-        "rain."
+        "chance. All configurations had 2.00 crashes per run in clear sky and 2.00 crashes per run in "
+        "heavy rain."
     )
     assert list(first.lines) == []
+
+
+@pytest.mark.parametrize("rain", [1, 10])
+def test_a_configuration_without_a_crash_is_named_only_in_a_weather_where_that_is_sure(
+    tmp_path, rain
+):
+    """rain: seeds of ten in which all but the first configuration crash in rain; one in clear sky."""
+    rows = [
+        (key(c, f"{kind}-noon", seed, log_hash=f"{c}{kind}{seed}"),
+         metrics(barriers=int(c != "1" and seed <= most)))
+        for kind, most in (("clear", 1), ("rain", rain))
+        for c in "123"
+        for seed in range(1, 11)
+    ]  # fmt: skip
+    MATRIX.write(tmp_path, rows)
+    first = told(load_matrix(tmp_path))[0]
+    if rain == 1:
+        assert first.sentence.startswith("10 seeds are too few to rank the configurations")
+        assert "configuration 1" not in " ".join([first.sentence, *first.lines])
+    else:
+        assert first.sentence == (
+            "Of the configurations, fewest crashes: in heavy rain configuration 1 (ACC) with 0.00 per "
+            "run. All configurations lie within these crashes per run: 0.00 to 0.10 in clear sky."
+        )
+        assert first.lines[0].startswith("Heavy rain, configuration 1: it has surely fewer crashes")
+        assert first.lines[1] == (
+            "Clear sky: every difference between two configurations may be chance."
+        )
 
 
 def test_too_few_seeds_name_no_configuration_as_the_one_with_fewest_crashes(tmp_path):

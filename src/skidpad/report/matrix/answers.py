@@ -85,17 +85,18 @@ def _functions(matrix: Matrix) -> Answer:
     rates = {g: _rates(matrix, g) for g in matrix.climates}
     judged = {g: {c: r[c] for c in r if c != REFERENCE} or r for g, r in rates.items()}
     best = {g: min(r, key=lambda c: r[c].rate) for g, r in judged.items() if r}
-    parts = [_fewest(g, judged[g], judged[g][c].rate) for g, c in best.items()]
     without = _without_crashes(judged)
     least = seeds_for_verdict(len(differences))
     several = len(matrix.comparison_configs) > 1
-    is_sure = matrix.seeds >= least and any(d.is_sure for d in differences.values())
+    sure = {g for (g, _, _), d in differences.items() if d.is_sure and matrix.seeds >= least}
+    named = {g: c for g, c in best.items() if g in sure or not several}
+    unsure = {g: judged[g] for g in best if g not in named}
     if without:
         first = without[0]
-    elif several and not is_sure:  # a name beside "too few to rank" would read as a rank
-        first = _range_sentence(judged)
-    else:
-        first = f"Of the configurations, fewest {EVENTS}: {'; '.join(parts)}."
+    else:  # a name where nothing is sure would read as a rank
+        parts = [_fewest(g, judged[g], judged[g][c].rate) for g, c in named.items()]
+        told = [f"Of the configurations, fewest {EVENTS}: {'; '.join(parts)}."] if parts else []
+        first = " ".join([*told, *_range_sentences(unsure)])
     sentence = f"{first}{_beside_reference(rates, judged)}"
     if not several:
         lines = without[1:]
@@ -104,12 +105,17 @@ def _functions(matrix: Matrix) -> Answer:
     elif without:
         lines = without[1:]
     else:
-        if not is_sure:
+        if not named:
             sentence = (
                 f"{count_text(matrix.seeds, 'seed')} are too few to rank the configurations: every "
                 f"difference between two of them may be chance. {sentence}"
             )
-        told = [_sureness(g, c, differences, judged[g][c]) for g, c in best.items()]
+        told = [_sureness(g, c, differences, judged[g][c]) for g, c in named.items()]
+        if named:
+            told += [
+                f"{capitalize_first(g.name)}: every difference between two configurations may be chance."
+                for g in unsure
+            ]
         lines = [line for line in told if line]
     return Answer(
         "Which functions crash least, in which weather, and how sure is that?",
@@ -145,15 +151,19 @@ def _fewest(group: WeatherGroup, rates: dict[str, Rate], least: float) -> str:
     return f"in {group.name} {named} with {least:.2f} per run"
 
 
-def _range_sentence(judged: dict[WeatherGroup, dict[str, Rate]]) -> str:
-    """Returns a sentence with the least and the largest rate in each weather, without a name."""
-    told = []
+def _range_sentences(judged: dict[WeatherGroup, dict[str, Rate]]) -> list[str]:
+    """Returns sentences with the least and the largest rate in each weather, without a name."""
+    alike, spread = [], []
     for group, rates in judged.items():
-        found = sorted({f"{rate.rate:.2f}" for rate in rates.values()}, key=float)
-        if found:
-            ends = found[0] if len(found) == 1 else f"{found[0]} to {found[-1]}"
-            told.append(f"{ends} in {group.name}")
-    return f"All configurations lie within these {EVENTS} per run: {'; '.join(told)}."
+        low, *rest = sorted({f"{rate.rate:.2f}" for rate in rates.values()}, key=float)
+        if rest:
+            spread.append(f"{low} to {rest[-1]} in {group.name}")
+        else:
+            alike.append(f"{low} {EVENTS} per run in {group.name}")
+    told = [f"All configurations had {list_text(alike)}."] if alike else []
+    if spread:
+        told.append(f"All configurations lie within these {EVENTS} per run: {'; '.join(spread)}.")
+    return told
 
 
 def _beside_reference(
@@ -213,7 +223,7 @@ def _sureness(
     if sure:
         largest = max(others[c].p for c in sure)
         told.append(f"it has surely fewer {EVENTS} than {config_list(sure)} ({_at_most(largest)})")
-    if open_ and any(d.is_sure for d in differences.values()):
+    if open_:
         told.append(f"its difference from {config_list(open_)} may be chance")
     if same:
         told.append(f"it drove exactly as {config_list(same)}")

@@ -200,11 +200,11 @@ export default {
       H.push([h.t, h.motion.speed_kmh, h.stack.distance, limit, h.motion.grip]); while (H.length && h.t - H[0][0] > STRIP_SECONDS) H.shift();
       const [g, w, high] = this.fit(this.$refs.strip), part = high / 3; g.font = "12px sans-serif";
       const curve = (i, most, row, ink, name) => { const top = row * part; g.strokeStyle = "#303944"; g.strokeRect(0.5, top + 0.5, w - 1, part - 4);
-        g.strokeStyle = ink; g.lineWidth = 1.6; g.beginPath(); let pen = false;
-        for (const one of H) { const v = one[i]; if (v === null) { pen = false; continue; }
+        g.strokeStyle = g.fillStyle = ink; g.lineWidth = 1.6; g.beginPath(); let pen = false;
+        H.forEach((one, k) => { const v = one[i]; if (v === null) { pen = false; return; }
           const x = w - (h.t - one[0]) / STRIP_SECONDS * w, y = top + (part - 6) * (1 - Math.min(v / most, 1)) + 1;
-          if (pen) g.lineTo(x, y); else g.moveTo(x, y); pen = true; }
-        g.stroke(); g.lineWidth = 1; g.fillStyle = ink; g.fillText(name, 6, top + 14); };
+          if (pen) g.lineTo(x, y); else { g.moveTo(x, y); if (H[k + 1] === undefined || H[k + 1][i] === null) g.fillRect(x - 1, y - 1, 2, 2); } pen = true; });
+        g.stroke(); g.lineWidth = 1; g.fillText(name, 6, top + 14); };
       if (limit !== null) curve(3, 160, 0, "#ff8552", ""), g.fillText(`envelope: ${Math.round(limit)} km/h${by && by !== "none" ? `, ${by}` : ""}`, w - 190, 14);
       curve(1, 160, 0, "#4d9dff", "speed, 0 to 160 km/h"); curve(2, 80, 1, "#4fce7f", "distance, 0 to 80 m"); curve(4, 1, 2, "#f2b441", "grip, 0 to 1");
     },
@@ -217,10 +217,10 @@ export default {
       const [g, w, high] = this.fit(this.$refs.line), T = this.timeline, n = Math.max(T.last - T.first, 1);
       const x = (tick) => (tick - T.first) / n * w, at = (i, all) => i / Math.max(all.length - 1, 1) * w;
       g.fillStyle = "#1d232b"; g.fillRect(0, 0, w, high); g.font = "11px sans-serif";
-      const curve = (values, most, top, bottom, ink) => {  // gaps where there is no value
-        g.strokeStyle = ink; g.lineWidth = 2; g.beginPath(); let pen = false;
+      const curve = (values, most, top, bottom, ink) => {  // gaps where there is no value, a dot for a lone one
+        g.strokeStyle = g.fillStyle = ink; g.lineWidth = 2; g.beginPath(); let pen = false;
         values.forEach((v, i) => { if (v === null) { pen = false; return; } const y = bottom - (bottom - top) * Math.min(v / most, 1);
-          if (pen) g.lineTo(at(i, values), y); else g.moveTo(at(i, values), y); pen = true; }); g.stroke(); g.lineWidth = 1; };
+          if (pen) g.lineTo(at(i, values), y); else { g.moveTo(at(i, values), y); if ((values[i + 1] ?? null) === null) g.fillRect(at(i, values) - 1, y - 1, 2, 2); } pen = true; }); g.stroke(); g.lineWidth = 1; };
       const most = Math.max(...T.speed, 1); curve(T.speed, most, 8, 48, "#4d9dff");
       g.fillStyle = "#ff8552"; const wide = w / T.ttc.length + 1;
       T.ttc.forEach((v, i) => { if (v === null || v >= T.near) return; const bar = 48 * (1 - v / T.near); g.fillRect(i / T.ttc.length * w, 50 - bar, wide, bar); });

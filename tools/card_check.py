@@ -2,10 +2,10 @@
 
 python tools/card_check.py OUT.json [--runs N] [--seconds S] [--vehicles V] [--workers W] [--cores C]
 
-1. start: runs of every configuration and two weathers for 50 ticks, against the same runs on the CPU.
-2. outcomes: the same runs to their end, on the card and on the CPU, as distributions.
-3. closed-loop ticks/s on the card, with supervisor, respawn and log; set-up, judging and compiling apart.
-4. finished, judged runs per minute end to end, on the card with W processes and on C cores without it.
+1. start: runs of configurations 0 to 4 and two weathers for 50 ticks, against the same runs on the CPU.
+2. outcomes of runs of configuration 2 to their end, as distributions: all on the card, an eighth on the CPU.
+3. ticks/s of the same runs on the card, with supervisor, respawn and log; set-up, judging, compiling apart.
+4. finished, judged runs per minute: on the card with one and W processes, on C cores without it.
 """
 
 from __future__ import annotations

@@ -68,6 +68,26 @@ def test_on_the_simulator_the_logs_are_those_of_the_cpu():
     assert found["events"] > 2  # so that worlds came back and went there again
 
 
+def test_no_runs_on_a_card_with_workers_are_no_results(monkeypatch):
+    monkeypatch.setattr("skidpad.core.kernels.card.require_card", lambda: None)
+    assert skidpad.drive_many([], device="cuda", workers=2) == []
+
+
+def test_classes_of_stacks_are_not_sent_to_workers_on_a_card(monkeypatch):
+    sent = []
+
+    def note(jobs, workers):
+        sent.extend(job.argument for job in jobs)
+        return []
+
+    monkeypatch.setattr("skidpad.core.kernels.card.require_card", lambda: None)
+    monkeypatch.setattr("skidpad.campaign.runs.many.run_jobs", note)
+    one = {"stack": 2, "sensors": "objects", "duration": 1.0}
+    with pytest.raises(KeyError):
+        skidpad.drive_many([one, one], device="cuda", workers=2)
+    assert [kind for part in sent for _, kind in part] == [None, None]
+
+
 def test_without_a_card_a_sentence_says_so(monkeypatch):
     monkeypatch.setattr("numba.cuda.is_available", lambda: False)
     one = {"stack": 2, "sensors": "objects", "duration": 1.0}

@@ -52,9 +52,10 @@ def drive_many(
         runs: run values, as `skidpad.Scenario(...).spec` is one, or mappings of what `skidpad.drive` takes.
             Runs whose `stack` is the same `VectorStack`, an object, are driven by it together.
         workers: processes; 1 drives in this one.
-        device: "cpu", or "cuda" for a graphics card (extra `gpu`). Runs that have a quick way are then driven
-            on the card together, all others on the CPU. On a card the first ticks are those of the CPU to
-            1e-9; content hashes are not those of the CPU.
+        device: "cpu", or "cuda" for a graphics card (extra `gpu`). Runs with a quick way whose world a kernel
+            steps (no script, patches, wind, roll-over or envelope) are then driven on the card together, all
+            others on the CPU. On a card the first 50 ticks are those of the CPU to 1e-9; content hashes are
+            not those of the CPU.
         judge: is called with each run where it was driven, and its value stands in the list in place of
             the run. With workers it is a function of a module. Logs are not kept then.
 
@@ -108,11 +109,14 @@ def _drive_on_card(
     from skidpad.core.kernels.card import require_card
 
     require_card()
+    if not described:
+        return []
     if workers == 1:
         with share_setups():
             return drive_on_card(described, judge)
     size = -(-len(described) // workers)
-    parts = [described[first : first + size] for first in range(0, len(described), size)]
+    sent = [(spec, None) for spec, _ in described]  # a worker loads the stack itself
+    parts = [sent[first : first + size] for first in range(0, len(sent), size)]
     drive_part = partial(drive_on_card, judge=judge)
     jobs = [
         Job(str(k), drive_part, part, 3600.0 + sum(spec.deadline_s for spec, _ in part))

@@ -13,6 +13,8 @@ import pytest
 
 import skidpad
 from skidpad.campaign.driving.quick_kernel import drive_ticks
+from skidpad.campaign.runs.many import DEFAULTS
+from skidpad.campaign.runs.run import OpenRun, describe
 from skidpad.core.errors import ConfigError
 from skidpad.core.kernels.batch import call_directly, find_leaves
 from skidpad.core.kernels.jit import hold
@@ -39,6 +41,40 @@ print(json.dumps({
 """
 
 
+BY_ONE = """
+import json
+import skidpad
+from skidpad.campaign.runs import card
+from skidpad.campaign.runs.many import DEFAULTS
+from skidpad.campaign.runs.run import describe
+from skidpad.recording.run.log_files import log_hash
+from skidpad.simulation.recovery import Supervisor
+
+card.ROWS = 1  # each tick is the last one of a launch, and each event in the first one of the next
+places, note = [], Supervisor.pass_ticks
+
+def pass_ticks(self, ticks, place, standing):
+    places.append((ticks, *place))
+    note(self, ticks, place, standing)
+
+Supervisor.pass_ticks = pass_ticks
+found = {}
+for name, way in (
+    ("arrived", {"duration": 40.0, "route_km": 0.05}), ("under way", {"duration": 6.0}),
+):
+    one = {"stack": 4, "seed": 2, "vehicles": 4, "sensors": "objects", **way}
+    (run,) = card.drive_on_card([describe(**{**DEFAULTS, **one})])
+    told, places[:] = list(places), []
+    again = skidpad.drive(**one)
+    found[name] = {
+        "card": log_hash(run.log), "cpu": log_hash(again.log), "ticks": len(run.log),
+        "quick": run.quick_ticks, "places": [told, list(places)],
+    }
+    places.clear()
+print(json.dumps(found))
+"""
+
+
 class Inner(NamedTuple):
     x: np.ndarray
     n: int
@@ -51,10 +87,10 @@ class Outer(NamedTuple):
     share: float
 
 
-def test_on_the_simulator_the_logs_are_those_of_the_cpu():
+def simulate(text):
     environment = {**os.environ, "NUMBA_ENABLE_CUDASIM": "1"}
     done = subprocess.run(
-        [sys.executable, "-c", DRIVE],
+        [sys.executable, "-c", text],
         check=False,
         capture_output=True,
         text=True,
@@ -62,10 +98,24 @@ def test_on_the_simulator_the_logs_are_those_of_the_cpu():
         timeout=900,
     )
     assert done.returncode == 0, done.stderr[-2000:]
-    found = json.loads(done.stdout.splitlines()[-1])
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def test_on_the_simulator_the_logs_are_those_of_the_cpu():
+    found = simulate(DRIVE)
     assert found["card"] == found["cpu"]
     assert found["ticks"] > 0.9 * found["all"]
     assert found["events"] > 2  # so that worlds came back and went there again
+
+
+def test_ends_of_ways_and_events_at_the_border_of_launches_are_those_of_the_cpu():
+    for name, run in simulate(BY_ONE).items():
+        assert run["card"] == run["cpu"]
+        assert run["quick"] > 0.5 * run["ticks"]
+        assert (run["ticks"] < 800) == (name == "arrived") or name == "under way"
+        on_card, on_cpu = run["places"]
+        assert on_card == on_cpu
+        assert all(lane >= 0 for _, lane, _, _ in on_card)
 
 
 def test_no_runs_on_a_card_with_workers_are_no_results(monkeypatch):
@@ -88,6 +138,25 @@ def test_classes_of_stacks_are_not_sent_to_workers_on_a_card(monkeypatch):
     assert [kind for part in sent for _, kind in part] == [None, None]
 
 
+def test_where_a_run_raises_all_are_closed(monkeypatch):
+    from skidpad.campaign.runs.card import drive_on_card
+
+    opened = []
+
+    class Opened(OpenRun):
+        def __init__(self, spec, kind):
+            if len(opened) == 2:
+                raise RuntimeError("the third")
+            super().__init__(spec, kind)
+            opened.append(self)
+
+    monkeypatch.setattr("skidpad.campaign.runs.card.OpenRun", Opened)
+    one = {"stack": 2, "sensors": "objects", "duration": 1.0}
+    with pytest.raises(RuntimeError, match="the third"):
+        drive_on_card([describe(**{**DEFAULTS, **one})] * 3)
+    assert [run.over for run in opened] == [True, True]
+
+
 def test_without_a_card_a_sentence_says_so(monkeypatch):
     monkeypatch.setattr("numba.cuda.is_available", lambda: False)
     one = {"stack": 2, "sensors": "objects", "duration": 1.0}
@@ -101,6 +170,18 @@ def test_an_array_that_stands_twice_in_a_value_is_one_leaf():
     assert leaves.paths == ("inner.x",)
     assert leaves.source.endswith("(a0, i[0]), a0, None, f[1])")
     assert find_leaves(hold(Inner(x, 7))).source.startswith("Inside(")
+
+
+def test_an_array_with_gaps_is_refused():
+    with pytest.raises(ValueError, match="inner.x must be C-contiguous, got strides"):
+        find_leaves(Outer(Inner(np.arange(6.0)[::2], 7), np.arange(3.0), None, 0.5))
+
+
+def test_numbers_of_numpy_are_floats_where_they_are():
+    leaves = find_leaves((np.float32(0.5), np.float64(0.25), 3))
+    assert leaves.source == "(f[0], f[1], i[2],)"
+    floats, ints = leaves.number_arrays()
+    assert (floats.tolist(), ints.tolist()) == ([0.5, 0.25, 0.0], [0, 0, 3])
 
 
 def test_calls_by_address_become_plain_calls():

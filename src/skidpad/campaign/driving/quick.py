@@ -18,6 +18,7 @@ import numpy as np
 from skidpad.campaign.driving.loop import Arrival, Stepper, Timer, Unsupervised
 from skidpad.campaign.driving.outdoors import ChangedBackend, FileChanges
 from skidpad.campaign.driving.quick_kernel import (
+    ARRIVED,
     DONE,
     MOVED,
     REFUSED,
@@ -277,7 +278,7 @@ class QuickDrive:
                     continue
             if stop.why == REFUSED:
                 self._refuse(last)
-            elif stop.why != DONE:
+            elif stop.why not in (DONE, ARRIVED):
                 stepper.next_frame = self.parts.backend.read_frame()
             break
         if driven:

@@ -41,11 +41,12 @@ from skidpad.stack.road import RoadParts, read_road
 from skidpad.stack.think import Answer, Light, Parts, think, write_report
 
 # why the kernel came back
-DONE = 0  # all ticks that were asked for are driven, or the ego has come to the end of its way
+DONE = 0  # all ticks that were asked for are driven
 MOVED = 1  # actors have moved, and Python is to look after the traffic before they settle
 STEPPED = 2  # the world has made its step, in which something happened
 UNUSUAL = 3  # the tick has begun, and the supervisor may have something to do in it
 REFUSED = 4  # the stack's command is out of range
+ARRIVED = 5  # the ego has come to the end of its way
 
 
 class Addresses(NamedTuple):
@@ -377,6 +378,7 @@ def drive_ticks(
         write_tick(joined, k + done, tick, felt, answer, way, light)
         done += 1
         if has_arrived(joined.value.tables, felt):
+            why = ARRIVED
             break
     return (
         done, why, touches, crossed, throttle, brake, steer, handbrake, *place, standing,

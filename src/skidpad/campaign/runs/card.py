@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import cache
 from hashlib import sha256
+from math import nan
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -24,7 +25,6 @@ import numpy as np
 from numba import cuda
 from numpy.typing import NDArray
 
-from skidpad.campaign.driving import quick_kernel
 from skidpad.campaign.driving.quick import Call, Calls, Returned
 from skidpad.campaign.driving.quick_kernel import DONE, drive_ticks
 from skidpad.campaign.runs.run import OpenRun, Run
@@ -39,7 +39,7 @@ from skidpad.core.kernels.batch import (
     write_taker,
 )
 from skidpad.core.kernels.card import SIMULATED, Stores, find_view, keep_apart, move_bytes
-from skidpad.core.kernels.jit import hold, kernel_hash, user_cache
+from skidpad.core.kernels.jit import _cache_of, hold
 from skidpad.core.run import RunSpec
 from skidpad.physics.contact import resolve_contacts
 from skidpad.physics.vehicle import step_vehicles
@@ -93,6 +93,7 @@ APART = (
     resolve_contacts, settle, cross_markings, think, read_road, heed_light, find_ego, has_reason, advance,
 )  # fmt: skip
 BEGUN, TICK, LEFT, GRACE, STANDING, HANDBRAKE, TICKS, WHY, TOUCHES, CROSSED, LANE = range(11)
+NOWHERE = (-1, nan, nan)
 
 
 class Stages:
@@ -120,6 +121,7 @@ class World:
         self._calls = _drive_to_end(run)
         self.call: Call | None = next(self._calls, None)
         self.driven = 0  # ticks of the present call
+        self.place = NOWHERE  # of the ego in the last of them
         self._joined: object = None
         self._leaves: Leaves | None = None
         self.numbers: tuple[NDArray[Any], ...] = ()
@@ -141,7 +143,7 @@ class World:
 
     def answer(self, told: Returned) -> None:
         """Hands the run what its call gave, and takes the next one."""
-        self.driven = 0
+        self.driven, self.place = 0, NOWHERE
         try:
             self.call = self._calls.send(told)
         except StopIteration:
@@ -193,9 +195,26 @@ def _drive_some(
     judge: Callable[[Run], Any] | None,
     stages: Stages,
 ) -> list[Any]:
-    """Drives runs that are on the card at the same time."""
-    with stages.time("set-up"):
-        worlds = [World(k, OpenRun(spec, kind)) for k, (spec, kind) in enumerate(described)]
+    """Drives runs that are on the card at the same time; where one raises, all are closed."""
+    with ExitStack() as opened:
+        worlds = []
+        with stages.time("set-up"):
+            for k, (spec, kind) in enumerate(described):
+                run = OpenRun(spec, kind)
+                opened.callback(run.close)
+                worlds.append(World(k, run))
+        _drive_worlds(worlds, stages)
+        found = []
+        for world in worlds:
+            with stages.time("judging"):
+                world.run.close()
+                driven = world.run.finish()
+                found.append(driven if judge is None else judge(driven))
+        return found
+
+
+def _drive_worlds(worlds: Sequence[World], stages: Stages) -> None:
+    """Drives worlds until none has a call."""
     going = [world for world in worlds if world.call is not None]
     while going:  # again where a world has changed its kind on the way
         kinds: dict[object, list[World]] = {}
@@ -206,13 +225,9 @@ def _drive_some(
         for group in kinds.values():
             Group(group, stages).drive()
         going = [world for world in going if world.call is not None]
-    found = []
-    for world in worlds:
-        with stages.time("judging"):
-            world.run.close()
-            driven = world.run.finish()
-            found.append(driven if judge is None else judge(driven))
-    return found
+
+
+_LAUNCHED: set[Any] = set()  # kernels of this process that are compiled
 
 
 class Group:
@@ -253,12 +268,13 @@ class Group:
     def _launch(self) -> None:
         """Drives up to ROWS ticks of all worlds."""
         stages, stores = self.stages, self.stores
-        with stages.time("compiling" if not stages.launches else "card"):
+        with stages.time("card" if self.kernel in _LAUNCHED else "compiling"):
             ints, floats = cuda.to_device(self.ints), cuda.to_device(self.floats)
             blocks = -(-len(self.worlds) // THREADS)
             self.kernel[blocks, THREADS](stores.table, ints, floats, ROWS, *stores.data)
             cuda.synchronize()
             self.ints[:], self.floats[:] = ints.copy_to_host(), floats.copy_to_host()
+        _LAUNCHED.add(self.kernel)
         stages.launches += 1
 
     def _take_rows(self, going: NDArray[np.int64]) -> None:
@@ -279,7 +295,9 @@ class Group:
         ticks = int(row[TICKS])
         world.driven += ticks
         row[LEFT] -= ticks
-        if row[WHY] != DONE or row[LEFT] == 0 or ticks < ROWS:  # less, as the way may have ended
+        if ticks or row[LANE] >= 0:  # else an event of the first tick, before the ego is looked for
+            world.place = int(row[LANE]), float(self.floats[b, 3]), float(self.floats[b, 4])
+        if row[WHY] != DONE or row[LEFT] == 0:
             row[LEFT] = 0
             return True
         row[TICK] += ticks - row[BEGUN]
@@ -302,7 +320,7 @@ class Group:
                 world.answer(
                     (
                         world.driven, row[WHY], row[TOUCHES], row[CROSSED], *drawn[:3],
-                        row[HANDBRAKE] != 0, row[LANE], drawn[3], drawn[4], row[STANDING],
+                        row[HANDBRAKE] != 0, *world.place, row[STANDING],
                     )
                 )  # fmt: skip
 
@@ -379,12 +397,12 @@ def find_kernel(source: str, dtypes: tuple[np.dtype[Any], ...], key: KeyLeaves) 
 def _keep_text(text: str) -> str:
     """Returns the file with this text in the user's cache, beside which numba keeps machine code; "": none.
 
-    Its folder is named after all files of the kernels, so that what an edit has made stale is not found.
+    It is in the folder of this file's kernels, named after all files that these and the launch are made of.
     """
-    about = f"{kernel_hash(Path(quick_kernel.__file__))}-{sha256(text.encode()).hexdigest()[:16]}"
-    file = user_cache() / "card" / about / "launch.py"
-    if SIMULATED:
+    folder = "" if SIMULATED else _cache_of(Path(__file__).resolve())
+    if not folder:
         return ""
+    file = Path(folder) / sha256(text.encode()).hexdigest()[:16] / "launch.py"
     try:
         if not file.exists():
             file.parent.mkdir(parents=True, exist_ok=True)

@@ -55,7 +55,7 @@ class Leaves(NamedTuple):
         """Returns the numbers as floats and as integers, each 0 where the other tells it."""
         floats, ints = np.zeros(len(self.numbers)), np.zeros(len(self.numbers), np.int64)
         for k, number in enumerate(self.numbers):
-            if isinstance(number, float):
+            if isinstance(number, (float, np.floating)):
                 floats[k] = number
             else:
                 ints[k] = np.uint64(number).astype(np.int64) if number >= 0 else number
@@ -86,6 +86,10 @@ class _Walk:
             fields = zip(kind._fields, value, strict=True)  # type: ignore[attr-defined]
             return f"{name}({', '.join(self.visit(v, f'{path}.{f}') for f, v in fields)})"
         if isinstance(value, np.ndarray):
+            if not value.flags.c_contiguous:
+                raise ValueError(
+                    f"{path.removeprefix('.')} must be C-contiguous, got strides {value.strides}"
+                )
             key = value.ctypes.data, value.shape, value.dtype
             if key not in self._known or not value.size:
                 self._known[key] = len(self.arrays)
@@ -95,14 +99,15 @@ class _Walk:
         if value is None:
             return "None"
         self.numbers.append(value)
-        kept = f"{'f' if isinstance(value, float) else 'i'}[{len(self.numbers) - 1}]"
+        store = "f" if isinstance(value, (float, np.floating)) else "i"
+        kept = f"{store}[{len(self.numbers) - 1}]"
         if isinstance(value, np.uint64):
             return f"uint64({kept})"
         return f"({kept} != 0)" if isinstance(value, (bool, np.bool_)) else kept
 
 
 def find_leaves(value: Any) -> Leaves:
-    """Returns what a value consists of."""
+    """Returns what a value consists of; raises ValueError where an array is not C-contiguous."""
     walk = _Walk()
     source = walk.visit(value, "")
     return Leaves(

@@ -17,7 +17,7 @@ from skidpad.campaign.runs.run import OpenRun
 from skidpad.core.kernels.calls import call, find_address
 from skidpad.core.run import RunSpec
 from skidpad.core.vocabulary import Govern
-from skidpad.envelope.govern import Told, find_limits, keep_inside
+from skidpad.envelope.govern_kernel import Told, find_limits, keep_inside
 from skidpad.recording.run.log_files import log_hash
 from skidpad.recording.run.ticks import copy_actors
 from skidpad.sensors.object_level.objects import sense

@@ -23,7 +23,7 @@ from skidpad.core.run import Function, Roads, RunSpec
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import Govern, Outcome, RelocationReason, SensorLevel, TrafficStart
-from skidpad.envelope.govern import find_limits, keep_inside
+from skidpad.envelope.govern_kernel import find_limits, keep_inside
 from skidpad.physics.presets import all_presets, find_weather
 from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.log_files import log_hash

@@ -11,6 +11,7 @@ from skidpad.campaign.driving.governing import choose_envelope
 from skidpad.campaign.runs.run import drive
 from skidpad.campaign.runs.run import run as drive_run
 from skidpad.core.errors import ConfigError
+from skidpad.core.frames import EgoEstimate, RadarPoints, SensorFrame
 from skidpad.core.geometry import Pose
 from skidpad.core.run import Passenger, Roads, RunSpec, Scenario
 from skidpad.core.setup import ActorSetup, Setup
@@ -19,18 +20,23 @@ from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import Govern, GripModel, Outcome, RangeModel, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.envelope.govern import (
-    PULSE_BRAKE,
-    PULSE_TIME,
+    AIR_ID,
+    RAIN_ID,
     SENSORS,
-    V_CREEP,
     Envelope,
     EnvelopeSettings,
     GovernedStack,
-    find_limits,
     govern,
+    with_pedals,
+)
+from skidpad.envelope.govern_kernel import (
+    PULSE_BRAKE,
+    PULSE_TIME,
+    V_CREEP,
+    find_limits,
     grip_at,
+    hold_back,
     keep_inside,
-    lower,
     pulse_brake,
 )
 from skidpad.envelope.limits import Binding
@@ -85,6 +91,14 @@ def test_a_falling_limit_is_approached_with_the_stated_deceleration_at_most():
     braked = lower(VehicleCommand(1.0), 30.0, 5.0, 2.0, 11.0)
     assert braked.throttle == 0.0
     assert braked.brake * 11.0 == pytest.approx(2.0)
+
+
+def lower(command, v, allowed, approach, a_brake):
+    """The command as a governed stack gives it on."""
+    pedals = hold_back(
+        command.throttle, command.brake, command.reverse, v, allowed, approach, a_brake
+    )
+    return with_pedals(command, *pedals)
 
 
 class Whole(Straight):
@@ -225,7 +239,7 @@ def test_the_oracle_of_sight_knows_how_far_the_radar_reaches_in_rain():
         )  # fmt: skip
         settings = choose_envelope(RunSpec(govern=Govern.ORACLE_SIGHT), setup)
         radar = RadarSpec("radar", Pose(2.0, 0.0, 1.0), range=100.0)
-        return Envelope([radar], load_map("straight"), settings).reach
+        return Envelope([radar], load_map("straight"), settings).arrays.sight.memory["reach"][0]
 
     rain = Weather(precipitation=100.0)
     assert reach(Weather()) == pytest.approx(100.0)
@@ -233,6 +247,19 @@ def test_the_oracle_of_sight_knows_how_far_the_radar_reaches_in_rain():
     assert reach(rain, RangeModel.NONE) == pytest.approx(100.0)
     with pytest.raises(ConfigError, match="oracle-sight needs a stack with a radar"):
         Envelope([], load_map("straight"), EnvelopeSettings(oracle_sight=lambda nominal: nominal))
+
+
+@pytest.mark.parametrize("rss", [False, True])
+def test_off_every_lane_a_lead_of_before_is_no_limit(rss):
+    envelope = Envelope([], load_map("straight"), EnvelopeSettings(rss=rss))
+    envelope.arrays.sight.memory["gap"] = 3.0
+    ego = EgoEstimate(Pose(0.0, 5000.0), 20.0, 0.0, 0.0, 0.0, (20.0,) * 4, 4)
+    told = envelope.update(
+        SensorFrame(1, ego, {}, {}, RadarPoints.none(), {}, extra={RAIN_ID: 0, AIR_ID: 20.0}),
+        VehicleCommand(),
+    )
+    assert told.places == 0
+    assert np.isinf(envelope.arrays.limits[Binding.LEAD])
 
 
 def test_settings_out_of_range_are_told():

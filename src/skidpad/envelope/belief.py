@@ -126,7 +126,7 @@ def new_belief() -> BeliefArrays:
     memory["is_new"] = True
     prior = prior_of(0, False).copy()
     p = np.outer(prior, STIFFNESS_PRIOR)
-    return BeliefArrays(memory, p, prior, np.empty(len(GRIP)), np.empty_like(p))
+    return BeliefArrays(memory, p, prior, np.zeros(len(GRIP)), np.zeros_like(p))
 
 
 @kernel

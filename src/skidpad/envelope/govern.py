@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import inf, isfinite, isnan, nan
-from typing import Any, NamedTuple
+from math import inf, isfinite, nan
+from typing import Any
 
 import numpy as np
 
-from skidpad.core.arrays import Floats, Floats32
+from skidpad.core.arrays import Floats
 from skidpad.core.errors import ConfigError, require_range
-from skidpad.core.frames import RadarPoints, SensorFrame
-from skidpad.core.kernels.jit import Held, hold, kernel
+from skidpad.core.frames import SensorFrame
+from skidpad.core.kernels.jit import hold
 from skidpad.core.maths.constants import G
 from skidpad.core.sensor_types import read_sensor
 from skidpad.core.setup import DT
@@ -30,15 +30,22 @@ from skidpad.core.specs import (
 )
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.vocabulary import Supervision
-from skidpad.envelope.belief import BRIDGE_K, COLD, COLD_C, PRIORS, prior_grip
+from skidpad.envelope.belief import BRIDGE_K, COLD_C, prior_grip
 from skidpad.envelope.bridges import BridgesAhead
+from skidpad.envelope.govern_kernel import (
+    CLOSE,
+    V_CREEP,
+    EnvelopeArrays,
+    EnvelopeParts,
+    EnvelopeRules,
+    Told,
+    find_limits,
+    keep_inside,
+)
 from skidpad.envelope.grip import (
     STIFFNESS,
     Car,
     Grip,
-    GripArrays,
-    drive_at,
-    estimate_grip,
     leave_place,
     make_grip,
     new_estimator,
@@ -46,58 +53,34 @@ from skidpad.envelope.grip import (
 from skidpad.envelope.limits import (
     Binding,
     RssParameters,
-    bends_speed,
     bridge_speed,
-    floating_speed,
-    following_speed,
     lowest,
     preview_speed,
-    rss_speed,
     sight_speed,
 )
 from skidpad.envelope.seen import FurtherSight
 from skidpad.envelope.sight import (
-    SightArrays,
+    Motion,
     SightRules,
-    clear_way,
-    look_for_lead,
     lose_lead,
     make_way,
     new_sight,
     sight_rules,
-    trace_way,
 )
 from skidpad.envelope.signals import (
     BLOCK,
-    BusArrays,
     BusModel,
     BusRules,
     CarBus,
-    write_message,
 )
-from skidpad.roads.kernels import LaneArrays
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.interface import Stack
 
 RAIN_ID, AIR_ID = "envelope_rain", "envelope_air"
 SENSORS = (PointSensorSpec(RAIN_ID, RAIN_SENSOR), PointSensorSpec(AIR_ID, AIR_THERMOMETER))
-# mm of water by stage of the rain sensor, as high as to be expected: wet, heavy rain and puddles of the
-# friction table of the Bosch Automotive Handbook (docs/physics.md)
-FILMS = (0.0, 0.2, 1.0, 2.0)
-TABLE_KMH = (80.0, 60.0, 40.0)  # rows of the rival: dry, rain, cold
-V_CREEP = 1.5  # m/s, below it the stack is left alone: it must be able to start
-BRAKE_GAIN = 1.0  # 1/s, from too much speed to deceleration
-SOFT = 1.0  # m/s below the limit, over which throttle is taken away
-CLOSE = 2.0  # m kept behind a standing lead
-LEAD_GRIP = 1.2  # times the estimate that a lead's tyres may have
-LEAD_BRAKE = 8.0  # m/s^2 that it brakes at most
-# of brake pulses: within what drivers find comfortable, 2 m/s^2 (our assumption)
-PULSE_BRAKE, PULSE_TIME, PULSE_EVERY = 1.5, 0.8, 300.0  # m/s^2, s, m from one to the next
 EVERY = (1 << len(Binding)) - 1  # limits as bits
 # settings that kernels take as they are, as floats: each other type would be another kernel
 PLAIN = ("share", "lateral_share", "delay", "approach", "most", "stiffness", "factor", "dt")
-ORACLE_STEP = 0.5  # m/s between values of a grip that is known, for studies
-PULSE_BELOW, PULSE_V_LEAST, PULSE_AY_MOST = 0.3, 8.0, 0.5  # confidence, m/s, m/s^2 across
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -182,246 +165,13 @@ class Allowed:
         }  # fmt: skip
 
 
-class EnvelopeRules(NamedTuple):
-    """What holds for an envelope in all ticks; fields as in `EnvelopeSettings`."""
-
-    share: float
-    lateral_share: float
-    delay: float
-    approach: float
-    most: float
-    stiffness: float
-    factor: float
-    has_table: bool
-    table: tuple[float, float, float]  # m/s
-    rss: bool
-    rss_limits: RssParameters
-    counted: int  # limits that count, as bits by Binding
-    is_rival: bool  # a table or RSS in the place of the envelope
-    acts: bool  # it does not only watch
-    pulses: bool
-    dt: float  # s
-    car: Car
-    bus: BusRules
-    sight: SightRules
-
-
-class EnvelopeArrays(NamedTuple):
-    """What an envelope remembers, for kernels."""
-
-    grip: GripArrays
-    bus: BusArrays
-    sight: SightArrays
-    limits: Floats  # (9,) m/s by Binding, inf: none; of this tick
-    true_grip: Floats  # (n,) at each ORACLE_STEP m/s, for studies only; (0,): unknown
-    said: Floats  # (BLOCK, 8) RECORDED and `shown` of ticks, each in the row of its noise
-    pulse: Floats  # m since the last brake pulse, s that are left of one
-
-
-class EnvelopeParts(NamedTuple):
-    """All that an envelope reads and writes: behind one pointer, as each array costs a call 0.2 us."""
-
-    rules: EnvelopeRules
-    arrays: EnvelopeArrays
-    map: Held[LaneArrays]
-
-
-class Motion(NamedTuple):
-    """Pose, speed and accelerations of the ego, as `feel_motion` has them."""
-
-    x: float
-    y: float
-    z: float
-    pitch: float
-    yaw: float
-    v: float
-    yaw_rate: float
-    ax: float
-    ay: float
-    wheels: tuple[float, float, float, float]
-
-
-class Told(NamedTuple):
-    """What the envelope says in a tick: numbers of `Allowed`, NaN for None."""
-
-    speed: float
-    binding: int
-    value: float  # grip, to confidence
-    shown: float
-    confidence: float
-    prior: float
-    reach: float
-    places: int  # of the way ahead
-    grade: float
-    has_lead: bool
-
-
-RECORDED = ("speed_mps", "binding", "grip", "confidence", "prior", "reach_m", "ego_mps")
-
-
-@kernel
-def find_limits(
-    parts: Held[EnvelopeParts], distance: Floats32, azimuth: Floats32, altitude: Floats32,
-    velocity: Floats32, ego: Motion, throttle: float, brake: float, steer: float, stage: int,
-    is_cold: bool,
-) -> Told:  # fmt: skip
-    """Takes what is sensed in a tick and writes the limits of speed; returns what else is found.
-
-    distance to velocity: of the radar, as `RadarPoints`. throttle, brake, steer: of the command of the tick
-    before, 0 while a supervisor drives. stage: of the rain sensor, 0: dry; is_cold: by the thermometer. Once
-    per tick.
-    """
-    r, arrays, map = parts.value.rules, parts.value.arrays, parts.value.map
-    points = RadarPoints(distance, azimuth, altitude, velocity)
-    limits, v = arrays.limits, max(ego.v, 0.0)
-    limits[:] = inf
-    places, grade = trace_way(map, ego.x, ego.y, ego.z, ego.yaw, arrays.sight.way)
-    signals = write_message(
-        arrays.bus, r.bus, ego.wheels, ego.ax, ego.ay, ego.yaw_rate, steer, brake,
-        drive_at(r.car, throttle, v), grade,
-    )  # fmt: skip
-    expected = PRIORS[stage + COLD if is_cold else stage]
-    value, shown, sure, prior = estimate_grip(
-        arrays.grip, r.car, r.stiffness, r.dt, signals, stage, expected, grade
-    )
-    if len(arrays.true_grip) > 0:
-        value = grip_at(arrays.true_grip, v)
-        shown, sure = value, 1.0
-    elif r.factor != 1.0:
-        value *= r.factor
-    reach, has_lead = 0.0, not isnan(arrays.sight.memory[0].gap)
-    if r.has_table:
-        limits[Binding.TABLE] = r.table[2 if is_cold else min(stage, 1)]
-    elif r.rss:
-        limits[Binding.TABLE] = TABLE_KMH[0] / 3.6
-        if places > 0:
-            has_lead = see_lead(arrays, r, points, places, ego, v)
-        if has_lead:
-            lead = arrays.sight.memory[0]
-            limits[Binding.LEAD] = rss_speed(lead.gap, lead.lead_speed, r.rss_limits)
-    else:
-        limits[Binding.WATER] = floating_speed(FILMS[stage])
-        if places > 0:  # else nothing is known of what lies ahead
-            has_lead = see_lead(arrays, r, points, places, ego, v)
-            reach = limit_ahead(arrays, r, places, ego, v, value, has_lead)
-    speed, binding = lowest(limits, r.counted, r.most)
-    said = arrays.said[arrays.bus.memory[0].drawn - 1]
-    said[0], said[1], said[2], said[3] = speed, binding, value, sure
-    said[4], said[5], said[6], said[7] = prior, reach, v, shown
-    return Told(speed, binding, value, shown, sure, prior, reach, places, grade, has_lead)
-
-
-@kernel
-def grip_at(known: Floats, v: float) -> float:
-    """Returns the grip at v in m/s from (n,) values for each ORACLE_STEP m/s; beyond them the last one."""
-    if not isfinite(v):
-        return nan
-    i = min(max(int(v / ORACLE_STEP), 0), len(known) - 1)
-    j = min(i + 1, len(known) - 1)
-    return float(known[i] + (v / ORACLE_STEP - i) * (known[j] - known[i]))
-
-
-@kernel
-def see_lead(
-    arrays: EnvelopeArrays, r: EnvelopeRules, points: RadarPoints, places: int, ego: Motion,
-    v: float,
-) -> bool:  # fmt: skip
-    """Returns whether there is a lead, whose gap and speed are noted."""
-    return look_for_lead(
-        arrays.sight, r.sight, points, places, ego.x, ego.y, ego.z, ego.pitch, ego.yaw, v
-    )
-
-
-@kernel
-def limit_ahead(
-    arrays: EnvelopeArrays, r: EnvelopeRules, places: int, ego: Motion, v: float, grip: float,
-    has_lead: bool,
-) -> float:  # fmt: skip
-    """Writes the limits by sight, bends and lead, and returns the m that are seen to be clear."""
-    limits, sight, way = arrays.limits, arrays.sight.memory[0], arrays.sight.way
-    braking = r.share * grip * G
-    reach = min(sight.reach, clear_way(way, r.sight, places, ego.x, ego.y, ego.yaw))
-    limits[Binding.SIGHT] = sight_speed(reach, braking, r.delay)
-    limits[Binding.BEND] = bends_speed(
-        way[0, :places], way[4, :places], r.lateral_share * grip * G, min(r.approach, braking),
-        r.delay, v,
-    )  # fmt: skip
-    if has_lead:
-        hardest = min(LEAD_GRIP * grip * G, LEAD_BRAKE)
-        limits[Binding.LEAD] = following_speed(
-            sight.gap - CLOSE, sight.lead_speed, braking, hardest, r.delay
-        )
-    return float(reach)
-
-
-@kernel
-def hold_back(
-    throttle: float, brake: float, reverse: bool, v: float, allowed: float, approach: float,
-    a_brake: float,
-) -> tuple[float, float]:  # fmt: skip
-    """Returns less throttle above `allowed` - SOFT m/s and more brake above `allowed`.
-
-    Unchanged when backing up, below V_CREEP, or where no more is asked for. approach: m/s^2 of braking at
-    most; a_brake: m/s^2 of full brake.
-    """
-    if v <= max(allowed - SOFT, V_CREEP) or reverse:
-        return throttle, brake
-    share = min(max((allowed - v) / SOFT, 0.0), 1.0)
-    asked = min(BRAKE_GAIN * max(v - allowed, 0.0), approach) / a_brake
-    return throttle * share, max(brake, asked)
-
-
-@kernel
-def pulse_brake(
-    pulse: Floats, v: float, ay: float, confidence: float, has_lead: bool, dt: float
-) -> float:
-    """Returns m/s^2 to brake with in this tick, PULSE_BRAKE in a pulse, else 0; call it in every tick.
-
-    Brakes a little, now and then, where nothing is known of the grip and the way is free. pulse: m since the
-    last one, s left. A pulse lasts PULSE_TIME s and comes after PULSE_EVERY m. None comes from confidence
-    PULSE_BELOW on, behind a lead, at PULSE_V_LEAST or slower, or from PULSE_AY_MOST on.
-    """
-    pulse[0] += max(v, 0.0) * dt
-    is_free = not has_lead and v > PULSE_V_LEAST and abs(ay) < PULSE_AY_MOST
-    if confidence >= PULSE_BELOW or not is_free:
-        pulse[1] = 0.0
-        return 0.0
-    if pulse[0] > PULSE_EVERY:
-        pulse[0], pulse[1] = 0.0, PULSE_TIME
-    pulse[1] -= dt
-    return PULSE_BRAKE if pulse[1] > 0.0 else 0.0
-
-
-@kernel
-def keep_inside(
-    parts: Held[EnvelopeParts], told: Told, v: float, ay: float, throttle: float, brake: float,
-    reverse: bool,
-) -> tuple[float, float]:  # fmt: skip
-    """Returns throttle and brake of the stack's command, held back to the allowed speed.
-
-    v, ay: of the ego, m/s and m/s^2.
-    """
-    r = parts.value.rules
-    braking = r.share * told.value * G
-    approach = min(r.approach, braking)
-    if told.binding == Binding.LEAD:  # a lead may brake at any moment
-        approach = braking
-    throttle, brake = hold_back(throttle, brake, reverse, v, told.speed, approach, r.car.a_brake)
-    if r.pulses:
-        pulse = parts.value.arrays.pulse
-        least = pulse_brake(pulse, v, ay, told.confidence, told.has_lead, r.dt)
-        if least > 0.0:
-            throttle, brake = 0.0, max(brake, least / r.car.a_brake)
-    return throttle, brake
-
-
 class Envelope:
     """The speed that is safe here and now."""
 
     def __init__(
         self, specs: Sequence[SensorSpec], map: RoadMap, settings: EnvelopeSettings
     ) -> None:
-        self.map, self.settings = map, settings
+        self.settings = settings
         radar = next((spec for spec in specs if isinstance(spec, RadarSpec)), None)
         true_range = settings.oracle_sight
         if true_range is not None and radar is None:
@@ -434,7 +184,7 @@ class Envelope:
         self.arrays = EnvelopeArrays(
             new_estimator(), self.bus.arrays, new_sight(self.rules.sight),
             np.full(len(Binding), inf), np.array(settings.oracle or (), dtype=np.float64),
-            np.empty((BLOCK, 8)), np.zeros(2),
+            np.zeros((BLOCK, 8)), np.zeros(2),
         )  # fmt: skip
         self.held = hold(EnvelopeParts(self.rules, self.arrays, map.held))
         self.further: FurtherSight | None = None
@@ -442,11 +192,6 @@ class Envelope:
             self.further = FurtherSight(specs, settings.dt, settings.walkers, settings.lanes)
         self.bridges = BridgesAhead(map) if settings.bridges else None
         self.bridge: float | None = None  # m to the next one that may be frozen
-
-    @property
-    def reach(self) -> float:
-        """M at which leads are first seen."""
-        return float(self.arrays.sight.memory["reach"][0])
 
     def newest(self, ticks: int) -> Floats:
         """Returns (ticks, 8) RECORDED and `shown` of the newest ticks, of one block of noise."""
@@ -561,13 +306,10 @@ def read_pedals(command: VehicleCommand) -> tuple[float, float]:
         return nan, nan
 
 
-def lower(
-    command: VehicleCommand, v: float, allowed: float, approach: float, a_brake: float
-) -> VehicleCommand:
-    """Returns the command as `hold_back` has it."""
-    throttle, brake = hold_back(
-        command.throttle, command.brake, command.reverse, v, allowed, approach, a_brake
-    )
+def with_pedals(command: VehicleCommand, throttle: float, brake: float) -> VehicleCommand:
+    """Returns the command with these pedals, all else as it was; the very command where they are its own."""
+    if throttle == command.throttle and brake <= command.brake:
+        return command
     return replace(command, throttle=throttle, brake=brake)
 
 
@@ -611,11 +353,10 @@ class GovernedStack:
 
     def pass_ticks(self, ticks: int, applied: VehicleCommand) -> None:
         """Takes in that kernels drove so many ticks; applied: the last command."""
-        *_, reach, v, shown = row = self.envelope.newest(ticks)[-1].tolist()
-        self.applied = applied
-        self.allowed = Allowed(
-            row[0], Binding(int(row[1])), make_grip(row[2], shown, row[3], row[4]), reach, v
-        )
+        row = self.envelope.newest(ticks)[-1].tolist()
+        speed, binding, value, confidence, prior, reach, v, shown = row
+        grip = make_grip(value, shown, confidence, prior)
+        self.applied, self.allowed = applied, Allowed(speed, Binding(int(binding)), grip, reach, v)
 
     def close(self) -> None:
         """Calls the stack's `close` where it has one."""
@@ -646,8 +387,7 @@ class GovernedStack:
                 self.envelope.held, told, float(frame.ego.speed), float(frame.ego.ay), *pedals,
                 bool(command.reverse),
             )  # fmt: skip
-            if throttle != command.throttle or brake > command.brake:
-                command = replace(command, throttle=throttle, brake=brake)
+            command = with_pedals(command, throttle, brake)
         self.applied = command
         return command
 

@@ -133,7 +133,7 @@ def new_estimator() -> GripArrays:
     """Returns what an estimator remembers that has read nothing."""
     memory = np.zeros(1, ESTIMATOR)
     memory["v"], memory["ratio_variance"] = -1.0, RATIO_FIRST**2
-    return GripArrays(memory, np.empty((WINDOW, 8)), np.empty(8), new_belief())
+    return GripArrays(memory, np.zeros((WINDOW, 8)), np.zeros(8), new_belief())
 
 
 @kernel

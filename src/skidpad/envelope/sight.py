@@ -89,6 +89,21 @@ def locate_on(way: Way, x: Floats, y: Floats) -> tuple[NDArray[np.intp], Floats]
     return nearest, (y - way.y[k]) * np.cos(heading) - (x - way.x[k]) * np.sin(heading)
 
 
+class Motion(NamedTuple):
+    """Pose, speed and accelerations of the ego, as `feel_motion` has them."""
+
+    x: float
+    y: float
+    z: float
+    pitch: float
+    yaw: float
+    v: float
+    yaw_rate: float
+    ax: float
+    ay: float
+    wheels: tuple[float, float, float, float]
+
+
 class SightRules(NamedTuple):
     """What holds for the sight of one stack."""
 
@@ -137,7 +152,7 @@ def new_sight(rules: SightRules) -> SightArrays:
     memory = np.zeros(1, SIGHT)
     memory["gap"], memory["unseen"] = nan, inf
     memory["reach"] = SEEN_PRIOR if isnan(rules.known) else rules.known
-    return SightArrays(memory, np.empty(SEEN_KEPT), np.empty(SEEN_KEPT), np.empty((5, PLACES)))
+    return SightArrays(memory, np.zeros(SEEN_KEPT), np.zeros(SEEN_KEPT), np.zeros((5, PLACES)))
 
 
 @kernel
@@ -148,17 +163,16 @@ def lose_lead(arrays: SightArrays) -> None:
 
 @kernel
 def look_for_lead(
-    arrays: SightArrays, r: SightRules, points: RadarPoints, n: int,
-    x: float, y: float, z: float, pitch: float, yaw: float, v: float,
-) -> bool:  # fmt: skip
+    arrays: SightArrays, r: SightRules, points: RadarPoints, n: int, ego: Motion
+) -> bool:
     """Notes the lead of this tick and returns whether there is one; call it once per tick.
 
-    n: places of the way ahead; x to yaw, v: pose and m/s of the ego. A lead without a return is carried on
-    for HOLD s. A return JOIN m or more beyond a held lead does not replace it. First distances of leads that
-    come nearer are noted for the reach.
+    n: places of the way ahead. A lead without a return is carried on for HOLD s. A return JOIN m or more
+    beyond a held lead does not replace it. First distances of leads that come nearer are noted for the
+    reach.
     """
-    m = arrays.memory[0]
-    gap, speed = find_lead(arrays.way, r, points, n, x, y, z, pitch, yaw, v)
+    m, v = arrays.memory[0], max(ego.v, 0.0)
+    gap, speed = find_lead(arrays.way, r, points, n, ego, v)
     m.unseen += r.dt
     is_held = not isnan(m.gap) and m.unseen <= HOLD
     m.gap = max(m.gap + (m.lead_speed - v) * r.dt, 0.0) if is_held else nan
@@ -173,14 +187,16 @@ def look_for_lead(
 
 @kernel
 def find_lead(
-    way: Floats, r: SightRules, points: RadarPoints, n: int,
-    x: float, y: float, z: float, pitch: float, yaw: float, v: float,
-) -> tuple[float, float]:  # fmt: skip
-    """Returns gap in m and speed in m/s, not below 0, of the nearest radar point in the lane; NaN: none."""
+    way: Floats, r: SightRules, points: RadarPoints, n: int, ego: Motion, v: float
+) -> tuple[float, float]:
+    """Returns gap in m and speed in m/s, not below 0, of the nearest radar point in the lane; NaN: none.
+
+    v: m/s of the ego, not below 0.
+    """
     gap, speed, nearest = nan, nan, inf
     if not r.has_radar or n < 2:
         return gap, speed
-    c, s, climb = cos(yaw), sin(yaw), sin(pitch)
+    c, s, climb = cos(ego.yaw), sin(ego.yaw), sin(ego.pitch)
     for i in range(len(points.range)):
         distance, azimuth = float(points.range[i]), float(points.azimuth[i])
         altitude = float(points.altitude[i])
@@ -188,8 +204,10 @@ def find_lead(
         ahead, left = r.x + flat * cos(azimuth), r.y + flat * sin(azimuth)
         if ahead <= FRONT or flat >= nearest:
             continue
-        place, across = find_place(way, n, x + c * ahead - s * left, y + s * ahead + c * left)
-        above = z + r.z + distance * sin(altitude) - ahead * climb - way[3, place]
+        place, across = find_place(
+            way, n, ego.x + c * ahead - s * left, ego.y + s * ahead + c * left
+        )
+        above = ego.z + r.z + distance * sin(altitude) - ahead * climb - way[3, place]
         if abs(across) < HALF_LANE and LEAST_HEIGHT < above < MOST_HEIGHT:
             nearest, gap = flat, max(ahead - FRONT, 0.0)
             speed = max(v + float(points.velocity[i]) / max(cos(azimuth), 0.1), 0.0)

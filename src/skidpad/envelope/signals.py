@@ -149,7 +149,7 @@ class CarBus:
             m.steer_offset * u[7], 1.0 + m.torque_offset * u[8], steer_max,
         )  # fmt: skip
         self._noise = stream(seed, "envelope/bus/noise")
-        self.arrays = BusArrays(np.zeros(1, BUS), np.empty((m.delay + 1, 10)), np.empty((BLOCK, 8)))
+        self.arrays = BusArrays(np.zeros(1, BUS), np.zeros((m.delay + 1, 10)), np.zeros((BLOCK, 8)))
         self.arrays.memory["drawn"] = BLOCK
 
     def draw_noise(self) -> int:

@@ -40,7 +40,9 @@ from skidpad.core.setup import ActorCommand
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import LightState, Supervision
 from skidpad.envelope.belief import COLD_C
-from skidpad.envelope.govern import GovernedStack, Motion, Told, find_limits, keep_inside
+from skidpad.envelope.govern import GovernedStack
+from skidpad.envelope.govern_kernel import NOTHING_TOLD, find_limits, keep_inside
+from skidpad.envelope.sight import Motion
 from skidpad.recording.run.ticks import TickArrays, TickLog, copy_actors
 from skidpad.sensors.object_level.objects import ObjectSuite, sense
 from skidpad.simulation.embedded.engine import EmbeddedBackend
@@ -66,9 +68,7 @@ from skidpad.stack.think import think
 
 NO_WAY = np.zeros((0, 3))
 ANOTHER_SIMULATOR = "another simulator drives"
-# of the types that kernels of the envelope take
-STILL = Motion(*(0.0,) * 9, (0.0,) * 4)
-NOTHING_TOLD = Told(0.0, 0, *(0.0,) * 5, 0, 0.0, False)
+STILL = Motion(*(0.0,) * 9, (0.0,) * 4)  # of the type that the envelope's kernels take
 
 Returned = tuple[int, int, int, int, float, float, float, bool, int, float, float, int]
 

@@ -16,14 +16,15 @@ from skidpad.core.arrays import Flags, Floats
 from skidpad.core.kernels.calls import call
 from skidpad.core.kernels.jit import Held, inner_kernel, kernel
 from skidpad.core.states import ActorStates
-from skidpad.envelope.govern import (
+from skidpad.envelope.govern_kernel import (
+    NOTHING_TOLD,
     V_CREEP,
     EnvelopeParts,
-    Motion,
     Told,
     find_limits,
     keep_inside,
 )
+from skidpad.envelope.sight import Motion
 from skidpad.physics.fleet import shown_gear
 from skidpad.recording.run.ticks import APPLIED, REPORT, REQUESTED, ActorColumns, copy_actors
 from skidpad.roads.journeys import come_by
@@ -232,7 +233,7 @@ def ask_envelope(
     """
     rules = joined.value.rules
     if inside is None:
-        return rules.v_told, Told(0.0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0.0, False)
+        return rules.v_told, NOTHING_TOLD
     echoes = joined.value.sensors.value.around.radar.echoes
     ego = Motion(
         felt[0], felt[1], felt[2], felt[4], felt[5], felt[6], felt[7], felt[8], felt[9],

@@ -9,7 +9,8 @@ from skidpad.campaign.driving.loop import Moment, Sink
 from skidpad.core.sensor_types import SensorType, find_sensor_type, read_sensor
 from skidpad.core.setup import Setup
 from skidpad.core.specs import AIR_SENSORS
-from skidpad.envelope.govern import RECORDED, GovernedStack
+from skidpad.envelope.govern import GovernedStack
+from skidpad.envelope.govern_kernel import RECORDED
 from skidpad.envelope.limits import Binding
 from skidpad.recording.run.readings import (
     RecordedSensor,

@@ -240,7 +240,7 @@ class Group:
         dtypes = {a.dtype for a in leaves[0].arrays} | {FLOATS, INTS}
         ordered = tuple(sorted(dtypes, key=repr))
         with stages.time("compiling"):
-            self.kernel = find_kernel(leaves[0].source, ordered, KeyLeaves(leaves[0]))
+            self.kernel = find_kernel(KeyLeaves(leaves[0]), ordered)
         with stages.time("copying"):
             self.stores = Stores(leaves, ordered, LOGS, ROWS, WORK, INTERLEAVED)
         n = len(worlds)
@@ -370,9 +370,8 @@ class KeyLeaves:
 
 
 @cache
-def find_kernel(source: str, dtypes: tuple[np.dtype[Any], ...], key: KeyLeaves) -> Any:
-    """Returns the kernel of a launch for values of this source; its machine code is kept on the disk."""
-    del source
+def find_kernel(key: KeyLeaves, dtypes: tuple[np.dtype[Any], ...]) -> Any:
+    """Returns the kernel of a launch for such values; its machine code is kept on the disk."""
     leaves, names = key.leaves, name_stores(dtypes)
     text = write_taker(leaves, dtypes)
     space: dict[str, Any] = {**leaves.classes, "view": find_view(), "uint64": np.uint64}

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from envelope_power import ENOUGH, factor_bound
+from envelope_power import ENOUGH, LEVEL, factor_bound
 from result_texts import markdown
 from skidpad.core.arrays import Floats
 from skidpad.evidence.statistics import compare_pairs, holm, mean_limits, poisson_interval
@@ -38,6 +38,9 @@ SURFACES = {
     "dry": ("clear-noon", "clear-night"),
 }  # fmt: skip
 SLIPPERY = ("rain", "snow", "ice")
+WORSE_BY = (
+    5.0  # events per 100 km: a cell that has so many more is worse (preregistration of 2026-11-28)
+)
 EVENTS_PER_KM = (pl.col("serious_contacts") + pl.col("road_departures")).sum() / pl.col(
     "distance_km"
 ).sum()
@@ -196,6 +199,36 @@ def goals(folder: Path) -> str:
             "p against the table (Holm)"]  # fmt: skip
     text = f"{len(maps)} of {len(MAPS)} maps. Contacts of 5 km/h + departures.\n\n"
     return text + markdown(head, rows)
+
+
+def worse(folder: Path) -> str:
+    """Returns one row per map and weather: has the envelope more events than the bare stack, by WORSE_BY?
+
+    folder: of any map of the proof. Paired by seed; p values of all cells are adjusted together (Holm).
+    """
+    found = [
+        (name.removeprefix("envelope-"), weather, drivers)
+        for name in MAPS
+        if (path := folder.with_name(name)).is_dir()
+        for weather, drivers in cells(path)
+        if ENVELOPE in drivers
+    ]
+    more = [
+        100.0 * np.subtract(*(by_seed([d[n]], EVENTS_PER_KM) for n in (ENVELOPE, BARE)))
+        for _, _, d in found
+    ]
+    fewer = holm([compare_pairs(WORSE_BY - m).p_greater for m in more])
+    larger = holm([compare_pairs(m - WORSE_BY).p_greater for m in more])
+    rows = []
+    for (name, weather, d), m, p, q in zip(found, more, fewer, larger, strict=True):
+        verdict = "not worse" if p < LEVEL else "worse" if q < LEVEL else "too few to say"
+        rows.append(
+            [name, weather, count_text(d[BARE]), count_text(d[ENVELOPE]), compared_text(m, 1), f"{p:.2g}",
+             verdict]
+        )  # fmt: skip
+    head = ["map", "weather", BARE, ENVELOPE, "more events per 100 km, mean of seeds (95 %)",
+            f"p of {WORSE_BY:.0f} more (Holm)", "verdict"]  # fmt: skip
+    return markdown(head, rows)
 
 
 def count_text(runs: pl.DataFrame) -> str:

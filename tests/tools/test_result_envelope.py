@@ -133,6 +133,26 @@ def test_goals_are_judged_over_the_maps_that_are_driven(tmp_path):
     assert rows["dry"][5].strip() == "too few (0)"
 
 
+@pytest.mark.parametrize(("contacts", "verdict"), [(1, "not worse"), (5, "worse")])
+def test_a_cell_is_worse_where_events_are_more_by_the_margin(tmp_path, contacts, verdict):
+    write_runs(tmp_path / proof.MAPS[0], {"3": 3, "5": contacts})
+    rows = rows_of(proof.worse(tmp_path / proof.MAPS[1]), "figure8")
+    assert rows["snow"][6] == verdict
+    assert rows["snow"][4].startswith(f"{20.0 * (contacts - 3):+.1f} (")
+    assert rows["clear-noon"][6] == "not worse"
+
+
+def test_a_cell_of_few_seeds_that_scatter_is_too_small_to_say(tmp_path):
+    folder = tmp_path / proof.MAPS[0]
+    write_runs(folder, {"3": 1, "5": 1})
+    runs = pl.read_parquet(folder / "results.parquet")
+    scattered = pl.when((pl.col("config") == "5") & (pl.col("seed") == 1)).then(9)
+    runs.with_columns(
+        serious_contacts=scattered.otherwise(pl.col("serious_contacts"))
+    ).write_parquet(folder / "results.parquet")
+    assert rows_of(proof.worse(folder), "figure8")["snow"][6] == "too few to say"
+
+
 def test_a_factor_is_of_events_per_km(tmp_path):
     assert proof.factor_text(40, 4, 0.5) == f"5.0 (above {0.5 * power.factor_bound(40, 4):.1f})"
 

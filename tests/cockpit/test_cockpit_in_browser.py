@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 from dataclasses import replace
 from time import sleep
 
@@ -333,6 +334,13 @@ def test_a_campaign_is_watched_in_a_browser(browser, tmp_path):
             )
         ).wait_for()
         until(page, "() => document.querySelector('.q-img img')?.naturalWidth === 80")
+        # of a run whose log is there a film, from before the crash on
+        shutil.copytree(tmp_path / RUNS / "2_clear-noon-001", tmp_path / RUNS / "2_clear-noon-005")
+        ledger.write_text(ledger.read_text() + line.replace("-003", "-005") + "\n")
+        page.get_by_text(
+            re.compile("worst crash: 2_clear-noon-005.*; film from 5 s before it")
+        ).wait_for()
+        until(page, "() => document.querySelector('.q-img img')?.naturalWidth === 480")
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
         photograph(page, "watch-390")
         context.close()

@@ -18,6 +18,7 @@ from skidpad.campaign.driving.loop import Sink
 from skidpad.campaign.runs.run import run
 from skidpad.campaign.takeover.desk import Desk, Recorded
 from skidpad.cli.main import app
+from skidpad.cli.options import carla_backend
 from skidpad.cockpit import producer as producer_module
 from skidpad.cockpit import serving
 from skidpad.cockpit.bridge import ASLEEP_AFTER, RELEASE_AFTER, Bridge, DeadMan, Tabs
@@ -45,7 +46,7 @@ from skidpad.cockpit.words import (
 from skidpad.core.errors import ConfigError, InputError, SkidpadError
 from skidpad.core.frames import RadarPoints
 from skidpad.core.inputs import Crowd, Functions, Lamps, LampSwitch, Method, Pedals, Sky, Wheel
-from skidpad.core.run import Function
+from skidpad.core.run import Function, run_from_plain
 from skidpad.core.setup import DT
 from skidpad.core.specs import Modality
 from skidpad.core.states import StackReport
@@ -223,21 +224,55 @@ def test_a_pause_shows_the_moment_and_goes_on_by_steps():
     theirs.close()
 
 
+@pytest.fixture
+def drive_asked(monkeypatch, tmp_path):
+    """A function that invokes `skidpad drive` and returns what would be driven: job and plain data."""
+    kept = []
+    monkeypatch.setattr(serving, "serve", lambda producer, *_: kept.append(producer) or "ended")
+    monkeypatch.setattr(producer_module, "Producer", lambda job, about: (job, about))
+
+    def ask(*words):
+        done = CliRunner().invoke(app, ["drive", *words, "--out", str(tmp_path / "run")])
+        assert done.exit_code == 0, done.exception
+        return kept.pop()
+
+    return ask
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_drive_begins_in_rain_behind_a_lead(drive_asked, seed):
+    _, about = drive_asked("--duration", "4", "--sensors", "objects", "--seed", str(seed))
+    spec = run_from_plain(about["spec"], "the drive")
+    assert spec.weather.precipitation > 0.0
+    log = run(spec).log
+    for second in (2, 3):
+        k = 20 * second
+        x, y, yaw = (getattr(log.actors, name)[k] for name in ("x", "y", "yaw"))
+        dx, dy, c, s = x - x[0], y - y[0], np.cos(yaw[0]), np.sin(yaw[0])
+        ahead, left = c * dx + s * dy, c * dy - s * dx
+        lead = (ahead > 20.0) & (ahead < 60.0) & (abs(left) < 1.0)
+        assert (np.hypot(log.actors.vx[k], log.actors.vy[k])[lead] > 1.0).any()
+
+
+def test_a_drive_on_a_carla_server_keeps_the_traffic_that_it_can_have(drive_asked, monkeypatch):
+    monkeypatch.setattr(carla_backend, "check_backend", lambda choice: choice)
+    for words, traffic in (((), "fixed"), (("--traffic", "random"), "random")):
+        _, about = drive_asked("--backend", "carla", *words)
+        assert about["spec"]["course"]["traffic"] == traffic
+    with pytest.raises(AssertionError, match="embedded simulator alone"):
+        drive_asked("--backend", "carla", "--traffic", "pack")
+
+
 @pytest.mark.req("A-267", "A-268")
 @pytest.mark.parametrize(
     ("words", "own"),
     [((), True), (("--no-gc-in-pause",), False), (("--without", "gc-in-pause"), False)],
 )
 def test_a_drive_collects_garbage_in_its_pauses_unless_it_is_told_not_to(
-    feed, monkeypatch, tmp_path, words, own
+    feed, monkeypatch, drive_asked, words, own
 ):
-    kept = []
-    monkeypatch.setattr(serving, "serve", lambda producer, *_: kept.append(producer) or "ended")
-    monkeypatch.setattr(producer_module, "Producer", lambda job, about: (job, about))
-    asked = ["drive", "--sensors", "objects", "--vehicles", "0", "--duration", "0.5", "--rate", "0"]
-    done = CliRunner().invoke(app, [*asked, *words, "--out", str(tmp_path / "run")])
-    assert done.exit_code == 0, done.output
-    ((job, about),) = kept
+    asked = ["--sensors", "objects", "--vehicles", "0", "--duration", "0.5", "--rate", "0"]
+    job, about = drive_asked(*asked, *words)
     disabled = []
     monkeypatch.setattr(pacing.gc, "disable", lambda: disabled.append(True))
     ours, theirs = multiprocessing.Pipe()

@@ -18,6 +18,9 @@ from skidpad.campaign.runs.desk_run import drive_at_desk
 from skidpad.campaign.takeover.desk import Desk, Recorded
 from skidpad.campaign.workers.pool import local
 from skidpad.cli.main import app
+from skidpad.cockpit import crash_film
+from skidpad.cockpit import source as source_module
+from skidpad.cockpit.crash_film import draw_crash
 from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.film import stretch_of, write_film
 from skidpad.cockpit.pictures import colours
@@ -44,6 +47,7 @@ from skidpad.core.states import ContactEvent
 from skidpad.core.vocabulary import GripModel, RangeModel
 from skidpad.physics.presets import preset
 from skidpad.recording.campaign.folder import RUNS
+from skidpad.recording.run.events import encode_events
 from skidpad.recording.run.log_files import EVENTS, TICKS
 from support.runs import adas_run
 
@@ -209,6 +213,22 @@ def test_a_stretch_becomes_a_film(driven, tmp_path):
     for begin, end in ((3, 2), (-1, 2), (50, 60)):
         with pytest.raises(ConfigError, match="--from"):
             stretch_of(recording, begin, end)
+
+
+def test_the_film_of_the_worst_crash_begins_before_it(driven, tmp_path, monkeypatch):
+    run = tmp_path / "run"
+    shutil.copytree(driven[0], run)
+    crash = ContactEvent(95, 1, "", impulse=1e3, v_closing=2.0, x=0.0, y=0.0)
+    (run / EVENTS).write_bytes(encode_events((crash,)))
+    monkeypatch.setattr(source_module, "BEFORE", 0.5)
+    for length, pictures in ((8.0, 8), (0.4, 5)):  # of every second of the ticks 85 to 99, or 93
+        monkeypatch.setattr(crash_film, "LENGTH", length)
+        draw_crash(run, tmp_path / "film.webp")
+        with Image.open(tmp_path / "film.webp") as film:
+            assert film.n_frames == pictures
+    with pytest.raises(FileError, match="not the folder of a run"):
+        draw_crash(tmp_path, tmp_path / "none.webp")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["film.webp", "run"]
 
 
 def sheet(driven, path, *words):

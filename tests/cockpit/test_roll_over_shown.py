@@ -5,8 +5,10 @@ from types import SimpleNamespace
 import pytest
 
 from skidpad.cockpit.hud import list_events
+from skidpad.cockpit.replay import told_of
 from skidpad.cockpit.watching import Key, Line, has_crashed
 from skidpad.core.vocabulary import Supervision
+from skidpad.recording.run.events import RolledOver
 
 
 def moment(*rolled):
@@ -23,6 +25,11 @@ def moment(*rolled):
 def test_the_cockpit_says_which_vehicle_rolled_over():
     assert list_events(moment()) == []
     assert list_events(moment(0, 1)) == ["ego rolled over", "lorry rolled over"]
+
+
+def test_a_replay_marks_the_egos_roll_over_as_a_crash():
+    assert told_of(RolledOver(30, 0)) == ("crash", "rolled over")
+    assert told_of(RolledOver(30, 1)) is None
 
 
 @pytest.mark.parametrize(

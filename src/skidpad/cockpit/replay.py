@@ -43,7 +43,7 @@ from skidpad.core.vocabulary import DetectionStatus, LightSource, LightState, Su
 from skidpad.evidence.bodies import body
 from skidpad.evidence.pairs import together
 from skidpad.physics.types import vehicle_types
-from skidpad.recording.run.events import LightChange, Notice, Relocation
+from skidpad.recording.run.events import LightChange, Notice, Relocation, RolledOver
 from skidpad.recording.run.inputs import read_inputs
 from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.log_files import TICKS, read_log
@@ -216,6 +216,8 @@ def told_of(event: Any) -> tuple[str, str] | None:
     match event:
         case ContactEvent():
             return "crash", f"contact with {event.static or 'a vehicle'}"
+        case RolledOver(actor=0):
+            return "crash", "rolled over"
         case Relocation():
             return "put back", event.reason.name.lower().replace("_", " ")
         case LaneInvasion() if event.marking == "solid":

@@ -7,11 +7,13 @@ import time
 import webbrowser
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from shlex import quote
-from typing import Any
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -25,6 +27,9 @@ from skidpad.pages.server import Place, Server
 from skidpad.pages.site import nicegui, site
 from skidpad.recording.campaign.folder import RUNS, last_snapshot
 from skidpad.recording.campaign.ledger import CAMPAIGN, LEDGER, latest, read_identity, read_ledger
+
+if TYPE_CHECKING:
+    from skidpad.cockpit.crash_film import CrashFilms
 
 WRAPPED = "overflow-wrap: anywhere"  # the name of a folder may be wider than a phone
 GOOD = "without a crash"
@@ -75,7 +80,7 @@ class Standing:
     cells: tuple[Cell, ...]
     worst_crash: str  # name of the run with the hardest one; "": none yet
     picture: Path | None = None  # the last one that was taken in that run
-    replay: str = ""  # command that replays that run from before its fastest crash; "": not kept
+    run: Path | None = None  # folder of that run; None: not kept
 
 
 def standing(folder: Path) -> Standing:
@@ -100,7 +105,7 @@ def standing(folder: Path) -> Standing:
         cells=tuple(_cell(name, good) for name, good in sorted(cells.items())),
         worst_crash=worst,
         picture=None if run is None else last_snapshot(run),
-        replay=f"skidpad replay {quote(str(run))}" if run is not None and run.is_dir() else "",
+        run=run if run is not None and run.is_dir() else None,
     )
 
 
@@ -140,8 +145,10 @@ def lines(now: Standing) -> list[str]:
         f"{c.name}: {c.good} of {c.runs} {GOOD}, 95 % {c.low:.2f} to {c.high:.2f}"
         for c in now.cells
     ]
-    begins = f"  ({now.replay} begins before its fastest crash)" if now.replay else ""
-    told.append(f"worst crash: {now.worst_crash or 'none'}{begins}")
+    told.append(f"worst crash: {now.worst_crash or 'none'}")
+    if now.run is not None:
+        replay = f"skidpad replay {quote(str(now.run))}"
+        told[-1] += f"  ({replay} begins before its fastest crash)"
     return told
 
 
@@ -153,8 +160,11 @@ COLUMNS: list[dict[str, Any]] = [
 ]
 
 
-def build(folder: Path) -> Callable[[], None]:
-    """Returns a function that builds the page of a campaign's standing, read anew every REFRESH s."""
+def build(folder: Path, films: CrashFilms) -> Callable[[], None]:
+    """Returns a function that builds the page of a campaign's standing, read anew every REFRESH s.
+
+    films: of its worst crash; the last picture of that run where there is none.
+    """
 
     def page() -> None:
         from nicegui import ui
@@ -162,10 +172,10 @@ def build(folder: Path) -> Callable[[], None]:
         ui.label(str(folder)).style(f"font-size: 18px; font-weight: 600; {WRAPPED}")
         bar = ui.linear_progress(value=0.0, show_value=False).props("size=14px rounded")
         said = ui.label()
-        table = ui.table(columns=COLUMNS, rows=[], row_key="name").props("dense flat dark")
-        table.style("width: 100%")
         crash = ui.label().style(WRAPPED)
         picture = ui.image().props("no-spinner").style("width: 100%; max-width: 640px")
+        table = ui.table(columns=COLUMNS, rows=[], row_key="name").props("dense flat dark")
+        table.style("width: 100%")
         shown: list[Path | None] = [None]
 
         def refresh() -> None:
@@ -176,12 +186,14 @@ def build(folder: Path) -> Callable[[], None]:
                 return
             head = lines(now)
             said.text = f"{head[0]}; {head[1]}"
-            pictured = "; last picture of that run" if now.picture else ""
-            crash.text = head[-1] + pictured
-            if now.picture != shown[0]:
-                picture.set_source("" if now.picture is None else as_address(now.picture))
-                shown[0] = now.picture
-            picture.set_visibility(now.picture is not None)
+            found = films.find(now.run) or now.picture
+            pictured = "last picture of that run" if now.picture else ""
+            seen = films.describe(now.run) or pictured
+            crash.text = f"{head[-1]}; {seen}" if seen else head[-1]
+            if found != shown[0]:
+                picture.set_source("" if found is None else as_address(found))
+                shown[0] = found
+            picture.set_visibility(found is not None)
             bar.value = now.done / now.planned if now.planned else 0.0
             table.rows = [
                 {
@@ -201,8 +213,9 @@ def build(folder: Path) -> Callable[[], None]:
 
 
 def as_address(picture: Path) -> str:
-    """Returns a picture's file as a data URI, so that no folder is served."""
-    return "data:image/png;base64," + base64.b64encode(picture.read_bytes()).decode()
+    """Returns a picture's file, .png or .webp, as a data URI, so that no folder is served."""
+    kind = picture.suffix.removeprefix(".")
+    return f"data:image/{kind};base64," + base64.b64encode(picture.read_bytes()).decode()
 
 
 def serve_watch(folder: Path, place: Place, say: Callable[[str], None], browser: bool) -> None:
@@ -210,15 +223,21 @@ def serve_watch(folder: Path, place: Place, say: Callable[[str], None], browser:
 
     say: takes the address. browser: opens one where there is a screen.
     """
+    from skidpad.cockpit.crash_film import CrashFilms  # draws: `--once` needs none of it
+
     standing(folder)
     nicegui()
-    with Server(site("Skidpad watch", {"/": build(folder)}), place) as server:
-        address = server.address()
-        say(f"watch: {address}  (Ctrl-C ends it)")
-        if browser and has_screen():
-            webbrowser.open(address)
-        try:
-            while True:
-                time.sleep(REFRESH)
-        except KeyboardInterrupt:
-            say("ended")
+    with TemporaryDirectory() as drawn, CrashFilms(Path(drawn)) as films:
+        application = site("Skidpad watch", {"/": build(folder, films)})
+        with Server(application, place) as server:
+            address = server.address()
+            say(f"watch: {address}  (Ctrl-C ends it)")
+            if browser and has_screen():
+                webbrowser.open(address)
+            try:
+                while True:
+                    with suppress(InputError):  # the page says it
+                        films.draw(standing(folder).run)
+                    time.sleep(REFRESH)
+            except KeyboardInterrupt:
+                say("ended")

@@ -15,7 +15,7 @@ from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.run import Roads, RunSpec, Scenario
 from skidpad.core.setup import VEHICLES_MAX
 from skidpad.core.simulator import BackendChoice, BackendKind
-from skidpad.core.vocabulary import Bodywork, Scenery
+from skidpad.core.vocabulary import Bodywork, Scenery, TrafficStart
 
 if TYPE_CHECKING:
     from skidpad.cockpit.source import Source
@@ -75,8 +75,14 @@ class OnClose(str, Enum):
     PAUSE = "pause"
 
 
-@spread_fields(duration=3600.0, scenery=Scenery.FULL, bodywork=Bodywork.SHAPED)
+@spread_fields(
+    duration=3600.0,
+    traffic=TrafficStart.PACK,  # a lead is in sight from the first second on
+    scenery=Scenery.FULL,
+    bodywork=Bodywork.SHAPED,
+)
 def drive(
+    context: typer.Context,
     drivers: Drivers,
     run: RunSpec,
     roads: Roads,
@@ -107,11 +113,13 @@ def drive(
         Path | None, typer.Option(help="Folder of the run; default: out/drives/<name>, numbered.")
     ] = None,
 ) -> None:
-    """Drive in a browser: watch the stack, take over, change weather and grip; keeps a run."""
+    """Drive in a browser, in rain behind a lead: watch the stack or take over; keeps a run."""
     from skidpad.cli.options.carla_backend import check_backend
     from skidpad.physics.presets import find_weather
     from skidpad.roads.map_files import require_map
 
+    if backend.backend == BackendKind.CARLA and is_default(context, "traffic"):
+        roads = structs.replace(roads, traffic=TrafficStart.FIXED)  # a CARLA server keeps no pack
     chosen = drivers.find_drivers() if drivers != Drivers() else Drivers(configs="3").find_drivers()
     if len(chosen) != 1:
         raise ConfigError(f"one driver at a time, got {len(chosen)}")
@@ -143,6 +151,12 @@ def drive(
     pauses = on_close is OnClose.PAUSE
     shown = About("drive", vehicles=most, pauses=pauses, parts=list_parts(spec))
     typer.echo(serve(producer, shown, place_of(pages), typer.echo, not pages.no_browser))
+
+
+def is_default(context: typer.Context, option: str) -> bool:
+    """Returns True when a command was given without this option."""
+    source = context.get_parameter_source(option)
+    return source is not None and source.name == "DEFAULT"
 
 
 def require_place(spec: RunSpec) -> None:
@@ -269,7 +283,7 @@ def watch(
     pages: Pages,
     once: Annotated[bool, typer.Option("--once", help="Print how it stands and end.")] = False,
 ) -> None:
-    """Watch a campaign while it runs: progress, results so far with intervals, the worst crash."""
+    """Watch a campaign while it runs: progress, results with intervals, a film of the worst crash."""
     if not folder.is_dir():
         raise FileError(f"{folder} is not the folder of a campaign")
     from skidpad.cockpit.watching import lines, serve_watch, standing

@@ -314,7 +314,7 @@ def test_a_campaign_is_watched_in_a_browser(browser, tmp_path):
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
         ledger = tmp_path / LEDGER  # a run more while the page is open
         line = ledger.read_text().splitlines()[0]
-        line = re.sub(',"sum":"[0-9a-f]+"', "", line).replace("-001", "-003")
+        line = re.sub("-00[12]", "-003", re.sub(',"sum":"[0-9a-f]+"', "", line))
         ledger.write_text(
             ledger.read_text() + line.replace('"fatal_collisions":0', '"fatal_collisions":1') + "\n"
         )

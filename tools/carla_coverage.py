@@ -9,7 +9,12 @@ import sys
 from pathlib import Path
 
 from skidpad.simulation.carla_server.actors.catalogue import Family, load_catalogue
-from skidpad.simulation.carla_server.actors.effects import acting, is_produced, load_acting
+from skidpad.simulation.carla_server.actors.effects import (
+    acting,
+    additions,
+    is_produced,
+    load_acting,
+)
 from skidpad.simulation.carla_server.methods import TABLES
 
 BEGIN, END = "<!-- coverage: generated -->", "<!-- end of coverage -->"
@@ -54,8 +59,8 @@ def _sensors() -> str:
     lines = [
         "### Sensors",
         "",
-        "| sensor | sends | attributes that act | accepted without effect |",
-        "|---|---|---|---|",
+        "| sensor | sends | attributes that act | our additions (not in Unreal) | without effect |",
+        "|---|---|---|---|---|",
     ]
     for blueprint in load_catalogue().values():
         if blueprint.family is not Family.SENSOR:
@@ -63,9 +68,9 @@ def _sensors() -> str:
         sends = "yes" if is_produced(blueprint.id) else "nothing"
         if blueprint.id in load_acting().in_the_client:
             sends = "computed in the client"
-        own = acting(blueprint)
-        vain = [a for a in blueprint.attributes if a not in own]
-        cells = (", ".join(sorted(own)), _list(vain))
+        acts, ours = acting(blueprint), additions(blueprint)
+        vain = [a for a in blueprint.attributes if a not in acts]
+        cells = (", ".join(sorted(acts - ours)), _list(list(ours)), _list(vain))
         lines.append(f"| `{blueprint.id}` | {sends} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
@@ -82,9 +87,9 @@ def _families() -> str:
         if family is Family.SENSOR or not members:
             continue
         known = {a: True for b in members for a in b.attributes}
-        own = {a for b in members for a in acting(b)}
-        vain = [a for a in known if a not in own]
-        lines.append(f"| {family.value} | {', '.join(sorted(own))} | {_list(vain)} |")
+        acts = {a for b in members for a in acting(b)}
+        vain = [a for a in known if a not in acts]
+        lines.append(f"| {family.value} | {', '.join(sorted(acts))} | {_list(vain)} |")
     return "\n".join(lines)
 
 

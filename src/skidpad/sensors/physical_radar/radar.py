@@ -120,27 +120,31 @@ class PhysicalRadar:
             dt: s between two ticks.
         """
         self.spec, self._key = spec, np.uint64(stream_key(seed, "physical radar", spec.id))
-        self._multipath, self._output, self._dt = multipath, output, dt
+        self._multipath, self._output, self.dt = multipath, output, dt
         self._interference = interference
+        self._cells = hold(make_cells())
+        self._tracks = hold(make_tracks())
+        self._out = np.empty((MOST_FOUND, 6), np.float32)
+        self._more = np.empty((MOST_TRACKS, 6))
+        self.surround(roadside, table)
+        self.change(weather)
+
+    def surround(self, roadside: Roadside, table: ActorTable) -> None:
+        """Sets what stands beside the roads and which actors there are, from the next tick on."""
         walls, sites = walls_of(roadside), sites_of(roadside)
-        mirrors = mirrors_of(roadside if multipath else Roadside())
+        mirrors = mirrors_of(roadside if self._multipath else Roadside())
         self._world = hold(
             RadarWorld(
                 table.length, table.width, table.height, targets_of(table), sites, walls,
                 group_walls(walls), group_sites(sites), mirrors,
             )
         )  # fmt: skip
-        self._cells = hold(make_cells())
-        beams = setup_of(spec, self._key, None).grid.beams
+        beams = setup_of(self.spec, self._key, None).grid.beams
         room = make_scratch(len(table), len(walls.x0), len(mirrors.walls.x0), beams)
         self._scratch = hold(room)
-        self._tracks = hold(make_tracks())
-        self._out = np.empty((MOST_FOUND, 6), np.float32)
-        self._more = np.empty((MOST_TRACKS, 6))
-        self.change(weather)
 
     def change(self, weather: Weather | None) -> None:
-        """Weather is another from the next tick on."""
+        """Sets weather and mounting, that of `spec`, from the next tick on."""
         self.setup = setup_of(self.spec, self._key, weather, self._multipath, self._interference)
 
     def measure(self, tick: int, states: ActorStates) -> RadarPoints:
@@ -158,7 +162,7 @@ class PhysicalRadar:
             return Reading(RadarPoints(*self._out[:count, :4].T))
         follows = self._output is RadarOutput.TRACKS
         count = list_objects(
-            self._held, self._cells, self._tracks, follows, self._dt, self._out, self._more, count
+            self._held, self._cells, self._tracks, follows, self.dt, self._out, self._more, count
         )
         rows = self._out[:count]
         points = RadarPoints(*rows[:, :4].T)

@@ -61,6 +61,10 @@ class LensDrops:
         self._period = max(round(WIPE / dt), 1)
         self.stroke, self.swept = -1, 0.0  # number of the last stroke, m of way since
 
+    def change(self, rain_mm_h: float) -> None:
+        """Rain is another from the next tick on; the glass stays as wet as it is."""
+        self._drops = rain_drops(rain_mm_h)
+
     def move(self, tick: int, speed: float) -> None:
         """Sweeps up the rain of one tick, or wipes; speed: m/s."""
         stroke = tick // self._period

@@ -231,7 +231,10 @@ def load_catalogue() -> dict[str, Blueprint]:
         ("triggers", Family.TRIGGER),
         ("controllers", Family.CONTROLLER),
     ):
-        made += [Blueprint(id, family, _attributes(e)) for id, e in data[group].items()]
+        made += [
+            Blueprint(id, family, _attributes({**entry, **data["additions"].get(id, {})}))
+            for id, entry in data[group].items()
+        ]
     made += [_vehicle(id, row, actor, data["colours"]) for id, row in data["vehicles"].items()]
     made += [_walker(id, row, actor) for id, row in data["walkers"].items()]
     for group in ("props", "estimated"):
@@ -265,7 +268,8 @@ def choose_attributes(blueprint: Blueprint, given: Mapping[str, str]) -> dict[st
             continue
         if attribute.restricted and value not in attribute.recommended:
             raise wire.WireError(
-                f"{blueprint.id}: {name} must be one of {', '.join(attribute.recommended)}"
+                f"{blueprint.id}: {name} must be one of {', '.join(attribute.recommended)}, "
+                f"got {value[:40]!r}"
             )
         values[name] = _check_value(blueprint.id, attribute, value)
     return values

@@ -18,6 +18,7 @@ class Acting:
 
     always: frozenset[str]
     sensors: dict[str, frozenset[str]]
+    additions: dict[str, frozenset[str]]  # by sensor: ours, which CARLA does not have
     families: dict[Family, frozenset[str]]
     in_the_client: frozenset[str]  # sensors computed there from map and snapshots
 
@@ -25,10 +26,11 @@ class Acting:
 @cache
 def load_acting() -> Acting:
     """Reads what acts, as listed beside the blueprints."""
-    data = load_data()["acting"]
+    data, additions = load_data()["acting"], load_data()["additions"]
     return Acting(
         always=frozenset(data["always"]),
         sensors={id: frozenset(names) for id, names in data["sensors"].items()},
+        additions={id: frozenset(names) for id, names in additions.items()},
         families={Family(name): frozenset(ids) for name, ids in data["families"].items()},
         in_the_client=frozenset(data["in_the_client"]),
     )
@@ -42,9 +44,14 @@ def acting(blueprint: Blueprint) -> set[str]:
     if blueprint.family is Family.SENSOR and not is_produced(blueprint.id):
         return {"role_name"}
     table = load_acting()
-    known = table.always | table.sensors.get(blueprint.id, frozenset())
+    known = table.always | table.sensors.get(blueprint.id, frozenset()) | additions(blueprint)
     known |= table.families.get(blueprint.family, frozenset())
     return {a.id for a in blueprint.attributes.values() if a.id in known or not a.modifiable}
+
+
+def additions(blueprint: Blueprint) -> frozenset[str]:
+    """Returns the ids of a blueprint's attributes that are additions of ours; all of them act."""
+    return load_acting().additions.get(blueprint.id, frozenset())
 
 
 def is_produced(sensor: str) -> bool:

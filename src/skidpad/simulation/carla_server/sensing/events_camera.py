@@ -70,7 +70,7 @@ def dynamic_vision(around: Surroundings, clock: Clock, sensor: Sensor) -> list[M
     """Returns one message with all events since the last reading, or none."""
     retina: Retina = sensor.equipment
     camera = retina.camera
-    scene, view = camera.look(around, clock, sensor.actor)
+    scene, view = camera.look(around, clock, sensor)
     camera.paint(around, sensor.actor, scene, view)
     rgb = camera.rgb.view(np.uint8).reshape(*camera.rgb.shape, 4)[..., :3]
     grey: Floats = rgb @ GREY

@@ -64,7 +64,7 @@ def optical_flow(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Mes
     """Returns one picture of flow as a message; the first one shows no motion."""
     made: FlowCamera = sensor.equipment
     camera = made.camera
-    scene, view = camera.look(around, clock, sensor.actor)
+    scene, view = camera.look(around, clock, sensor)
     return [(camera.head, made.memory.since(scene, view, camera.drawn).tobytes())]
 
 

@@ -82,7 +82,7 @@ def stream_of(sensor: Sensor, texture: int, hub: StreamHub) -> int:
 
 def colour_image(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
     """Returns one colour image as a message."""
-    return [picture(around, clock, sensor.actor, sensor.equipment.camera)]
+    return [picture(around, clock, sensor, sensor.equipment.camera)]
 
 
 def textures(
@@ -93,7 +93,7 @@ def textures(
     if not made.gbuffers:
         return []
     camera = made.camera
-    scene, view = camera.look(around, clock, sensor.actor)
+    scene, view = camera.look(around, clock, sensor)
     told: list[Message] = []
     for texture in wanted:
         out = np.zeros_like(camera.bgra)

@@ -18,6 +18,7 @@ from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.protocol import wire
 from skidpad.simulation.carla_server.sensing import pixels
+from skidpad.simulation.carla_server.sensing.camera_effects import CameraEffects
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
 from skidpad.simulation.carla_server.sensing.surroundings import (
     WIDEST,
@@ -48,23 +49,30 @@ class Camera:
     rgb: NDArray[np.uint32]  # packed red, green, blue, 255
     bgra: NDArray[np.uint8]
     head: bytes
+    effects: CameraEffects
     frame: int = -1  # that is drawn
 
-    def look(self, around: Surroundings, clock: Clock, actor: Actor) -> tuple[Pictured, View]:
+    def look(self, around: Surroundings, clock: Clock, sensor: Sensor) -> tuple[Pictured, View]:
         """Draws depth and keys, once per frame, and returns what is pictured and the view."""
+        actor = sensor.actor
         scene, view = around.picture(), camera_view(self.spec, around.actors.pose(actor))
         if self.frame != clock.frame:
             scene.live.draw(view, around.hidden_for(actor), AUTO_LEVEL, self.drawn)
             self.frame = clock.frame
+            speed = around.speed_of_carrier(actor)
+            self.effects.move(around.weather, speed, sensor.share(clock))
+            self.effects.limit_sight(view, self.drawn)
         return scene, view
 
     def paint(self, around: Surroundings, actor: Actor, scene: Pictured, view: View) -> None:
-        """Colours the picture that was drawn, in `rgb`, with the lamps of the carrier."""
+        """Colours the drawn picture, in `rgb`, with its carrier's lamps and the weather's effects."""
         lamps = headlights(around.actors, actor)
-        scene.shading.paint(view, lamps, self.drawn.inverse, self.drawn.key, self.rgb)
+        shading = self.effects.shading(scene)
+        shading.paint(view, lamps, self.drawn.inverse, self.drawn.key, self.rgb)
+        self.effects.add(scene, view, self.drawn, self.rgb)
 
 
-def make_camera(actor: Actor, _: int) -> Camera:
+def make_camera(actor: Actor, seed: int) -> Camera:
     """Returns a camera made from an actor's attributes; WireError or ConfigError when they are unusable."""
     width = wire.integer(int(actor.attributes["image_size_x"]), "image_size_x", 1, WIDEST)
     height = wire.integer(int(actor.attributes["image_size_y"]), "image_size_y", 1, WIDEST)
@@ -79,18 +87,19 @@ def make_camera(actor: Actor, _: int) -> Camera:
         np.zeros((height, width), dtype=np.dtype("<u4")),
         np.zeros((height, width, 4), dtype=np.uint8),
         IMAGE_HEAD.pack(width, height, fov),
+        CameraEffects(actor, spec, seed),
     )
 
 
 def image(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
     """Returns one image of the camera's modality as a list of messages."""
-    return [picture(around, clock, sensor.actor, sensor.equipment)]
+    return [picture(around, clock, sensor, sensor.equipment)]
 
 
-def picture(around: Surroundings, clock: Clock, actor: Actor, camera: Camera) -> Message:
+def picture(around: Surroundings, clock: Clock, sensor: Sensor, camera: Camera) -> Message:
     """Renders one image of the camera's modality as a message."""
     drawn, bgra = camera.drawn, camera.bgra
-    scene, view = camera.look(around, clock, actor)
+    scene, view = camera.look(around, clock, sensor)
     if camera.spec.modality is Modality.DEPTH:
         bgra_from_inverse_depth(drawn.inverse, bgra)
     elif camera.spec.modality is Modality.SEMANTIC:
@@ -98,6 +107,6 @@ def picture(around: Surroundings, clock: Clock, actor: Actor, camera: Camera) ->
     elif camera.spec.modality is Modality.INSTANCE:
         pixels.bgra_from_instances(drawn.labels, drawn.instances, scene.ids, bgra)
     else:
-        camera.paint(around, actor, scene, view)
+        camera.paint(around, sensor.actor, scene, view)
         pixels.bgra_from_rgb(camera.rgb, bgra)
     return camera.head, bgra.tobytes()

@@ -26,7 +26,7 @@ HALF = 127.5  # grey level of zero
 def normals(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
     """Returns one picture of normals as a message; the sky has no normal and is half grey."""
     camera: Camera = sensor.equipment
-    _, view = camera.look(around, clock, sensor.actor)
+    _, view = camera.look(around, clock, sensor)
     bgra_from_normals(world_normals(view, camera.drawn.inverse), camera.bgra)
     return [(camera.head, camera.bgra.tobytes())]
 

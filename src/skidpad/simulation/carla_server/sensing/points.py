@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
-from math import inf, radians, tan
+from math import radians, tan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +14,18 @@ from skidpad.core.geometry import Pose
 from skidpad.core.maths.lefthanded import angles_to_carla, vectors_to_carla
 from skidpad.core.maths.randomness import stream_key
 from skidpad.core.specs import RadarSpec
+from skidpad.core.vocabulary import RangeModel
+from skidpad.core.weather import Weather
+from skidpad.physics.optics import extinction, radar_range
 from skidpad.sensors.ranging.around import STEEPEST_DEG, Fan, RayHits, look_around
 from skidpad.sensors.ranging.beam import Beam
 from skidpad.sensors.ranging.radar import Radar
 from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.protocol import wire
+from skidpad.simulation.carla_server.sensing.additions import read_addition
+from skidpad.simulation.carla_server.sensing.echoes import Echoes, make_echoes
+from skidpad.simulation.carla_server.sensing.lidar_air import Returns, make_returns
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
 from skidpad.simulation.carla_server.sensing.surroundings import Surroundings
 
@@ -36,15 +42,19 @@ class RadarMake:
 
     spec: RadarSpec
     key: np.uint64
+    feels_air: bool
+    echoes: Echoes | None  # None: it returns what its rays meet
     readings: int = 0
     radar: Radar | None = None  # for the present number of rays per reading
 
-    def with_rays(self, n: int) -> Radar:
+    def with_rays(self, n: int, weather: Weather) -> Radar:
         """Returns the radar that sends n rays per reading; made anew when n changes."""
+        reach = self.spec.range
         if self.radar is None or self.radar.beam.rays != n:
             half_width = tan(radians(self.spec.horizontal_fov_deg / 2.0))
             half_height = tan(radians(self.spec.vertical_fov_deg / 2.0))
-            self.radar = Radar(self.spec, Beam(self.key, n, half_width, half_height), inf)
+            self.radar = Radar(self.spec, Beam(self.key, n, half_width, half_height), reach)
+        self.radar.range = radar_range(weather, reach) if self.feels_air else reach
         return self.radar
 
 
@@ -65,21 +75,28 @@ def make_radar(actor: Actor, seed: int) -> RadarMake:
     ):
         if not 0.1 <= value <= 170.0:
             raise wire.WireError(f"radar {name} must be between 0.1 and 170 deg, got {value:g}")
-    return RadarMake(spec, np.uint64(stream_key(seed, "radar", a["noise_seed"])))
+    key = np.uint64(stream_key(seed, "radar", a["noise_seed"]))
+    feels_air = read_addition(actor, "range_model") is RangeModel.PHYSICAL
+    return RadarMake(spec, key, feels_air, make_echoes(actor, spec, seed))
 
 
 def radar(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
     """Returns one message: velocity in m/s, azimuth and altitude in rad, depth in m of every return.
 
-    It is empty where a reading has no ray.
+    It is empty where a reading has no ray; a physical radar has cells instead.
     """
     make: RadarMake = sensor.equipment
-    n = int(make.spec.points_per_second * sensor.share(clock))
-    if n == 0:
+    actor, share = sensor.actor, sensor.share(clock)
+    n = int(make.spec.points_per_second * share)
+    if n == 0 and make.echoes is None:
         return [(b"",)]
-    carrier, pose = around.carrier_row(sensor.actor), around.actors.pose(sensor.actor)
     make.readings += 1
-    seen = make.with_rays(n).measure(make.readings, pose, around.picture().live, carrier)
+    if make.echoes is not None:
+        seen = make.echoes.measure(around, actor, make.readings, share)
+    else:
+        carrier, pose = around.carrier_row(actor), around.actors.pose(actor)
+        radar = make.with_rays(n, around.weather)
+        seen = radar.measure(make.readings, pose, around.picture().live, carrier)
     azimuth = angles_to_carla(seen.azimuth.astype(np.float64))
     columns = (seen.velocity, azimuth, seen.altitude, seen.range)
     return [(np.column_stack(columns).astype("<f4").tobytes(),)]
@@ -94,6 +111,8 @@ class LidarMake:
     rate: int  # points per second
     rotation_hz: float
     fov: float  # deg, horizontal
+    feels_air: bool
+    returns: Returns | None  # None: every surface returns, by CARLA's law
     angle: float = 0.0  # deg, within the field of view
 
     def turn(self, dt: float) -> Floats:
@@ -116,17 +135,20 @@ class LidarMake:
         return struct.pack("<fI", radians(self.angle), len(counts)) + counts.tobytes()
 
 
-def make_lidar(actor: Actor, _: int) -> LidarMake:
+def make_lidar(actor: Actor, seed: int) -> LidarMake:
     """Returns a lidar made from an actor's attributes; WireError when they are unusable."""
     a = actor.attributes
     channels = wire.integer(int(a["channels"]), "channels", 1, MAX_CHANNELS)
     degrees = np.linspace(float(a["upper_fov"]), float(a["lower_fov"]), channels)
+    reach = float(a["range"])
     return LidarMake(
         np.radians(np.clip(degrees, -STEEPEST_DEG, STEEPEST_DEG)),
-        float(a["range"]),
+        reach,
         wire.integer(int(a["points_per_second"]), "points_per_second", 0, MAX_POINTS),
         float(a["rotation_frequency"]),
         float(a["horizontal_fov"]),
+        read_addition(actor, "range_model") is RangeModel.PHYSICAL,
+        make_returns(actor, reach, seed),
     )
 
 
@@ -162,17 +184,39 @@ def _scan(around: Surroundings, clock: Clock, sensor: Sensor, drop_off: float) -
 
 def plain_lidar(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
     """Returns x, y, z, intensity of what is left after drop-off, with noise along the ray, as a message."""
+    make: LidarMake = sensor.equipment
+    if make.returns is not None:
+        return _scan_air(around, clock, sensor, make.returns)
     scan = _scan(around, clock, sensor, sensor.number("dropoff_general_rate"))
     limit, zero = sensor.number("dropoff_intensity_limit"), sensor.number("dropoff_zero_intensity")
     noise, distance = sensor.number("noise_stddev"), scan.seen.distance
-    intensity = np.exp(-sensor.number("atmosphere_attenuation_rate") * distance)
+    rate = sensor.number("atmosphere_attenuation_rate")
+    if make.feels_air:
+        rate = extinction(around.weather)
+    intensity = np.exp(-rate * distance)
     share = np.where(intensity > limit, 1.0, zero / max(limit, 1e-9) * intensity + 1.0 - zero)
     kept = sensor.rng.random(len(distance)) < share
     if noise > 0.0:
         distance = distance + sensor.rng.normal(0.0, noise, len(distance))
     points = np.empty((len(distance), 4), dtype="<f4")
     points[:, :3], points[:, 3] = scan.places(distance), intensity
-    return [(sensor.equipment.head(scan.channel[kept]), points[kept].tobytes())]
+    return [(make.head(scan.channel[kept]), points[kept].tobytes())]
+
+
+def _scan_air(
+    around: Surroundings, clock: Clock, sensor: Sensor, returns: Returns
+) -> list[Message]:
+    """Returns x, y, z, intensity of what a physical lidar notices, with noise along the ray, as a message."""
+    make: LidarMake = sensor.equipment
+    azimuth = make.turn(sensor.share(clock))
+    found = returns.scan(around, sensor.actor, azimuth, make.elevations)
+    noise, distance = sensor.number("noise_stddev"), found.distance
+    if noise > 0.0:
+        distance = distance + sensor.rng.normal(0.0, noise, len(distance))
+    points = np.empty((len(distance), 4), dtype="<f4")
+    points[:, :3] = vectors_to_carla(*(found.direction * distance[:, None]).T)
+    points[:, 3] = found.intensity
+    return [(make.head(found.channel), points.tobytes())]
 
 
 def semantic_lidar(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:

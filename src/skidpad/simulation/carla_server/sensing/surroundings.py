@@ -46,6 +46,7 @@ class Pictured:
         self.ids = np.array([0, *(a.id for a in members)], dtype=np.int64)  # by instance
         self.bodies = _bodies(members)
         self.live = LiveScene(roads, self.bodies, WIDEST, bodywork)
+        self.states = ActorStates.empty(len(members))
         self.weather: Weather | None = None
         self.elapsed = -np.inf
 
@@ -96,7 +97,8 @@ class Surroundings:
             self._pictured = seen = Pictured(roads, members, self.bodywork)
         now = self._clock.elapsed
         if seen.elapsed != now:
-            seen.live.place(self._states(members), now - seen.elapsed)
+            seen.states = self._states(members)
+            seen.live.place(seen.states, now - seen.elapsed)
             seen.live.show(self.moving.lights.by_id)
             seen.elapsed = now
         seen.shade(self._sky.weather)
@@ -133,6 +135,16 @@ class Surroundings:
             vehicles = self.actors.of(Family.VEHICLE)
             self._cars = frame, Boxes.of((a.id, self.actors.box(a)) for a in vehicles)
         return self._cars[1]
+
+    @property
+    def weather(self) -> Weather:
+        """The weather of this frame."""
+        return self._sky.weather
+
+    def speed_of_carrier(self, sensor: Actor) -> float:
+        """Returns the speed in m/s over the ground of what carries the sensor; 0 without a carrier."""
+        row, states = self.carrier_row(sensor), self.picture().states
+        return float(np.hypot(states.vx[row], states.vy[row])) if row >= 0 else 0.0
 
     def lamps(self, vehicle: Actor) -> int:
         """Returns the vehicle's flags of VehicleLightState."""

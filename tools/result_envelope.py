@@ -38,9 +38,7 @@ SURFACES = {
     "dry": ("clear-noon", "clear-night"),
 }  # fmt: skip
 SLIPPERY = ("rain", "snow", "ice")
-WORSE_BY = (
-    5.0  # events per 100 km: a cell that has so many more is worse (preregistration of 2026-11-28)
-)
+WORSE_BY = 5.0  # events per 100 km that make a cell worse: preregistration of 2026-11-28
 EVENTS_PER_KM = (pl.col("serious_contacts") + pl.col("road_departures")).sum() / pl.col(
     "distance_km"
 ).sum()

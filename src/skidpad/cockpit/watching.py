@@ -7,7 +7,6 @@ import time
 import webbrowser
 from collections import Counter
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -184,6 +183,7 @@ def build(folder: Path, films: CrashFilms) -> Callable[[], None]:
             except InputError as error:
                 said.text = str(error)
                 return
+            films.draw(now.run)
             head = lines(now)
             said.text = f"{head[0]}; {head[1]}"
             found = films.find(now.run) or now.picture
@@ -236,8 +236,6 @@ def serve_watch(folder: Path, place: Place, say: Callable[[str], None], browser:
                 webbrowser.open(address)
             try:
                 while True:
-                    with suppress(InputError):  # the page says it
-                        films.draw(standing(folder).run)
                     time.sleep(REFRESH)
             except KeyboardInterrupt:
                 say("ended")

@@ -22,7 +22,7 @@ from skidpad.physics.optics import depth_range, label_range
 from skidpad.sensors.pictures.degradation import CameraNoise, degradation
 from skidpad.sensors.pictures.exposure import expose
 from skidpad.sensors.pictures.lens import LensDrops
-from skidpad.sensors.pictures.lighting import lighting
+from skidpad.sensors.pictures.lighting import Lighting, lighting
 from skidpad.sensors.pictures.shading import Shading
 from skidpad.sensors.pictures.spray import veil_by_spray
 from skidpad.sensors.ranging.clouds import SprayClouds
@@ -48,6 +48,8 @@ class CameraEffects:
         self._wets = read_addition(actor, "camera_drops")
         self._sprays = read_addition(actor, "camera_spray")
         self._weather: Weather | None = None
+        self._light: Lighting | None = None  # that the camera records; None: the scene's
+        self._film = 0.0  # m of water on the road
         self._noise: CameraNoise | None = None
         self._drops: LensDrops | None = None
         self._dt, self._reading = 0.0, 0
@@ -65,9 +67,14 @@ class CameraEffects:
             self._drops.move(self._reading, speed)
 
     def _look_out(self, weather: Weather) -> None:
-        """Sets sight, noise and rain for a weather; by night with low beam, as pictures are lit."""
+        """Sets what a weather changes; labels reach as far as a low beam by night, as pictures are lit."""
         if self._sight:
             self.sight = Sight(depth_range(weather), label_range(weather, Beam.LOW))
+        if self._haze or self._exposes:
+            light = lighting(weather, haze=self._haze)
+            self._light = expose(light, weather) if self._exposes else light
+        if self._sprays:
+            self._film = road_surface(weather).film_mm / 1000.0
         if self._degrades:
             effect = replace(degradation(weather, exclusive=self._exclusive), glass=False)
             self._noise = CameraNoise(self._spec.id, self._seed, effect)
@@ -81,21 +88,17 @@ class CameraEffects:
 
     def shading(self, scene: Pictured) -> Shading:
         """Returns the colours of the scene in the light that this camera records."""
-        if self._weather is None or not (self._haze or self._exposes):
+        if self._light is None:
             return scene.shading
-        light = lighting(self._weather, haze=self._haze)
         shading = copy(scene.shading)  # snow and lamps are the same, so all else is
-        shading.light = expose(light, self._weather) if self._exposes else light
+        shading.light = self._light
         return shading
 
     def add(self, scene: Pictured, view: View, drawn: Pass, rgb: NDArray[np.uint32]) -> None:
         """Adds spray, drops and the published stages to a painted picture (H, W), in place."""
-        if self._weather is None:
-            return
-        light = self.shading(scene).light
+        light = self._light or scene.shading.light
         if self._sprays:
-            film = road_surface(self._weather).film_mm / 1000.0
-            clouds = SprayClouds(scene.bodies, film).at(scene.states)
+            clouds = SprayClouds(scene.bodies, self._film).at(scene.states)
             if len(clouds):
                 veil_by_spray(view, clouds, drawn.inverse, light.horizon, rgb)
         if self._drops is not None:

@@ -189,18 +189,23 @@ def plain_lidar(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Mess
         return _scan_air(around, clock, sensor, make.returns)
     scan = _scan(around, clock, sensor, sensor.number("dropoff_general_rate"))
     limit, zero = sensor.number("dropoff_intensity_limit"), sensor.number("dropoff_zero_intensity")
-    noise, distance = sensor.number("noise_stddev"), scan.seen.distance
+    distance = scan.seen.distance
     rate = sensor.number("atmosphere_attenuation_rate")
     if make.feels_air:
         rate = extinction(around.weather)
     intensity = np.exp(-rate * distance)
     share = np.where(intensity > limit, 1.0, zero / max(limit, 1e-9) * intensity + 1.0 - zero)
     kept = sensor.rng.random(len(distance)) < share
-    if noise > 0.0:
-        distance = distance + sensor.rng.normal(0.0, noise, len(distance))
+    distance = with_noise(sensor, distance)
     points = np.empty((len(distance), 4), dtype="<f4")
     points[:, :3], points[:, 3] = scan.places(distance), intensity
     return [(make.head(scan.channel[kept]), points[kept].tobytes())]
+
+
+def with_noise(sensor: Sensor, distance: Floats) -> Floats:
+    """Returns distances in m with the sensor's `noise_stddev` along the ray."""
+    noise = sensor.number("noise_stddev")
+    return distance + sensor.rng.normal(0.0, noise, len(distance)) if noise > 0.0 else distance
 
 
 def _scan_air(
@@ -210,9 +215,7 @@ def _scan_air(
     make: LidarMake = sensor.equipment
     azimuth = make.turn(sensor.share(clock))
     found = returns.scan(around, sensor.actor, azimuth, make.elevations)
-    noise, distance = sensor.number("noise_stddev"), found.distance
-    if noise > 0.0:
-        distance = distance + sensor.rng.normal(0.0, noise, len(distance))
+    distance = with_noise(sensor, found.distance)
     points = np.empty((len(distance), 4), dtype="<f4")
     points[:, :3] = vectors_to_carla(*(found.direction * distance[:, None]).T)
     points[:, 3] = found.intensity

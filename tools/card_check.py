@@ -2,8 +2,10 @@
 
 python tools/card_check.py OUT.json [--runs N] [--seconds S] [--vehicles V] [--workers W] [--cores C]
 
-1. start: runs of configurations 0 to 4 and two weathers for 50 ticks, against the same runs on the CPU.
-2. outcomes of runs of configuration 2 to their end, as distributions: all on the card, an eighth on the CPU.
+1. start: runs of configurations 0 to 4 and two weathers for 50 ticks, and what their radars saw, against
+   the same runs on the CPU.
+2. outcomes of runs of configuration 2 to their end: all on the card, an eighth on the CPU, and how those that
+   both have driven differ in the mean. More than four standard errors are not chance.
 3. ticks/s of the same runs on the card, with supervisor, respawn and log; set-up, judging, compiling apart.
 4. finished, judged runs per minute: on the card with one and W processes, on C cores without it.
 """
@@ -29,6 +31,8 @@ from skidpad.core.kernels.card import require_card
 
 START = 50  # ticks that are promised
 NEAR = 1e-9
+RADAR_NEAR = 1e-4  # its echoes are in single precision
+RADAR = ("radar_pre", "radar_velocity", "radar_points")  # of the report
 SEED = 1000
 
 
@@ -65,10 +69,11 @@ def start_of(run: Run) -> dict[str, Any]:
     """Returns the first ticks of a run's log."""
     log = run.log
     own = {f"ego.{n}": getattr(log.ego, n)[:START] for n in ("x", "y", "yaw", "speed")}
+    radar = {f"radar.{n}": np.nan_to_num(getattr(log.report, n)[:START], nan=-1.0) for n in RADAR}
     asked = {
         f"asked.{n}": getattr(log.requested, n)[:START] for n in ("throttle", "brake", "steer")
     }
-    return own | asked | {"quick": run.quick_ticks}
+    return own | radar | asked | {"quick": run.quick_ticks}
 
 
 def compare_starts(descriptions: list[dict[str, Any]]) -> dict[str, Any]:
@@ -83,8 +88,23 @@ def compare_starts(descriptions: list[dict[str, Any]]) -> dict[str, Any]:
     return {
         "runs": len(card), "ticks": START, "largest": largest,
         "on_card": int(sum(a["quick"] for a in card)),
-        "within_1e-9": max(largest.values()) <= NEAR,
+        "within_1e-9": all(
+            error <= (RADAR_NEAR if name.startswith("radar.") else NEAR)
+            for name, error in largest.items()
+        ),
     }  # fmt: skip
+
+
+def compare_outcomes(
+    card: list[dict[str, float]], cores: list[dict[str, float]]
+) -> dict[str, dict[str, float]]:
+    """Returns, of runs that both have driven, the mean difference card - cores and its standard errors."""
+    found = {}
+    for name in cores[0]:
+        more = np.array([a[name] - b[name] for a, b in zip(card, cores, strict=False)])
+        error = float(more.std(ddof=1) / len(more) ** 0.5)
+        found[name] = {"more_on_card": float(more.mean()), "standard_error": error}
+    return found
 
 
 def sum_up(judged: list[dict[str, float]]) -> dict[str, Any]:
@@ -117,14 +137,16 @@ def time_card(descriptions: list[dict[str, Any]]) -> tuple[dict[str, Any], list[
     }, judged  # fmt: skip
 
 
-def time_many(descriptions: list[dict[str, Any]], **how: Any) -> dict[str, Any]:
-    """Returns runs per minute end to end."""
+def time_many(
+    descriptions: list[dict[str, Any]], card: list[dict[str, float]], **how: Any
+) -> dict[str, Any]:
+    """Returns runs per minute end to end, and how outcomes differ from the card's."""
     begin = perf_counter()
     judged = skidpad.drive_many(descriptions, judge=judge, **how)
     wall = perf_counter() - begin
     return {
         **how, "runs": len(judged), "wall_s": wall, "runs_per_min": 60.0 * len(judged) / wall,
-        "judged": sum_up(judged),
+        "judged": sum_up(judged), "against_card": compare_outcomes(card, judged),
     }  # fmt: skip
 
 
@@ -170,9 +192,9 @@ def main(argv: list[str]) -> int:
         timed, judged = time_card(runs)
         note(f"card_{vehicles + 1}_vehicles", timed | {"judged": sum_up(judged)})
         few = runs[: max(asked.runs // 8, 16)]
-        note(f"cores_{vehicles + 1}_vehicles", time_many(few, workers=asked.cores))
+        note(f"cores_{vehicles + 1}_vehicles", time_many(few, judged, workers=asked.cores))
         if asked.workers > 1:
-            shared = time_many(runs, workers=asked.workers, device="cuda")
+            shared = time_many(runs, judged, workers=asked.workers, device="cuda")
             note(f"card_shared_{vehicles + 1}_vehicles", shared)
     return 0
 

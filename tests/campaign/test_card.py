@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from numba import typeof
+from numba.core import types
 
 import skidpad
 from skidpad.campaign.driving.quick_kernel import drive_ticks
@@ -182,6 +184,37 @@ def test_numbers_of_numpy_are_floats_where_they_are():
     assert leaves.source == "(f[0], f[1], i[2],)"
     floats, ints = leaves.number_arrays()
     assert (floats.tolist(), ints.tolist()) == ([0.5, 0.25, 0.0], [0, 0, 3])
+
+
+class Key(NamedTuple):
+    key: np.uint64
+    n: int
+
+
+def test_an_unsigned_number_that_is_held_stays_unsigned():
+    # as a signed one its shifts keep the sign, and random numbers of a card are not those of a CPU
+    key = np.uint64(2**63 + 5)
+    leaves = find_leaves(hold((Key(key, 7), hold(Key(key, 8)))))
+    assert leaves.source.count("Key(uint64(i[") == 2
+    assert leaves.number_arrays()[1].astype(np.uint64).tolist() == [key, 7, key, 8]
+
+
+def count_unsigned(typed):
+    if isinstance(typed, types.StructRef):
+        return sum(count_unsigned(kind) for _, kind in typed._fields)
+    if isinstance(typed, types.BaseTuple):
+        return sum(count_unsigned(kind) for kind in typed.types)
+    return int(typed == types.uint64)
+
+
+def test_all_unsigned_numbers_of_a_run_stay_unsigned():
+    run = OpenRun(*describe(**{**DEFAULTS, "stack": 4, "sensors": "objects", "duration": 5.0}))
+    call = None
+    while call is None:  # the first tick is driven by itself
+        call = next(run.ask(50), None)
+    run.close()
+    assert count_unsigned(typeof(call.joined)) >= 1  # the radar's
+    assert find_leaves(call.joined).source.count("uint64(") == count_unsigned(typeof(call.joined))
 
 
 def test_calls_by_address_become_plain_calls():

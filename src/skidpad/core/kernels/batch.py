@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numba.core import types
 from numba.experimental.structref import StructRefProxy
 from numpy.typing import NDArray
 
@@ -72,19 +73,27 @@ class _Walk:
         self.classes: dict[str, type] = {"Inside": Inside}
         self._known: dict[tuple[object, ...], int] = {}
 
-    def visit(self, value: Any, path: str) -> str:
-        """Returns the expression that builds `value` anew."""
+    def visit(self, value: Any, path: str, typed: Any = None) -> str:
+        """Returns the expression that builds `value` anew.
+
+        typed: its type for kernels, where it was held: an unsigned number comes out of there as Python's int.
+        """
         if isinstance(value, StructRefProxy):
-            return f"Inside({self.visit(read_held(value), path)})"
+            inner = value._numba_type_.field_dict["value"]
+            return f"Inside({self.visit(read_held(value), path, inner)})"
         if isinstance(value, tuple):
             kind = type(value)
+            names = getattr(kind, "_fields", range(len(value)))
+            inside = [None] * len(value) if typed is None else typed.types
+            parts = [
+                self.visit(v, f"{path}.{f}", t)
+                for f, v, t in zip(names, value, inside, strict=True)
+            ]
             if kind is tuple:
-                parts = [self.visit(v, f"{path}.{k}") for k, v in enumerate(value)]
                 return f"({', '.join(parts)},)"
             name = f"{kind.__module__}_{kind.__qualname__}".replace(".", "_")
             self.classes[name] = kind
-            fields = zip(kind._fields, value, strict=True)  # type: ignore[attr-defined]
-            return f"{name}({', '.join(self.visit(v, f'{path}.{f}') for f, v in fields)})"
+            return f"{name}({', '.join(parts)})"
         if isinstance(value, np.ndarray):
             if not value.flags.c_contiguous:
                 raise ValueError(
@@ -101,7 +110,7 @@ class _Walk:
         self.numbers.append(value)
         store = "f" if isinstance(value, (float, np.floating)) else "i"
         kept = f"{store}[{len(self.numbers) - 1}]"
-        if isinstance(value, np.uint64):
+        if isinstance(value, np.uint64) or typed == types.uint64:
             return f"uint64({kept})"
         return f"({kept} != 0)" if isinstance(value, (bool, np.bool_)) else kept
 

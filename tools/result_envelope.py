@@ -199,6 +199,20 @@ def goals(folder: Path) -> str:
     return text + markdown(head, rows)
 
 
+def in_sum(folder: Path) -> str:
+    """Returns one row per driver of a map over rain, snow and ice."""
+    drivers = {n: on_surfaces(runs, SLIPPERY) for n, runs in read_drivers(folder).items()}
+    bare = drivers[BARE]
+    rows = [
+        [name, count_text(runs), f"{mean_speed(runs):.1f}",
+         *(of(bare, runs) if name == ENVELOPE else "" for of in (times_fewer, contacts_fewer))]
+        for name, runs in drivers.items()
+    ]  # fmt: skip
+    head = ["driver", "contacts of 5 km/h + departures", "mean speed, km/h",
+            "times fewer than bare (95 % bound)", "contacts alone"]  # fmt: skip
+    return markdown(head, rows)
+
+
 def worse(folder: Path) -> str:
     """Returns one row per map and weather: has the envelope more events than the bare stack, by WORSE_BY?
 

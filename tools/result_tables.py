@@ -108,6 +108,7 @@ def block(name: str, which: str, folder: Path) -> str:
         "adas against": lambda path: result_matrix.against(reference_of(path), path),
         "adas envelope": result_envelope.rivals,
         "adas goals": result_envelope.goals,
+        "adas sum": result_envelope.in_sum,
         "adas worse": result_envelope.worse,
         "adas routes": result_envelope.routes,
         "adas pareto": result_envelope.pareto,

@@ -48,6 +48,18 @@ def test_a_factor_is_printed_only_where_the_bare_stack_has_30_events(tmp_path):
     assert dry["envelope"][7] == "too few (0)"
 
 
+def test_a_map_in_sum_counts_slippery_weathers_only(tmp_path):
+    write_runs(tmp_path / "envelope-foreign-town", {"3": 3, "5": 1})
+    own = pl.read_parquet(tmp_path / "envelope-foreign-town" / "results.parquet")
+    dry = pl.col("weather") == "clear-noon"
+    own = own.with_columns(pl.when(dry).then(7).otherwise("serious_contacts").alias("serious_contacts"))
+    own.write_parquet(tmp_path / "envelope-foreign-town" / "results.parquet")
+    text = proof.in_sum(tmp_path / "envelope-foreign-town")
+    rows = {line.split("|")[1].strip(): line for line in text.splitlines()}
+    assert "| 36 + 0 in 60 km |" in rows["bare"]
+    assert f"| 3.0 (above {power.factor_bound(36, 12):.1f}) |" in rows["envelope"]
+
+
 def test_rivals_lie_beside_and_the_table_is_tested_by_seed(tmp_path):
     write_runs(tmp_path / "envelope-figure8", {"3": 3, "5": 0})
     write_runs(tmp_path / "envelope-figure8-table", {"3": 2})

@@ -52,7 +52,9 @@ def test_a_map_in_sum_counts_slippery_weathers_only(tmp_path):
     write_runs(tmp_path / "envelope-foreign-town", {"3": 3, "5": 1})
     own = pl.read_parquet(tmp_path / "envelope-foreign-town" / "results.parquet")
     dry = pl.col("weather") == "clear-noon"
-    own = own.with_columns(pl.when(dry).then(7).otherwise("serious_contacts").alias("serious_contacts"))
+    own = own.with_columns(
+        pl.when(dry).then(7).otherwise("serious_contacts").alias("serious_contacts")
+    )
     own.write_parquet(tmp_path / "envelope-foreign-town" / "results.parquet")
     text = proof.in_sum(tmp_path / "envelope-foreign-town")
     rows = {line.split("|")[1].strip(): line for line in text.splitlines()}

@@ -30,6 +30,7 @@ from skidpad.recording.campaign.folder import RUNS, SNAPSHOTS
 from skidpad.recording.campaign.ledger import LEDGER
 from skidpad.recording.run.inputs import read_inputs
 from skidpad.recording.run.log_files import log_hash, read_log
+from skidpad.recording.run.readings import RecordedSensor, tabulate_readings, write_readings
 from support.cockpit.commands import PATIENCE, running
 from support.runs import adas_run
 
@@ -54,12 +55,24 @@ FINGER = """([name, type, x, y]) => { const pad = document.querySelector(`[data-
     const box = pad.getBoundingClientRect(); pad.setPointerCapture = () => {};
     pad.dispatchEvent(new PointerEvent(type, { bubbles: true, cancelable: true, pointerId: 7,
     clientX: box.left + x * box.width, clientY: box.top + y * box.height })); }"""
-INKS = """c => { const d = c.getContext('2d').getImageData(0, 90, c.width, c.height - 90).data, found = {};
-    const has = (r, g, b) => { for (let i = 0; i < d.length; i += 4)
-        if (i % (4 * c.width) > 1000  // right of the name
-            && Math.abs(d[i] - r) + Math.abs(d[i + 1] - g) + Math.abs(d[i + 2] - b) < 20) return true;
-        return false; };
-    return { gap: has(0x4f, 0xce, 0x7f), grip: has(0xf2, 0xb4, 0x41) }; }"""
+# columns of a canvas, in px of the page, in which a colour stands between two heights
+COLUMNS = """([selector, top, low, ink]) => { const c = document.querySelector(selector), found = [];
+    const k = c.width / c.clientWidth, high = Math.round((low - top) * k);
+    const d = c.getContext('2d').getImageData(0, Math.round(top * k), c.width, high).data;
+    for (let i = 0; i < d.length; i += 4)
+        if (ink.every((v, j) => Math.abs(d[i + j] - v) < 20)) found.push(Math.floor(i / 4 % c.width / k));
+    return [...new Set(found)]; }"""
+# keeps what was last written on each canvas, and where: text, left, top, right, bottom
+WRITTEN = """() => { window.written = {}; const on = CanvasRenderingContext2D.prototype;
+    const { clearRect, fillText } = on, of = (g) => g.canvas.parentElement.className;
+    on.clearRect = function (...box) { window.written[of(this)] = []; return clearRect.apply(this, box); };
+    on.fillText = function (text, x, y) { const m = this.measureText(text);
+        (window.written[of(this)] ||= []).push([String(text), x - m.actualBoundingBoxLeft,
+            y - m.actualBoundingBoxAscent, x + m.actualBoundingBoxRight, y + m.actualBoundingBoxDescent]);
+        return fillText.call(this, text, x, y); }; }"""
+LEFT, RIGHT, ROW, PLOT, HEAD = 34, 12, 58, 36, 34  # px of the plots, as cockpit.js lays them out
+GAP_INK, LIMIT_INK = (0x4F, 0xCE, 0x7F), (0xFF, 0x85, 0x52)
+ENVELOPE = RecordedSensor("envelope", "envelope", "Speed envelope", "m/s; binding: 0 none, 1 sight")
 PAUSED = "() => document.querySelector('.cockpit').dataset.paused === 'true'"
 FACT = """name => [...document.querySelectorAll('.cockpit dt')]
     .find(dt => dt.textContent === name)?.nextElementSibling.textContent"""
@@ -82,6 +95,39 @@ def opened(browser, address, errors):
     page.goto(address)
     until(page, "() => document.querySelector('.stage canvas')?.width === 800")
     return context, page
+
+
+def inked(page, row, ink):
+    """Columns of a plot of the time line in which its curve stands; names and numbers are outside."""
+    low = HEAD + (row + 1) * ROW - 4
+    return set(page.evaluate(COLUMNS, [".line canvas", low - PLOT, low, list(ink)]))
+
+
+def column_of(page, share):
+    """The px of the time line at which a share of its time has passed."""
+    return LEFT + share * (page.locator(".line canvas").bounding_box()["width"] - LEFT - RIGHT)
+
+
+def go_to(page, share):
+    """Click the time line where a share of its time has passed."""
+    line = page.locator(".line canvas")
+    line.scroll_into_view_if_needed()
+    line.click(position={"x": column_of(page, share), "y": 20})
+
+
+def labels_of(page, place):
+    """The labels of a canvas that were drawn last; none covers another one, and all lie on it."""
+    written = page.evaluate("place => window.written[place]", place)
+    width, height = page.evaluate(
+        "p => { const c = document.querySelector(`.${p} canvas`); return [c.clientWidth, c.clientHeight]; }",
+        place,
+    )
+    for i, (text, left, top, right, low) in enumerate(written):
+        assert min(left, top, width - right, height - low) >= -1, f"{text!r} is cut off"
+        for other, left_2, top_2, right_2, low_2 in written[:i]:
+            apart = right <= left_2 or right_2 <= left or low <= top_2 or low_2 <= top
+            assert apart, f"{text!r} covers {other!r} in {width} px"
+    return [text for text, *_ in written]
 
 
 def photograph(page, name):
@@ -232,6 +278,13 @@ def stored(tmp_path_factory):
     night = Sky(preset("clear-night"), GripModel.PHYSICAL, RangeModel.PHYSICAL)
     inputs = [Timed(40, Wheel(True)), Timed(60, night), Timed(80, Wheel(False))]
     drive_at_desk(wanted, Desk(Recorded(inputs), wanted), folder)
+    # as of a run in which the envelope said nothing for the middle third
+    limits = [None if 40 <= tick < 80 else 20.0 for tick in range(len(read_log(folder)))]
+    rows = [
+        {"tick": tick, "envelope.speed_mps": v, "envelope.binding": 1.0}
+        for tick, v in enumerate(limits)
+    ]
+    write_readings(folder, tabulate_readings({ENVELOPE.id: ENVELOPE}, rows))
     return folder
 
 
@@ -242,14 +295,35 @@ def test_a_run_is_scrubbed_through_in_a_browser(browser, stored, tmp_path):
         context, page = opened(browser, command.address(), errors)
         page.keyboard.press("p")
         until(page, PAUSED)
-        line = page.locator(".line canvas")
-        line.scroll_into_view_if_needed()
-        # under the time line: the gap, where one is in the way, and the grip of the tyres, as logged
-        kept = page.evaluate(f"({INKS})(document.querySelector('.line canvas'))")
-        assert kept["gap"] == any(v is not None for v in RecordedRun(stored).curves().gap)
-        assert kept["grip"]
-        box = line.bounding_box()
-        page.mouse.click(box["x"] + 0.25 * box["width"], box["y"] + 20)
+        # plots under the time line: curves where there are values and nowhere else
+        curves = RecordedRun(stored).curves()
+        for row, values, ink in ((0, curves.limit, LIMIT_INK), (1, curves.gap, GAP_INK)):
+            there = inked(page, row, ink)
+            for k in range(4, len(values) - 4):
+                near = {value is None for value in values[k - 4 : k + 5]}
+                column = round(column_of(page, k / (len(values) - 1)))
+                around = there & {column - 1, column, column + 1}
+                assert near == {True, False} or bool(around) == (near == {False}), (row, k)
+        assert inked(page, 3, (0xF2, 0xB4, 0x41)), "grip"
+        # numbers at the ends of all axes, at every width, and no label over another one
+        page.evaluate(WRITTEN)
+        for width in (390, 1280):
+            page.set_viewport_size({"width": width, "height": 900})
+            until(page, "() => window.written.line?.length && window.written.strips?.length")
+            until(page, "() => document.querySelector('.line canvas').width <= innerWidth")
+            assert page.evaluate("document.documentElement.scrollWidth") <= width
+            wide = page.evaluate(
+                "Math.min(...[...document.querySelectorAll('.facts dd')].map(d => d.clientWidth))"
+            )
+            assert wide > 30, "facts stand in lines"
+            labels = labels_of(page, "line")
+            assert {"speed, km/h", "gap to what is ahead, m", "grip of the tyres"} <= set(labels)
+            assert {"80", "10", "1", "6 s"} <= set(labels)
+            assert labels.count("0") >= 5
+            assert {"speed, km/h", "-30", "0 s"} <= set(labels_of(page, "strips"))
+            photograph(page, f"plots-{width}")
+            page.evaluate("window.written = {}")
+        go_to(page, 0.25)
         until_fact(page, "time", "1.50 s")
         day = picture_of(page)[0]
         # the address names the moment, and opens it again
@@ -259,11 +333,11 @@ def test_a_run_is_scrubbed_through_in_a_browser(browser, stored, tmp_path):
         page.reload()
         until_fact(page, "time", "2.50 s")
         until(page, PAUSED)
-        page.mouse.click(box["x"] + 0.25 * box["width"], box["y"] + 20)
+        go_to(page, 0.25)
         until_fact(page, "time", "1.50 s")
         page.keyboard.press("ArrowRight")
         until_fact(page, "time", "1.55 s")
-        page.mouse.click(box["x"] + 0.6 * box["width"], box["y"] + 20)
+        go_to(page, 0.6)
         until_fact(page, "drives", "you")
         until_fact(page, "weather", "clear-night")
         assert picture_of(page)[0] < 0.6 * day

@@ -24,6 +24,7 @@ from skidpad.cockpit.crash_film import draw_crash
 from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.film import stretch_of, write_film
 from skidpad.cockpit.pictures import colours
+from skidpad.cockpit.plots import FOOT, ROW
 from skidpad.cockpit.replay import RecordedRun, report_of
 from skidpad.cockpit.replaying import Replayer
 from skidpad.cockpit.source import opening_tick
@@ -226,6 +227,7 @@ def test_the_film_of_the_worst_crash_begins_before_it(driven, tmp_path, monkeypa
         draw_crash(run, tmp_path / "film.webp")
         with Image.open(tmp_path / "film.webp") as film:
             assert film.n_frames == pictures
+            assert film.size == (480, 360 + round(0.6 * (3 * ROW + FOOT)))  # plots are under it
     with pytest.raises(FileError, match="not the folder of a run"):
         draw_crash(tmp_path, tmp_path / "none.webp")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["film.webp", "run"]

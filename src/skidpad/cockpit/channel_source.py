@@ -146,9 +146,12 @@ class ChannelSource(Source):
         del k
         return self._seat
 
-    def curves(self) -> Curves:
-        """Returns speed, gap, grip and what the monitor found along the time; tiers are None."""
-        part = every(self.ticks)
+    def curves(self, part: slice | None = None) -> Curves:
+        """Returns speed, gap, grip and what the monitor found along the time; tiers are None.
+
+        part: of the moments; None: about CURVE of them, for which alone the monitor's counts are made.
+        """
+        part = every(self.ticks) if part is None else part
         v = np.hypot(self._state[part, 0, 3], self._state[part, 0, 4])
         none = np.zeros(self.ticks)
         sizes = zip(self._table.length.tolist(), self._table.width.tolist(), strict=True)
@@ -157,7 +160,7 @@ class ChannelSource(Source):
             x, y, yaw, vx, vy = self._state[:, i].T
             bodies.append(Body(x, y, yaw, vx, vy, none, none, length, width))
         ahead = measure_ahead(bodies, self._present)
-        near = least_of(ahead.ttc, NEAR), least_of(ahead.gap, FAR)
+        near = least_of(ahead.ttc, NEAR, part), least_of(ahead.gap, FAR, part)
         grip = [round_value(world.mu) for world in self.worlds[part]]
         speed = np.round(v * 3.6, 1).tolist()
         return Curves(speed, [None] * len(v), *near, grip, *self._judged[::-1])

@@ -11,6 +11,10 @@ const PEDALS = { KeyW: "up", ArrowUp: "up", KeyS: "down", ArrowDown: "down", Key
   KeyD: "right", ArrowRight: "right", Space: "hand" };
 const HEARTBEAT = 100;  // ms between two words of the pedals while they are pressed
 const STRIP_SECONDS = 30;
+const EDGE = { left: 34, right: 12 };  // px beside plots, where the numbers of their axes stand
+const ROW = 58, PLOT = 36, HEAD = 34;  // px: of a plot with its name, of its axes, of what stands above the plots of a time line
+const INKS = { speed: "#4d9dff", limit: "#ff8552", gap: "#4fce7f", ttc: "#ff7ab8", grip: "#f2b441", dim: "#9aa5b1",
+  crash: "#ff5b52", "put back": "#f2b441", marking: "#b58cff", notice: "#9aa5b1", hazard: "#ff4fa3" };
 const PLACES = ["left", "rear", "right", "top", "depth", "semantic", "radar"];  // of the small views, as a page begins
 const LAYOUT = "skidpad-layout";  // what this browser keeps of it
 
@@ -58,7 +62,7 @@ export default {
     <div class="grip"><svg viewBox="0 0 60 84"><rect x="18" y="8" width="24" height="68" rx="7"/>
       <g v-for="(w, i) in wheels" :key="i"><rect :ref="'w' + i" :x="w[0]" :y="w[1]" width="11" height="20" rx="3"/>
       <text :ref="'m' + i" :x="w[0] + 5.5" :y="w[1] + 29"></text></g></svg><small>friction</small></div>
-    <ul ref="events" class="events"></ul></div>
+    <ul ref="events" class="events"></ul><dl ref="added" class="added"></dl></div>
   <div class="strips"><canvas ref="strip"></canvas></div>
   <div class="line" v-if="timeline"><canvas ref="line" @pointerdown="seek"
     @pointermove="$event.buttons && seek($event)"></canvas></div>
@@ -72,10 +76,12 @@ export default {
     document.addEventListener("keydown", this.down); document.addEventListener("keyup", this.up);
     window.addEventListener("blur", this.away); document.addEventListener("visibilitychange", this.away);
     this.beating = setInterval(() => this.beat(), HEARTBEAT);
+    this.resized = new ResizeObserver(() => this.head && this.curves(this.head));  // also while the run stands
+    this.resized.observe(this.$refs.strip);
     this.open();
   },
   unmounted() {
-    this.gone = true; clearInterval(this.beating); this.socket.close();
+    this.gone = true; clearInterval(this.beating); this.resized.disconnect(); this.socket.close();
     document.removeEventListener("keydown", this.down); document.removeEventListener("keyup", this.up);
     window.removeEventListener("blur", this.away); document.removeEventListener("visibilitychange", this.away);
   },
@@ -169,7 +175,8 @@ export default {
         ["light", s.light ? `${s.light} at ${s.light_at} m` : "-"], ["weather", seat.weather],
         ["grip", seat.grip || ""], ["collisions", h.collisions], ["real time", h.rtf ? `${h.rtf.toFixed(2)} x` : h.kind === "replay" ? `${h.rate} x` : "-"],
         ["pictures", `${this.shownAt.length}/s, ${h.dropped} dropped`], ["drives", seat.manual ? `you, by ${seat.method}` : "the stack"],
-        ["on", seat.functions ? seat.functions.join(" ") || "nothing" : "-"], ...(h.added || [])]);
+        ["on", seat.functions ? seat.functions.join(" ") || "nothing" : "-"]], r.facts);
+      this.list(h.added || [], r.added);
       [...r.tiers.children].forEach((li, i) => li.classList.toggle("lit", i === s.tier));
       m.mu.forEach((v, i) => { const w = r[`w${i}`][0], t = r[`m${i}`][0]; t.textContent = v === null ? "" : v.toFixed(2);
         w.style.fill = this.ink(v); });
@@ -178,11 +185,11 @@ export default {
       if (h.note && h.note !== this.note) { this.note = h.note; r.bar.textContent = h.note; }
       this.$el.classList.toggle("pair", !!h.beside);
       if (h.beside) r.other.textContent = `${Math.round(Math.abs(h.beside.speed_kmh))} km/h  ${h.beside.mode}  ${h.beside.weather}  ${h.beside.collisions} collisions`;
-      this.radar(h.radar); this.strip(h); if (this.timeline) this.line(h);
+      this.radar(h.radar); this.curves(h);
     },
+    curves(h) { this.strip(h); if (this.timeline) this.line(h); },
     ink(mu) { return mu === null ? "#555" : `hsl(${Math.max(0, Math.min(1, (mu - 0.1) / 0.8)) * 130}, 70%, 48%)`; },  // red: slippery
-    list(rows) {
-      const dl = this.$refs.facts;
+    list(rows, dl) {
       if (dl.children.length !== 2 * rows.length) dl.replaceChildren(...rows.flatMap(() => [document.createElement("dt"), document.createElement("dd")]));
       rows.forEach(([k, v], i) => { dl.children[2 * i].textContent = k; dl.children[2 * i + 1].textContent = v; });
     },
@@ -198,50 +205,69 @@ export default {
       const envelope = (name) => ((h.added || []).find(([k]) => k.startsWith("Speed envelope") && k.endsWith(`, ${name}`)) || [])[1];
       const limit = envelope("speed mps") === undefined ? null : 3.6 * envelope("speed mps"), by = envelope("binding");
       H.push([h.t, h.motion.speed_kmh, h.stack.distance, limit, h.motion.grip]); while (H.length && h.t - H[0][0] > STRIP_SECONDS) H.shift();
-      const [g, w, high] = this.fit(this.$refs.strip), part = high / 3; g.font = "12px sans-serif";
-      const curve = (i, most, row, ink, name) => { const top = row * part; g.strokeStyle = "#303944"; g.strokeRect(0.5, top + 0.5, w - 1, part - 4);
-        g.strokeStyle = g.fillStyle = ink; g.lineWidth = 1.6; g.beginPath(); let pen = false;
-        H.forEach((one, k) => { const v = one[i]; if (v === null) { pen = false; return; }
-          const x = w - (h.t - one[0]) / STRIP_SECONDS * w, y = top + (part - 6) * (1 - Math.min(v / most, 1)) + 1;
-          if (pen) g.lineTo(x, y); else { g.moveTo(x, y); if (H[k + 1] === undefined || H[k + 1][i] === null) g.fillRect(x - 1, y - 1, 2, 2); } pen = true; });
-        g.stroke(); g.lineWidth = 1; g.fillText(name, 6, top + 14); };
-      if (limit !== null) curve(3, 160, 0, "#ff8552", ""), g.fillText(`envelope: ${Math.round(limit)} km/h${by && by !== "none" ? `, ${by}` : ""}`, w - 190, 14);
-      curve(1, 160, 0, "#4d9dff", "speed, 0 to 160 km/h"); curve(2, 80, 1, "#4fce7f", "distance, 0 to 80 m"); curve(4, 1, 2, "#f2b441", "grip, 0 to 1");
+      const [g, w] = this.fit(this.$refs.strip), end = w - EDGE.right, wide = end - EDGE.left;
+      const points = (i) => H.map((one) => [end - (h.t - one[0]) / STRIP_SECONDS * wide, one[i]]);
+      const note = limit === null ? "" : `envelope ${Math.round(limit)}${by && by !== "none" ? `, ${by}` : ""}`;
+      this.plots(g, w, 0, [["speed, km/h", INKS.speed, this.round(H.flatMap((one) => [one[1], one[3]]), 20), points(1), h.motion.speed_kmh, points(3), note],
+        ["distance reported, m", INKS.gap, 80, points(2), h.stack.distance],
+        ["grip of the tyres", INKS.grip, this.round([1, ...H.map((one) => one[4])], 0.1), points(4), h.motion.grip]]);
+      this.times(g, w, 3 * ROW + 12, -STRIP_SECONDS, 0);
+    },
+    round(values, step) { return +(Math.max(1, Math.ceil(Math.max(...values) / step - 1e-9)) * step).toFixed(1); },  // up: the upper end of an axis
+    plots(g, w, top, rows) {  // one below the other: name, value now, numbers at the ends of the axis, curve
+      rows.forEach(([name, ink, most, points, now, limit, note, none], i) => {
+        const low = top + (i + 1) * ROW - 4, high = low - PLOT, end = w - EDGE.right, y = (v) => low - PLOT * Math.max(0, Math.min(v / most, 1));
+        g.strokeStyle = "#303944"; g.strokeRect(EDGE.left - 0.5, high - 0.5, end - EDGE.left + 1, PLOT + 1);
+        g.textAlign = "right"; g.fillStyle = INKS.dim; g.fillText(most, EDGE.left - 5, high + 8); g.fillText("0", EDGE.left - 5, low);
+        g.fillStyle = ink; g.fillText(now ?? "-", end, high - 5); g.textAlign = "left"; g.fillText(name, EDGE.left, high - 5);
+        if (note) { g.fillStyle = INKS.limit; g.fillText(note, EDGE.left + g.measureText(name).width + 12, high - 5); }
+        if (points.every((one) => one[1] === null)) { g.fillStyle = INKS.dim; g.textAlign = "center"; g.fillText(none || "no value", (EDGE.left + end) / 2, (low + high) / 2 + 4); g.textAlign = "left"; }
+        if (limit) this.curve(g, limit, y, INKS.limit, 1.2);
+        this.curve(g, points, y, ink, 1.8);
+      });
+    },
+    curve(g, points, y, ink, thick) {  // gaps where there is no value, a dot for a lone one
+      g.strokeStyle = g.fillStyle = ink; g.lineWidth = thick; g.beginPath(); let pen = false;
+      points.forEach(([x, v], i) => { if (v === null) { pen = false; return; }
+        if (pen) g.lineTo(x, y(v)); else { g.moveTo(x, y(v)); if ((points[i + 1] || [])[1] == null) g.fillRect(x - 1, y(v) - 1, 2, 2); } pen = true; });
+      g.stroke(); g.lineWidth = 1;
+    },
+    times(g, w, y, first, last) {  // s at both ends and at round numbers between
+      const wide = w - EDGE.left - EDGE.right, per = wide / Math.max(last - first, 1e-9), apart = 56, write = (text, x, to) => { g.textAlign = to; g.fillText(text, x, y); };
+      const step = [1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1200].find((s) => s * per >= apart) || 3600;
+      g.fillStyle = INKS.dim; write(+first.toFixed(1), EDGE.left, "left"); write(`${+last.toFixed(1)} s`, w - EDGE.right, "right");
+      for (let t = Math.ceil(first / step) * step; t < last; t += step) if (Math.min(t - first, last - t) * per >= apart) write(t, EDGE.left + (t - first) * per, "center");
+      g.textAlign = "left";
     },
     fit(c) {  // as many pixels as the screen has for it; drawn in pixels of the page
       const k = window.devicePixelRatio || 1, w = c.clientWidth, high = c.clientHeight;
       if (c.width !== Math.round(w * k) || c.height !== Math.round(high * k)) { c.width = Math.round(w * k); c.height = Math.round(high * k); }
-      const g = c.getContext("2d"); g.setTransform(k, 0, 0, k, 0, 0); g.clearRect(0, 0, w, high); return [g, w, high];
+      const g = c.getContext("2d"); g.setTransform(k, 0, 0, k, 0, 0); g.clearRect(0, 0, w, high); g.font = "11px sans-serif"; return [g, w, high];
     },
     line(h) {
-      const [g, w, high] = this.fit(this.$refs.line), T = this.timeline, n = Math.max(T.last - T.first, 1);
-      const x = (tick) => (tick - T.first) / n * w, at = (i, all) => i / Math.max(all.length - 1, 1) * w;
-      g.fillStyle = "#1d232b"; g.fillRect(0, 0, w, high); g.font = "11px sans-serif";
-      const curve = (values, most, top, bottom, ink) => {  // gaps where there is no value, a dot for a lone one
-        g.strokeStyle = g.fillStyle = ink; g.lineWidth = 2; g.beginPath(); let pen = false;
-        values.forEach((v, i) => { if (v === null) { pen = false; return; } const y = bottom - (bottom - top) * Math.min(v / most, 1);
-          if (pen) g.lineTo(at(i, values), y); else { g.moveTo(at(i, values), y); if ((values[i + 1] ?? null) === null) g.fillRect(at(i, values) - 1, y - 1, 2, 2); } pen = true; }); g.stroke(); g.lineWidth = 1; };
-      const most = Math.max(...T.speed, 1); curve(T.speed, most, 8, 48, "#4d9dff");
-      g.fillStyle = "#ff8552"; const wide = w / T.ttc.length + 1;
-      T.ttc.forEach((v, i) => { if (v === null || v >= T.near) return; const bar = 48 * (1 - v / T.near); g.fillRect(i / T.ttc.length * w, 50 - bar, wide, bar); });
-      T.tier.forEach((v, i) => { if (v === null) return; g.fillStyle = `hsl(${v * 27}, 60%, 50%)`; g.fillRect(i / T.tier.length * w, 52, w / T.tier.length + 1, 6); });
-      const inks = { crash: "#ff5b52", "put back": "#f2b441", marking: "#b58cff", notice: "#9aa5b1", hazard: "#ff4fa3" };
-      for (const [first, last] of T.hazards) { g.fillStyle = inks.hazard; g.fillRect(x(first), 0, Math.max(x(last) - x(first), 3), 5); }
+      const [g, w] = this.fit(this.$refs.line), T = this.timeline, n = Math.max(T.last - T.first, 1), wide = w - EDGE.left - EDGE.right;
+      const x = (tick) => EDGE.left + Math.min((tick - T.first) / n, 1) * wide, at = (i) => x(T.first + i * T.stride), i = Math.floor((h.tick - T.first) / T.stride);
+      const bar = (from, to, y, high, ink) => { const long = Math.max(to - from, 3); g.fillStyle = ink; g.fillRect(Math.min(from, w - EDGE.right - long), y, long, high); };
+      T.tier.forEach((v, k) => { if (v !== null) bar(at(k), at(k + 1) + 0.5, 20, 7, `hsl(${v * 27}, 60%, 50%)`); });
+      const rule = (at, ink) => { g.fillStyle = ink; for (let k = 1; k <= 4; k++) g.fillRect(at - 1, HEAD + k * ROW - 4 - PLOT, 2, PLOT); };  // beside no name
       const worst = Math.max(...T.violated, 1);
-      T.violated.forEach((v, i) => { if (v) { g.fillStyle = `rgba(255, 79, 163, ${0.25 + 0.75 * v / worst})`; g.fillRect(i / T.violated.length * w, 52, w / T.violated.length + 1, 6); } });
-      for (const [tick, kind] of T.events) { g.fillStyle = inks[kind] || "#fff"; g.fillRect(x(tick) - 1.5, kind === "crash" ? 0 : 30, 3, kind === "crash" ? 62 : 22); }
-      g.fillStyle = "#4d9dff"; g.fillText(`speed, 0 to ${Math.round(most)} km/h`, 6, 70);
-      g.fillStyle = "#ff8552"; g.fillText(`time to collision, below ${T.near} s`, 150, 70);
-      if (T.violated.length || T.hazards.length) { g.fillStyle = inks.hazard; g.textAlign = "right"; g.fillText(`hazards above, indicators beyond bounds below, up to ${Math.max(...T.violated, 0)}`, w - 6, 14); g.textAlign = "left"; }
-      const rows = [[T.gap, T.far, "#4fce7f", `gap to what is ahead, 0 to ${T.far} m`], [T.grip, 1, "#f2b441", "grip of the tyres, 0 to 1"]];
-      rows.forEach(([values, top, ink, name], i) => { const y = 76 + 42 * i; g.strokeStyle = "#303944"; g.strokeRect(0.5, y + 0.5, w - 1, 39);
-        curve(values, top, y + 2, y + 38, ink);
-        g.fillStyle = "#1d232bd0"; g.fillRect(3, y + 3, g.measureText(name).width + 6, 14); g.fillStyle = ink; g.fillText(name, 6, y + 13); });
-      g.fillStyle = "#fff"; g.fillRect(x(h.tick) - 1, 0, 2, high);
+      T.violated.forEach((v, k) => { if (v) bar(at(k), at(k + 1) + 0.5, 20, 7, `rgba(255, 79, 163, ${0.25 + 0.75 * v / worst})`); });
+      for (const [first, last] of T.hazards) bar(x(first), x(last), 14, 5, INKS.hazard);
+      g.fillStyle = INKS.dim; g.fillText(T.violated.length ? `indicators beyond bounds, up to ${Math.max(...T.violated)}` : "acting tier", EDGE.left, 10);
+      g.textAlign = "right"; let right = w - EDGE.right;  // what the colours of the marks mean
+      for (const kind of new Set([...T.events.map((one) => one[1]), ...(T.hazards.length ? ["hazard"] : [])])) { g.fillStyle = INKS[kind]; g.fillText(kind, right, 10); right -= g.measureText(kind).width + 10; }
+      g.textAlign = "left"; const low = HEAD + 4 * ROW - 4;
+      for (const [tick, kind] of T.events) { bar(x(tick) - 1.5, x(tick) + 1.5, 16, 15, INKS[kind]); if (kind === "crash") rule(x(tick), INKS[kind]); }
+      const points = (values) => values.map((v, k) => [at(k), v]);
+      this.plots(g, w, HEAD, [["speed, km/h", INKS.speed, this.round([...T.speed, ...T.limit], 20), points(T.speed), T.speed[i], points(T.limit), T.limit.length ? "speed envelope" : ""],
+        ["gap to what is ahead, m", INKS.gap, T.far, points(T.gap), T.gap[i], null, "", `nothing within ${T.far} m`], ["time to collision, s", INKS.ttc, T.near, points(T.ttc), T.ttc[i], null, "", `none below ${T.near} s`],
+        ["grip of the tyres", INKS.grip, this.round([1, ...T.grip], 0.1), points(T.grip), T.grip[i], null, "", "not recorded"]]);
+      this.times(g, w, low + 16, T.first * T.dt, T.last * T.dt);
+      rule(x(h.tick), "#fff"); g.fillRect(x(h.tick) - 1, 14, 2, 15);
     },
     seek(e) {
-      const box = e.target.getBoundingClientRect(), T = this.timeline;
-      this.say("seek", Math.round(T.first + (e.clientX - box.left) / box.width * (T.last - T.first)));
+      const box = e.target.getBoundingClientRect(), T = this.timeline, share = (e.clientX - box.left - EDGE.left) / (box.width - EDGE.left - EDGE.right);
+      this.say("seek", Math.round(T.first + Math.max(0, Math.min(share, 1)) * (T.last - T.first)));
     },
     key(e, down) {
       const focus = document.activeElement, tag = focus ? focus.tagName : "";

@@ -71,7 +71,7 @@ def _work(run: Path, path: Path) -> None:
 
 
 def draw_crash(run: Path, path: Path) -> None:
-    """Writes a film of a run, .webp, of LENGTH s from before its fastest crash on.
+    """Writes a film of a run, .webp, with plots, of LENGTH s from before its fastest crash on.
 
     FileError for a folder that cannot be replayed, OutputError for a film that cannot be written.
     """
@@ -79,4 +79,4 @@ def draw_crash(run: Path, path: Path) -> None:
     begin = opening_tick(source)
     first, last = (index_at(source, tick) for tick in (begin, begin + round(LENGTH / DT)))
     part = path.with_name(f"part-{path.name}")
-    write_film(source, range(first, last + 1), View.FOLLOW, part).rename(path)
+    write_film(source, range(first, last + 1), View.FOLLOW, part, plots=True).rename(path)

@@ -16,6 +16,7 @@ from skidpad.cockpit import hud
 from skidpad.cockpit.companion import Companion
 from skidpad.cockpit.marks import LightAhead, Lying, marks_of, patch_marks
 from skidpad.cockpit.pictures import Picture, colours, draw
+from skidpad.cockpit.plots import Plots
 from skidpad.cockpit.source import Source, index_at
 from skidpad.cockpit.studio import FOR_PEOPLE, Looks, Studio, View, plane
 from skidpad.cockpit.turn_signals import TurnSignals
@@ -49,11 +50,12 @@ def write_film(
     path: Path,
     other: Source | None = None,
     looks: Looks = FOR_PEOPLE,
+    plots: bool = False,
 ) -> Path:
     """Writes a film, .mp4 or .webp, of these moments in their own time, and returns its path.
 
-    other: a run to be shown beside it; looks: of the world in both. ConfigError for another ending,
-    OutputError when it cannot be written.
+    other: a run to be shown beside it; looks: of the world in both. plots: of speed, gap
+    and grip are under the pictures. ConfigError for another ending, OutputError when it cannot be written.
     """
     if path.suffix not in SUFFIXES:
         raise ConfigError(f"a film's file ends in {' or '.join(SUFFIXES)}, got {path}")
@@ -63,9 +65,9 @@ def write_film(
         raise OutputError(f"cannot write the film {path}: {error.strerror}") from error
     dt = source.step * DT
     if path.suffix == ".webp":
-        _webp(frames(source, moments[::2], view, other, looks), path, 2.0 * dt)
+        _webp(frames(source, moments[::2], view, other, looks, plots), path, 2.0 * dt)
     else:
-        _mp4(frames(source, moments, view, other, looks), path, dt)
+        _mp4(frames(source, moments, view, other, looks, plots), path, dt)
     return path
 
 
@@ -75,14 +77,19 @@ def frames(
     view: View,
     other: Source | None = None,
     looks: Looks = FOR_PEOPLE,
+    plots: bool = False,
 ) -> Iterator[Picture]:
-    """Yields a picture per moment: the view, mirrors in it, what is said, and another run beside it."""
+    """Yields a picture per moment: the view, mirrors in it, what is said, and another run beside it.
+
+    plots: of the first run are under it.
+    """
     first = source.seat(moments[0]).outside
     studio = Studio(source.map, source.table, first, source.seed, looks=looks)
     companion = None if other is None else Companion(other, source.tick(0), looks)
     camera, light = studio.suite.cameras[view.value], LightAhead(source.map)
     lying = Lying(source.map, read_surfaces(source.folder))
     signals = TurnSignals(source)
+    under: Plots | None = None
     for k in moments:
         moment = source.moment(k)
         studio.change(source.seat(k).outside)
@@ -100,9 +107,12 @@ def frames(
             moment.truth.tick,
             hud.list_events(moment),
         )
-        yield (
-            picture if companion is None else np.hstack([picture, _other(companion, moment, view)])
-        )
+        if companion is not None:
+            picture = np.hstack([picture, _other(companion, moment, view)])
+        if plots:
+            under = under or Plots(source, moments, picture.shape[1])
+            picture = np.vstack([picture, under.at(k)])
+        yield picture
 
 
 def _other(companion: Companion, moment: Moment, view: View) -> Picture:

@@ -45,12 +45,12 @@ def every(n: int) -> slice:
     return slice(None, None, max(1, n // CURVE))
 
 
-def least_of(values: Floats, below: float) -> list[float | None]:
-    """Returns the least value from each shown moment to the next, so that no short one is missed.
+def least_of(values: Floats, below: float, part: slice) -> list[float | None]:
+    """Returns the least value from each moment of `part` to the next, so that no short one is missed.
 
     None where it is not below `below`.
     """
     if not len(values):
         return []
-    least = np.minimum.reduceat(values, np.arange(len(values))[every(len(values))])
+    least = np.minimum.reduceat(values, np.arange(len(values))[part])
     return [round(v, 1) if v < below else None for v in least.tolist()]

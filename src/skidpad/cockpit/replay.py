@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from skidpad.campaign.driving.loop import Moment
+from skidpad.campaign.driving.readings import ENVELOPE
 from skidpad.campaign.runs.road import load_road
 from skidpad.campaign.runs.stored import read_run
 from skidpad.campaign.takeover.desk import beam_of
@@ -53,6 +54,7 @@ from skidpad.stack.control.text import mode_text
 
 LEAST_WAY, MOST_WAY = 0.3, 12.0  # m in two ticks, between which a grade can be told
 BRAKING_AX = -1.5  # m/s^2, below which the brake lamps of others are shown lit; our choice
+SPEED_LIMIT = f"{ENVELOPE}.speed_mps"
 WORDS: dict[str, type[Any]] = {
     "status": DetectionStatus,
     "tier": Tier,
@@ -199,16 +201,29 @@ class RecordedRun:
                 return Relocate(e.new, 0.0, Moved(e.reason, e.shift, e.old, e.new, True))
         return None
 
-    def curves(self) -> Curves:
-        """Returns speed, tier, time to collision, gap and grip along the time, of about CURVE moments."""
-        log, part = self.log, every(len(self.log))
+    def curves(self, part: slice | None = None) -> Curves:
+        """Returns speed, its limit, tier, time to collision, gap and grip at the moments of `part`.
+
+        None: at about CURVE of them.
+        """
+        log = self.log
+        part = every(len(log)) if part is None else part
         tiers = [None if isnan(v) else int(v) for v in log.report.tier[part].tolist()]
         bodies = [body(log, i) for i in range(len(log.table))]
         there = np.column_stack([together(log, 0, i) for i in range(len(bodies))])
         ahead = measure_ahead(bodies, there)
         grip = [round_value(mean_grip(mu)) for mu in log.mu[part, 0]]
         speed = np.round(log.v_ego[part] * 3.6, 1).tolist()
-        return Curves(speed, tiers, least_of(ahead.ttc, NEAR), least_of(ahead.gap, FAR), grip)
+        near = least_of(ahead.ttc, NEAR, part), least_of(ahead.gap, FAR, part)
+        return Curves(speed, tiers, *near, grip, limit=self._limits(part))
+
+    def _limits(self, part: slice) -> list[float | None]:
+        """Returns the speed envelope's limit in km/h at the moments of `part`; [] in a run without one."""
+        sensors, rows = self._readings
+        if ENVELOPE not in sensors:
+            return []
+        said = (rows.get(tick, {}).get(SPEED_LIMIT) for tick in self.log.tick[part].tolist())
+        return [None if v is None else round_value(3.6 * v, 1) for v in said]
 
 
 def told_of(event: Any) -> tuple[str, str] | None:

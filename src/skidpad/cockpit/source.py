@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from skidpad.campaign.driving.loop import Moment
-from skidpad.cockpit.indicators import FAR, NEAR
+from skidpad.cockpit.indicators import FAR, NEAR, every
 from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import LampSwitch, Outside
@@ -46,7 +46,7 @@ class Said:
 
 
 class Curves(NamedTuple):
-    """What is drawn along the time, at about a thousand moments."""
+    """What is drawn along the time, at moments of one distance."""
 
     speed: list[float]  # km/h
     tier: list[int | None]  # that acted
@@ -57,6 +57,7 @@ class Curves(NamedTuple):
     hazards: Sequence[
         tuple[int, int, str]
     ] = ()  # first and last tick, and what a monitor called it
+    limit: Sequence[float | None] = ()  # km/h of the speed envelope; (): the run has none
 
 
 class Source(Protocol):
@@ -105,8 +106,8 @@ class Source(Protocol):
         del k
         return []
 
-    def curves(self) -> Curves:
-        """Returns what is drawn along the time, at about CURVE moments."""
+    def curves(self, part: slice | None = None) -> Curves:
+        """Returns what is drawn along the time, at the moments of `part`; None: at about CURVE of them."""
         ...
 
 
@@ -147,6 +148,7 @@ def timeline(source: Source) -> dict[str, Any]:
         "first": source.tick(0),
         "last": source.tick(source.ticks - 1),
         "step": source.step,
+        "stride": every(source.ticks).step * source.step,  # ticks between two values of a curve
         "dt": DT,
         "near": NEAR,
         "far": FAR,

@@ -1,13 +1,15 @@
 """Kernels before clients wait: loaded from the disk, or compiled when this machine has none yet.
 
 At a first start two processes compile: this one what a tick needs, a child what takes longest in it
-and then the sensors. The server is ready when ticks are; a client that listens to a sensor before the child
-has ended waits for it.
+and then the sensors. The server is ready when ticks are; a client that listens to a sensor before these are
+compiled waits for them. The child then compiles the weather and radio effects of sensors, for which
+nothing waits, and ends. A later start compiles in a child what is missing of them.
 """
 
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
 from collections.abc import Callable
 from contextlib import suppress
@@ -23,8 +25,14 @@ from skidpad.physics.contact import CONTACT_LAW, Contacts, resolve_contacts
 from skidpad.physics.fleet import Fleet
 from skidpad.physics.segments import static_segments
 from skidpad.physics.vehicle import step_vehicles
+from skidpad.sensors.physical_radar.radar import find_detections
+from skidpad.sensors.pictures.degradation import degrade
+from skidpad.sensors.pictures.lens import show_drops
+from skidpad.sensors.pictures.spray import veil_by_spray
+from skidpad.sensors.ranging.lidar_returns import find_returns
 from skidpad.sensors.raster import rays
 from skidpad.simulation.carla_server.actors.catalogue import Family
+from skidpad.simulation.carla_server.actors.effects import load_acting
 from skidpad.simulation.carla_server.actors.registry import Attachment
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.options import ServerOptions
@@ -36,11 +44,24 @@ from skidpad.simulation.carla_server.sensing.gbuffers import (
 )
 from skidpad.simulation.carla_server.sensing.producers import PRODUCERS
 from skidpad.simulation.carla_server.served import Served
+from skidpad.simulation.carla_server.weather import PACKED
 from skidpad.simulation.world import step
 from skidpad.simulation.world.rows import Rows, bodies_of
 
 CONTEXT = multiprocessing.get_context("spawn")
 LIMIT = 600.0  # s that the child may take
+EFFECTS = (find_detections, find_returns, show_drops, veil_by_spray, degrade)
+STORM = {
+    "precipitation": 100.0,
+    "precipitation_deposits": 100.0,
+    "wetness": 100.0,
+    "fog_density": 30.0,
+    "sun_altitude_deg": -20.0,
+}  # in which every effect acts
+BEHIND = Pose(-15.0, 0.0)  # of a lead, in whose spray a car drives
+FAST = 20.0  # m/s of both
+SMALL_MAP = "straight"
+SMALL = {"image_size_x": "64", "image_size_y": "48"}  # px
 Say = Callable[[str], object]
 
 
@@ -55,9 +76,12 @@ class ProducingHub(StreamHub):
 def start_compiling(options: ServerOptions, say: Say) -> Helper | None:
     """Returns a helper that compiles beside this process, after saying so; None when all is kept.
 
-    To be called before anything is made of a map, for that compiles too.
+    To be called before anything is made of a map, for that compiles too. Effects that are not kept are
+    compiled by a child for which nothing waits.
     """
     if is_kept(step.advance_undriven) and is_kept(rays.cast):
+        if not all(map(is_kept, EFFECTS)):
+            CONTEXT.Process(target=compile_effects, args=(options,), daemon=True).start()
         return None
     say(f"first start: compiling, which is kept in {kernel_cache()}")
     return Helper(options, say)
@@ -88,14 +112,47 @@ def a_tick(
     episode.moving.map.project(0.0, 0.0, 0.0)
     before_step()
     car = episode.spawn(Wanted(name, {}), episode.map.spawn_points[0])
-    small = {"image_size_x": "64", "image_size_y": "48"}
     for kind in PRODUCERS if sensors else ():
-        actor = episode.attach(Wanted(kind, small), Pose(0.0, 0.0, 2.0), car.id, Attachment.RIGID)
+        actor = episode.attach(Wanted(kind, SMALL), Pose(0.0, 0.0, 2.0), car.id, Attachment.RIGID)
         sensor = episode.sensors.of(actor.id)
         if sensor is not None and isinstance(sensor.equipment, ColourCamera):
             sensor.equipment.gbuffers = True
             stream_of(sensor, Texture.AMBIENT_OCCLUSION, served.hub)
     served.tick()
+
+
+def compile_effects(options: ServerOptions) -> None:
+    """Compiles the weather and radio effects of sensors, when nothing else wants the processor.
+
+    It runs ticks of a world that is thrown away: a car in the spray of another one, at night, in rain
+    and fog, with a sensor per blueprint that has effects, and all of them on.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the server's
+    if hasattr(os, "nice"):  # not on Windows
+        os.nice(19)
+    run_effects(options)
+
+
+def run_effects(options: ServerOptions) -> None:
+    """Runs the ticks by which `compile_effects` compiles, on a small map, whatever the server's is."""
+    on_small = ServerOptions(map=SMALL_MAP, scenery=options.scenery, bodywork=options.bodywork)
+    served = Served(on_small, ProducingHub())
+    episode = served.episode
+    values = episode.sky.values | STORM
+    episode.sky.apply([*(values[name] for name in PACKED), 0.0])
+    name = next(id for id, b in served.stock.catalogue.items() if b.family is Family.VEHICLE)
+    start = episode.map.spawn_points[len(episode.map.spawn_points) // 2]
+    lead, car = (episode.spawn(Wanted(name, {}), place) for place in (start, start @ BEHIND))
+    for one in (lead, car):
+        vx, vy = FAST * np.cos(start.yaw), FAST * np.sin(start.yaw)
+        episode.vehicles.set_velocity(one.id, (float(vx), float(vy), 0.0))
+    for kind, names in load_acting().additions.items():
+        known = served.stock.blueprint(kind).attributes
+        strongest = {name: known[name].recommended[-1] for name in names}
+        mount = Pose(2.4, 0.0, 0.5)
+        episode.attach(Wanted(kind, SMALL | strongest), mount, car.id, Attachment.RIGID)
+    for _ in range(3):
+        served.tick()
 
 
 class Helper:
@@ -109,7 +166,7 @@ class Helper:
         there.close()
 
     def hear(self) -> None:
-        """Waits until the parts of a step are on the disk, LIMIT s at most."""
+        """Waits until the next part is on the disk, LIMIT s at most: of a step, then the sensors."""
         with suppress(EOFError, OSError):
             if self._pipe.poll(LIMIT):
                 self._pipe.recv()
@@ -121,12 +178,12 @@ class Helper:
         self._say("ticks are compiled; sensors are being compiled beside the first of them")
 
     def finish(self) -> None:
-        """Waits until the sensors are compiled, LIMIT s at most."""
-        self._process.join(LIMIT)
+        """Waits until the sensors are compiled, LIMIT s at most, and not for their effects."""
+        self.hear()
 
 
 def _help(pipe: Connection, options: ServerOptions) -> None:
-    """Compiles the parts of a tick in a helper process, reports that, and then runs one tick on demand."""
+    """Compiles the parts of a tick, on demand a tick with sensors, and effects; reports the first two."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the server's
     compile_parts()
     pipe.send(None)
@@ -135,6 +192,9 @@ def _help(pipe: Connection, options: ServerOptions) -> None:
     except EOFError:  # the server is gone
         return
     a_tick(options, sensors=True)
+    with suppress(OSError):
+        pipe.send(None)
+    compile_effects(options)
 
 
 def vehicle_arguments() -> tuple[Any, ...]:

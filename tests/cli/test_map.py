@@ -8,7 +8,7 @@ import tarfile
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
-from zipfile import ZIP_LZMA, ZipFile
+from zipfile import ZIP_BZIP2, ZIP_DEFLATED, ZIP_LZMA, ZIP_STORED, ZipFile
 
 import pytest
 from typer.testing import CliRunner
@@ -291,15 +291,31 @@ def test_a_zip_that_zipfile_does_not_read_is_one_sentence(
         find_road_files(source)
 
 
-def test_a_damaged_zip_is_one_sentence(tmp_path: Path) -> None:
-    source = tmp_path / "some.zip"
-    with ZipFile(source, "w", compression=ZIP_LZMA) as archive:
+@pytest.mark.parametrize("compression", [ZIP_STORED, ZIP_DEFLATED, ZIP_BZIP2, ZIP_LZMA])
+def test_a_damaged_member_of_a_zip_is_one_sentence_and_writes_nothing(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    compression: int,
+) -> None:
+    source, out = tmp_path / "some.zip", tmp_path / "maps"
+    with ZipFile(source, "w", compression=compression) as archive:
+        archive.writestr("Town02.xodr", ROADS)
         archive.writestr("Town03.xodr", ROADS)
     data = bytearray(source.read_bytes())
-    data[60:100] = bytes(40)
+    content = data.rindex(b"Town03.xodr", 0, data.index(b"PK\x01\x02")) + len("Town03.xodr")
+    data[content + 20 : content + 24] = b"oops"  # of the second map
     source.write_bytes(data)
-    with pytest.raises(FileError, match="cannot be read as a CARLA folder or archive"):
-        find_road_files(source)
+    monkeypatch.setattr(
+        "sys.argv", ["skidpad", "map", "import-carla", str(source), "--out", str(out)]
+    )
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    said = capsys.readouterr().err.strip()
+    assert f"{source} cannot be read as a CARLA folder or archive" in said
+    assert "\n" not in said
+    assert not out.exists()
 
 
 TOWN = tarred({"a/Town03.xodr": ROADS}, "w")

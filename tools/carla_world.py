@@ -46,3 +46,27 @@ def listening(
     came: queue.Queue[Any] = queue.Queue()
     sensor.listen(came.put)
     return sensor, came
+
+
+def spread(client: Any, world: Any, pattern: str, seed: int, number: int) -> list[Any]:
+    """Vehicles at spawn points that are spread over the map, of the blueprints of a pattern in turns."""
+    blueprints = sorted(world.get_blueprint_library().filter(pattern), key=lambda b: b.id)
+    points = world.get_map().get_spawn_points()
+    apart = max(1, len(points) // number)
+    commands = [
+        carla.command.SpawnActor(
+            blueprints[(seed + i) % len(blueprints)], points[(7 * seed + i * apart) % len(points)]
+        )
+        for i in range(number)
+    ]
+    answers = client.apply_batch_sync(commands, True)
+    return list(world.get_actors([a.actor_id for a in answers if not a.error]))
+
+
+def hear_collisions(world: Any, cars: list[Any], heard: Any) -> list[Any]:
+    """A collision sensor on each car, whose events go to `heard`."""
+    blueprint = world.get_blueprint_library().find("sensor.other.collision")
+    sensors = [world.spawn_actor(blueprint, carla.Transform(), attach_to=car) for car in cars]
+    for sensor in sensors:
+        sensor.listen(heard)
+    return sensors

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 
-def memory_mb(process: int) -> float:
-    """Resident memory; 0 where the system does not tell."""
+def memory_mb(process: int, which: str = "VmRSS") -> float:
+    """Resident memory, with "VmHWM" its peak; 0 where the system does not tell."""
     status = Path(f"/proc/{process}/status")
     for line in status.read_text().splitlines() if status.exists() else []:
-        if line.startswith("VmRSS"):
+        if line.startswith(which):
             return round(int(line.split()[1]) / 1024.0, 1)
     return 0.0

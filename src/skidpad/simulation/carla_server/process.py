@@ -61,6 +61,11 @@ class ServerProcess(AbstractContextManager["ServerProcess"]):
                 self._process.wait()
 
     @property
+    def pid(self) -> int:
+        """Returns the id of the server's process."""
+        return self._process.pid
+
+    @property
     def alive(self) -> bool:
         """Returns whether the server's process still runs."""
         return self._process.poll() is None

@@ -20,6 +20,7 @@ from skidpad.core.vocabulary import Govern
 from skidpad.envelope.govern_kernel import Told, find_limits, keep_inside
 from skidpad.recording.run.log_files import log_hash
 from skidpad.recording.run.ticks import copy_actors
+from skidpad.scenarios.playing.table_kernel import play_tick
 from skidpad.sensors.object_level.objects import sense
 from skidpad.simulation.recovery import RecoverySettings, Supervisor, find_ego, has_reason
 from skidpad.simulation.world.feel import feel_motion
@@ -27,18 +28,19 @@ from skidpad.simulation.world.step import advance
 from skidpad.stack.perception.lights import heed_light
 from skidpad.stack.road import read_road
 from skidpad.stack.think import think
-from support.runs import adas_run
+from support.runs import adas_run, scenario_run
 
 Faulty = Callable[..., Any]
 LEAD = adas_run(4, duration=15.0)
 GOVERNED = adas_run(4, "icy_100", duration=15.0, govern=Govern.ENVELOPE)
 LIGHTS = adas_run(4, duration=32.0)
+STORY = scenario_run("lead_slowdown")
 
 
 @register_jitable
-def flip(value):
-    """Returns a number of double precision with its last bit the other way round."""
-    return np.int64(np.float64(value).view(np.int64) ^ 1).view(np.float64)
+def flip(value, bit=0):
+    """Returns a number of double precision with a bit, the last one by default, the other way round."""
+    return np.int64(np.float64(value).view(np.int64) ^ (1 << bit)).view(np.float64)
 
 
 @register_jitable
@@ -156,6 +158,17 @@ def keep_wrong(address: int) -> Faulty:
     return faulty
 
 
+def play_wrong(address: int) -> Faulty:
+    def faulty(map, states, table, t, dt):
+        goes_on = call(address, play_tick, (map, states, table, t, dt))
+        pedals = table.value.pedals
+        for k in range(len(pedals)):
+            pedals[k, 0] = flip(pedals[k, 0], 40)  # what the last bit does is lost in the log
+        return goes_on
+
+    return faulty
+
+
 FAULTS: dict[str, tuple[Any, Callable[[int], Faulty], RunSpec]] = {
     "advance": (advance, move_wrong, LEAD),
     "feel_motion": (feel_motion, feel_wrong, LEAD),
@@ -168,6 +181,7 @@ FAULTS: dict[str, tuple[Any, Callable[[int], Faulty], RunSpec]] = {
     "copy_actors": (copy_actors, copy_wrong, LEAD),
     "find_limits": (find_limits, limit_wrong, GOVERNED),
     "keep_inside": (keep_inside, keep_wrong, GOVERNED),
+    "play_tick": (play_tick, play_wrong, STORY),
 }
 
 
@@ -194,7 +208,9 @@ def drive(spec: RunSpec, quickly: bool) -> tuple[str, tuple[object, ...], int]:
     return log_hash(run.log), memory, run.quick_ticks
 
 
-@pytest.mark.parametrize("spec", [LEAD, LIGHTS, GOVERNED], ids=["roads", "lights", "governed"])
+@pytest.mark.parametrize(
+    "spec", [LEAD, LIGHTS, GOVERNED, STORY], ids=["roads", "lights", "governed", "story"]
+)
 def test_without_a_fault_both_ways_are_the_same(spec: RunSpec) -> None:
     one, other = drive(spec, False), drive(spec, True)
     assert one[:2] == other[:2]

@@ -13,6 +13,7 @@ import pytest
 from msgspec import structs
 
 from skidpad.campaign.cells.grip import Cross, cross, template
+from skidpad.campaign.driving import quick
 from skidpad.campaign.driving.loop import Arrival, Moment, Sink, Timer, Unsupervised
 from skidpad.campaign.driving.quick_kernel import drive_ticks
 from skidpad.campaign.driving.run_setup import stage_of
@@ -28,6 +29,7 @@ from skidpad.physics.presets import all_presets, find_weather
 from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.log_files import log_hash
 from skidpad.recording.run.ticks import copy_actors
+from skidpad.scenarios.playing.table_kernel import play_tick
 from skidpad.scenarios.shipped import NAMES
 from skidpad.sensors.object_level.objects import sense
 from skidpad.simulation.recovery import RecoverySettings, Supervisor, find_ego, has_reason
@@ -228,6 +230,20 @@ def test_scripted_runs_give_the_same_bits(scenario: str, weather: str) -> None:
     assert opened.quick_ticks > SHARE * len(one.log)
 
 
+@pytest.mark.parametrize("scenario", ["lead_slowdown", "ghost_cut_in"])  # without a contact
+def test_a_story_in_a_table_needs_no_call_per_tick(scenario: str, monkeypatch: Any) -> None:
+    asked: list[int] = []
+
+    def count(joined: Any, story: Any, begun: bool, tick: int, n: int, *others: Any) -> Any:
+        asked.append(n)
+        return drive_ticks(joined, story, begun, tick, n, *others)
+
+    monkeypatch.setattr(quick, "drive_ticks", count)
+    run, opened = drive_quickly(scenario_run(scenario))
+    assert opened.quick_ticks > SHARE * len(run.log)
+    assert len(asked) < 0.15 * opened.quick_ticks
+
+
 def test_a_script_that_changes_what_is_seen_and_felt_gives_the_same_bits(tmp_path: Path) -> None:
     hidden = private('<VisibilityAction graphics="true" sensors="{}" traffic="true"/>')
     rain = """<GlobalAction><EnvironmentAction><Environment name="theirs"><Weather>
@@ -399,9 +415,10 @@ def test_addresses_are_of_the_types_that_the_kernel_calls() -> None:
     """Compiled anew, the kernel asks for no machine code but that whose addresses it is given."""
     for word in (Govern.NONE, Govern.ENVELOPE):
         drive_quickly(adas_run(4, duration=3.0, govern=word))
+    drive_quickly(scenario_run("lead_slowdown"))
     called = (
         advance, feel_motion, sense, read_road, think, find_ego, has_reason, heed_light, copy_actors,
-        find_limits, keep_inside,
+        find_limits, keep_inside, play_tick,
     )  # fmt: skip
     known: list[Any] = [set(one.overloads) for one in called]  # type: ignore[attr-defined]
     kernel: Any = drive_ticks

@@ -23,6 +23,7 @@ from skidpad.campaign.driving.quick_kernel import (
     MOVED,
     REFUSED,
     STEPPED,
+    TOLD,
     UNUSUAL,
     Addresses,
     Joined,
@@ -44,6 +45,8 @@ from skidpad.envelope.govern import GovernedStack
 from skidpad.envelope.govern_kernel import NOTHING_TOLD, find_limits, keep_inside
 from skidpad.envelope.sight import Motion
 from skidpad.recording.run.ticks import TickArrays, TickLog, copy_actors
+from skidpad.scenarios.playing.table import hold_no_story
+from skidpad.scenarios.playing.table_kernel import Table, play_tick
 from skidpad.sensors.object_level.objects import ObjectSuite, sense
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.simulation.recovery import (
@@ -57,7 +60,7 @@ from skidpad.simulation.recovery import (
 )
 from skidpad.simulation.sensing import Objects
 from skidpad.simulation.world.feel import feel_motion
-from skidpad.simulation.world.step import advance
+from skidpad.simulation.world.step import DECIDE, MOVE, advance
 from skidpad.simulation.world.touch import EGO
 from skidpad.simulation.world.world import World
 from skidpad.stack.adas import AdasStack
@@ -77,6 +80,7 @@ class Call(NamedTuple):
     """A call of `drive_ticks`; whatever makes it hands back what that gives."""
 
     joined: Held[Joined]
+    story: Held[Table] | None  # that the kernel plays
     begun: bool
     tick: int
     n: int
@@ -102,8 +106,9 @@ def make_calls(calls: Calls) -> int:
 class QuickParts(NamedTuple):
     """What of a run takes part in its quick way.
 
-    timer: counts the ticks of a run whose world a kernel steps; None: it is stepped here, as a script is
-    asked or patches, wind or roll-over are looked at in each tick. way: of a run that ends with it.
+    timer: counts the ticks of a run whose world a kernel steps; None: it is stepped here, as a story is asked
+    or patches, wind or roll-over are looked at in each tick; while a table holds the story, in a kernel, too.
+    way: of a run that ends with it.
     changed: the backend of one with a script, and the file's changes.
     """
 
@@ -226,32 +231,45 @@ class QuickDrive:
         return 0
 
     def _step_world(self, most: int, last: Request) -> int:
-        """Drives ticks in which the world steps here, with its script; the rest of each is one call."""
+        """Drives ticks in which the world steps here, with its script; the rest of each is one call.
+
+        Where a table holds the story, one call drives on to where it has to be played here.
+        """
         stepper, world, script = self.stepper, self.parts.world, self.stepper.script
         arrays, driven, inner = self.log.reserve(1), 0, self.parts.backend
-        joined, shown = self._join(arrays), world.lights.by_id
+        joined, shown, begun = self._join(arrays), world.lights.by_id, False
         while driven < min(most, arrays.left) and not script.ended:
             assert stepper.action is not None
-            silent = self._make_step(stepper.action.command, stepper.words)
-            if not (silent and world.is_quiet and world.lights.by_id is shown):
+            begun = begun or self._make_step(stepper.action.command, stepper.words)
+            if not (begun and world.is_quiet and world.lights.by_id is shown):
                 stepper.next_frame = inner.read_frame()
                 break
-            call = self._describe(joined, arrays.at + driven, last, True, 1)
+            story, n = self._story_ahead(min(most, arrays.left) - driven)
+            call = self._describe(joined, story, arrays.at + driven, last, True, n)
             stop = self._note(call, drive_ticks(*call[:-1], *last))
-            if stop.why == UNUSUAL:
-                stepper.next_frame = inner.read_frame()
-                break
-            last = stop.request
-            if stop.why == REFUSED:
+            last, driven = stop.request, driven + stop.ticks
+            self._tell(stop.ticks, last)
+            begun = stop.why in (MOVED, STEPPED)
+            if begun:
+                world.finish_step(stop.touches, stop.crossed, settled=stop.why == STEPPED)
+            elif stop.why == REFUSED:
                 self._refuse(last)
                 break
-            driven += 1
-            stepper.action = Action(VehicleCommand(*last))
-            self._tell_envelope(1, stepper.action.command)
-            for sink in stepper.sinks:
-                sink.pass_ticks(1)
-            stepper.words = script.step(inner.truth())
+            elif stop.why == UNUSUAL:
+                stepper.next_frame = inner.read_frame()
+                break
+            else:
+                stepper.words = script.step(inner.truth())
         return driven
+
+    def _story_ahead(self, most: int) -> tuple[Held[Table] | None, int]:
+        """Returns the story that the kernel is given, and how many ticks it may drive with it."""
+        if self.parts.changed is None:
+            return None, 1
+        player, world = self.parts.changed[1].player, self.parts.world
+        if player.table is None or not self.parts.backend.steps_alone or world.has_drivers:
+            return hold_no_story(), 1
+        return player.table.held, min(most, player.count_ahead(world.tick))
 
     def _make_step(self, command: VehicleCommand, words: Sequence[ActorCommand]) -> bool:
         """Steps the world; returns whether no script changes anything in this tick."""
@@ -268,7 +286,7 @@ class QuickDrive:
         while driven < n:
             shown = lights.by_id
             joined = self._join(arrays)
-            call = self._describe(joined, arrays.at + driven, last, begun, n - driven)
+            call = self._describe(joined, None, arrays.at + driven, last, begun, n - driven)
             stop = self._note(call, (yield call))
             last, driven = stop.request, driven + stop.ticks
             if stop.why in (MOVED, STEPPED):
@@ -281,11 +299,9 @@ class QuickDrive:
             elif stop.why not in (DONE, ARRIVED):
                 stepper.next_frame = self.parts.backend.read_frame()
             break
+        self._tell(driven, last)
         if driven:
-            stepper.action, stepper.words = Action(VehicleCommand(*last)), ()
-            self._tell_envelope(driven, stepper.action.command)
-            for sink in stepper.sinks:
-                sink.pass_ticks(driven)
+            stepper.words = ()
         return driven
 
     def _last_request(self) -> Request | str:
@@ -306,7 +322,10 @@ class QuickDrive:
         c = action.command
         return Request(c.throttle, c.brake, c.steer, c.handbrake)
 
-    def _describe(self, joined: Held[Joined], at: int, last: Request, begun: bool, n: int) -> Call:
+    def _describe(
+        self, joined: Held[Joined], story: Held[Table] | None, at: int, last: Request,
+        begun: bool, n: int,
+    ) -> Call:  # fmt: skip
         """Returns the call that drives up to n ticks.
 
         at: their first row in the log. begun: the world has made the step of the first one already.
@@ -316,7 +335,10 @@ class QuickDrive:
         way = self.parts.way
         if way is not None:
             self._reached[0] = way.journey.reached
-        return Call(joined, begun, world.tick, n, at, grace, stood, last)
+        if n > 1 or self.parts.timer is not None:  # else the world makes its own step
+            for kept, new in zip(self._clocks, world.lights.clocks(), strict=True):
+                kept[:] = new
+        return Call(joined, story, begun, world.tick, n, at, grace, stood, last)
 
     def _note(self, call: Call, found: Returned) -> Stop:
         """Notes the ticks of a call that are whole."""
@@ -335,12 +357,19 @@ class QuickDrive:
                 way.ended = way.journey.is_done
             if supervisor is not None:
                 supervisor.pass_ticks(ticks, (lane, s, offset), standing)
+            if self.parts.changed is not None:  # Python plays the story at the end of a call
+                self.parts.changed[1].player.pass_ticks(ticks - (why in (DONE, TOLD)))
         return Stop(ticks, why, touches, crossed, Request(throttle, brake, steer, handbrake))
 
-    def _tell_envelope(self, ticks: int, command: VehicleCommand) -> None:
-        """Tells the envelope, if any, what kernels drove; command: the last one."""
+    def _tell(self, ticks: int, last: Request) -> None:
+        """Tells all who look on that kernels drove so many ticks; last: what the stack asked for."""
+        if ticks == 0:
+            return
+        self.stepper.action = Action(VehicleCommand(*last))
         if self.parts.governed is not None:
-            self.parts.governed.pass_ticks(ticks, command)
+            self.parts.governed.pass_ticks(ticks, self.stepper.action.command)
+        for sink in self.stepper.sinks:
+            sink.pass_ticks(ticks)
 
     def _refuse(self, request: Request) -> None:
         """Ends the run as a command out of range does."""
@@ -361,6 +390,7 @@ class QuickDrive:
         return Rules(
             dt=world.dt,
             substeps=world.fleet.steps,
+            moving=MOVE if self.parts.timer is None else DECIDE | MOVE,
             weather=arrays.weather,
             bumper_first=self.parts.suite.camera_ids[0] == stack.cameras.bumper.depth_id,
             supervised=supervisor is not None,
@@ -386,9 +416,6 @@ class QuickDrive:
         assert common is not None, "find_parts has asked for it"
         parts, governed = stack.parts(suite.most_runs, suite.most_points), self.parts.governed
         inside = None if governed is None else governed.envelope.held
-        if self.parts.timer is not None:  # else the world makes its own steps
-            for kept, new in zip(self._clocks, lights.clocks(), strict=True):
-                kept[:] = new
         if lights.by_id is not self._shown:
             self._shown = lights.by_id
             self._lines[:] = road.scan.show(self._shown)
@@ -420,8 +447,9 @@ class QuickDrive:
         runs, points = self.parts.suite.sample_arrays()
         pose, way = (0.0, 0.0, 0.0, 0.0, 0.0), (0, 0.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
         step = (world.arena, 0, 0, 0.0, 0, 0.0, 0.0)
+        steps_here = self.parts.timer is None and self.parts.changed is None
         return Addresses(
-            advance=0 if self.parts.timer is None else find_address(advance, *step),
+            advance=0 if steps_here else find_address(advance, *step),
             feel_motion=find_address(feel_motion, world.arena, EGO),
             sense=find_address(sense, common, map, 0),
             read_road=find_address(read_road, t.memory, road, t.on_highway, t.ways, *pose, True),
@@ -438,6 +466,9 @@ class QuickDrive:
             ),
             keep_inside=0 if inside is None else find_address(
                 keep_inside, inside, NOTHING_TOLD, 0.0, 0.0, 0.0, 0.0, False
+            ),
+            play_tick=0 if self.parts.changed is None else find_address(
+                play_tick, map, states, hold_no_story(), 0.0, 0.0
             ),
         )  # fmt: skip
 

@@ -29,11 +29,12 @@ from skidpad.physics.fleet import shown_gear
 from skidpad.recording.run.ticks import APPLIED, REPORT, REQUESTED, ActorColumns, copy_actors
 from skidpad.roads.journeys import come_by
 from skidpad.roads.kernels import LaneArrays
+from skidpad.scenarios.playing.table_kernel import Table, play_tick
 from skidpad.sensors.object_level.objects import Common, sense
 from skidpad.simulation.recovery import WRONG_WAY_DOT, find_ego, has_reason, is_slow
 from skidpad.simulation.world.feel import Felt, feel_motion
 from skidpad.simulation.world.lights import ROUNDING
-from skidpad.simulation.world.step import DECIDE, MOVE, SETTLE, Arena, advance
+from skidpad.simulation.world.step import SETTLE, Arena, advance
 from skidpad.simulation.world.touch import EGO
 from skidpad.simulation.world.traffic.manager import CHECK_PERIOD
 from skidpad.stack.memory import Memory
@@ -48,6 +49,7 @@ STEPPED = 2  # the world has made its step, in which something happened
 UNUSUAL = 3  # the tick has begun, and the supervisor may have something to do in it
 REFUSED = 4  # the stack's command is out of range
 ARRIVED = 5  # the ego has come to the end of its way
+TOLD = 6  # the story of a scenario goes on in Python
 
 
 class Addresses(NamedTuple):
@@ -64,6 +66,7 @@ class Addresses(NamedTuple):
     copy_actors: int
     find_limits: int
     keep_inside: int
+    play_tick: int
 
 
 class Tables(NamedTuple):
@@ -94,6 +97,7 @@ class Rules(NamedTuple):
 
     dt: float  # s
     substeps: int
+    moving: int  # stages of a step of the world before actors settle
     weather: int  # number of it in the log
     bumper_first: bool  # of the two cameras
     supervised: bool
@@ -179,7 +183,7 @@ def step_world(joined: Held[Joined], tick: int) -> tuple[int, int, int]:
     rules, t, arena = joined.value.rules, joined.value.tables, joined.value.arena
     address = joined.value.at.advance
     looks = tick % CHECK_PERIOD == 0
-    stages = DECIDE | MOVE if looks else DECIDE | MOVE | SETTLE
+    stages = rules.moving if looks else rules.moving | SETTLE
     touches, crossed = call(
         address, advance, (arena, stages, tick, rules.dt, rules.substeps, 0.0, 0.0)
     )
@@ -339,17 +343,41 @@ def has_arrived(t: Tables, felt: Felt) -> bool:
     return bool(t.reached[0] == len(t.way) - 1)
 
 
+@inner_kernel
+def tell_actors(story: Held[Table] | None, joined: Held[Joined], tick: int) -> bool:
+    """Plays the story on by a tick and hands its actors their pedals; False: Python has to play it.
+
+    story: None as `inside` of `ask_envelope`.
+    """
+    if story is None:
+        return True
+    dt, commands = joined.value.rules.dt, joined.value.arena.value.rows.commands
+    if not call(
+        joined.value.at.play_tick, play_tick,
+        (joined.value.map, joined.value.states, story, tick * dt, dt),
+    ):  # fmt: skip
+        return False
+    actors, pedals = story.value.actors, story.value.pedals
+    for i in range(len(actors)):
+        if actors[i].is_told:
+            command = commands[actors[i].row]
+            command[0], command[1], command[2] = pedals[i, 0], pedals[i, 1], pedals[i, 2]
+            command[3] = command[4] = 0.0
+    return True
+
+
 @kernel
 def drive_ticks(
-    joined: Held[Joined], begun: bool, tick: int, n: int, k: int, grace: int, standing: int,
-    throttle: float, brake: float, steer: float, handbrake: bool,
+    joined: Held[Joined], story: Held[Table] | None, begun: bool, tick: int, n: int, k: int,
+    grace: int, standing: int, throttle: float, brake: float, steer: float, handbrake: bool,
 ) -> tuple[int, int, int, int, float, float, float, bool, int, float, float, int]:  # fmt: skip
     """Drives up to n ticks after `tick` and writes rows of the log from k on.
 
-    begun: the world has made the step of the first tick already, and stands at `tick`. grace: ticks without
-    the detector of an ego that is stuck. standing: ticks for which it stands without a reason. throttle,
-    brake, steer, handbrake: of the tick before. Returns ticks that are whole, why it came back, contacts and
-    crossed markings of the step, the last request, lane (-1: not looked for), s and offset of the ego, and
+    story: of a scenario, which says between two ticks what actors do; None: there is none. begun: the world
+    has made the step of the first tick already, and stands at `tick`. grace: ticks without the detector of
+    an ego that is stuck. standing: ticks for which it stands without a reason. throttle, brake, steer,
+    handbrake: of the tick before. Returns ticks that are whole, why it came back, contacts and crossed
+    markings of the step, the last request, lane (-1: not looked for), s and offset of the ego, and
     `standing`.
     """
     at, rules, arena = joined.value.at, joined.value.rules, joined.value.arena
@@ -380,6 +408,9 @@ def drive_ticks(
         done += 1
         if has_arrived(joined.value.tables, felt):
             why = ARRIVED
+            break
+        if done < n and not tell_actors(story, joined, tick):
+            why = TOLD
             break
     return (
         done, why, touches, crossed, throttle, brake, steer, handbrake, *place, standing,

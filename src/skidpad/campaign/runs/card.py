@@ -80,8 +80,8 @@ def launch(t, ints, floats, n, {names}):
     if b < ints.shape[0] and ints[b, 2] > 0:
         joined = take(t, b, {names})
         told = drive(
-            joined, ints[b, 0] != 0, ints[b, 1], min(ints[b, 2], n), 0, ints[b, 3], ints[b, 4],
-            floats[b, 0], floats[b, 1], floats[b, 2], ints[b, 5] != 0,
+            joined, None, ints[b, 0] != 0, ints[b, 1], min(ints[b, 2], n), 0, ints[b, 3],
+            ints[b, 4], floats[b, 0], floats[b, 1], floats[b, 2], ints[b, 5] != 0,
         )
         ints[b, 6], ints[b, 7], ints[b, 8], ints[b, 9] = told[0], told[1], told[2], told[3]
         floats[b, 0], floats[b, 1], floats[b, 2] = told[4], told[5], told[6]

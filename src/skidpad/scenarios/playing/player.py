@@ -180,6 +180,20 @@ class Player:
             self._tabulate()
         return words
 
+    def count_ahead(self, tick: int) -> int:
+        """Returns how many ticks a kernel may drive with the table; the last is played here."""
+        assert self.table is not None
+        until = min(self.table.wakes, self.duration)
+        return max(int(until / self.scene.dt) - tick, 1)
+
+    def pass_ticks(self, ticks: int) -> None:
+        """Takes in that a kernel has played so many ticks of the table."""
+        if ticks:
+            assert self.table is not None
+            self.ticks += ticks
+            self.by_table += ticks
+            self.table.played += ticks
+
     def settle(self) -> None:
         """Brings actors and actions to where the table has come, if there is one.
 

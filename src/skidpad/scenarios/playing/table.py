@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from math import hypot, inf, isnan
 
 import numpy as np
 
 from skidpad.core.geometry import Pose
-from skidpad.core.kernels.jit import hold
+from skidpad.core.kernels.jit import Held, hold
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import ActorStates, VehicleCommand, WorldTruth
 from skidpad.scenarios.actions.lateral import ChangeOfOffset
@@ -136,6 +137,16 @@ class StoryTable:
         for change, done in zip(self.changes, self.rows.changes["done"].tolist(), strict=True):
             if isinstance(change, ChangeOfOffset):
                 change.done = done
+
+
+@cache
+def hold_no_story() -> Held[Table]:
+    """Returns an empty table, of the type that kernels take."""
+    actors = np.zeros(0, ACTORS)
+    rows = Table(
+        actors, actors, np.zeros(0, CONDITIONS), np.zeros(0, CHANGES), np.zeros((0, 3))
+    )  # fmt: skip
+    return hold(rows)
 
 
 def tabulate(

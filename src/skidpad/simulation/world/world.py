@@ -391,7 +391,7 @@ class World:
         if self.traffic is not None:
             stages |= DECIDE
         if words:
-            if self.traffic is not None and self.traffic.drivers.state["active"].any():
+            if self.has_drivers:
                 self._advance(DECIDE)
             stages &= ~DECIDE
             for word in words:
@@ -440,6 +440,11 @@ class World:
                 self._put_vehicles(self.traffic)
             self._advance(SETTLE)
         self._end_step()
+
+    @property
+    def has_drivers(self) -> bool:
+        """Whether any vehicle of the traffic drives itself."""
+        return self.traffic is not None and bool(self.traffic.drivers.state["active"].any())
 
     @property
     def is_quiet(self) -> bool:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import queue
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple
 
 import carla
 
@@ -16,13 +16,20 @@ PATIENCE_S = 120.0  # with a call
 HIGH = 2.0  # m above the middle of the car at which sensors are put
 
 
+class ServedWorld(NamedTuple):
+    """A world, and the process that serves it."""
+
+    world: Any
+    server: ServerProcess
+
+
 @contextmanager
-def served(name: str) -> Iterator[Any]:
-    """The world of a map, loaded and synchronous, on a server of its own."""
-    with ServerProcess(["--idle-exit", "600"]) as server:
+def served(name: str, options: Sequence[str] = ()) -> Iterator[ServedWorld]:
+    """The world of a map, loaded and synchronous, on a server of its own; options: of the server."""
+    with ServerProcess(["--idle-exit", "600", *options]) as server:
         client = carla.Client("127.0.0.1", server.port)
         client.set_timeout(PATIENCE_S)
-        yield loaded(client, name)
+        yield ServedWorld(loaded(client, name), server)
 
 
 def loaded(client: Any, name: str) -> Any:
@@ -35,13 +42,13 @@ def loaded(client: Any, name: str) -> Any:
 
 
 def listening(
-    world: Any, car: Any, kind: str, options: Mapping[str, str]
+    world: Any, car: Any, kind: str, options: Mapping[str, str], yaw_deg: float = 0.0
 ) -> tuple[Any, queue.Queue[Any]]:
-    """A fresh sensor on a car, and where its readings come."""
+    """A fresh sensor on a car, and where its readings come. yaw_deg: of CARLA, to the right."""
     blueprint = world.get_blueprint_library().find(f"sensor.{kind}")
     for name, value in options.items():
         blueprint.set_attribute(name, value)
-    place = carla.Transform(carla.Location(z=HIGH))
+    place = carla.Transform(carla.Location(z=HIGH), carla.Rotation(yaw=yaw_deg))
     sensor = world.spawn_actor(blueprint, place, attach_to=car)
     came: queue.Queue[Any] = queue.Queue()
     sensor.listen(came.put)

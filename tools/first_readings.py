@@ -37,7 +37,7 @@ TEXTURE = 3  # carla.GBufferTextureID.GBufferA
 
 def main() -> None:
     """Every kind, again and again."""
-    with served("straight") as world:
+    with served("straight") as (world, _):
         point = world.get_map().get_spawn_points()[0]
         car = world.spawn_actor(world.get_blueprint_library().find("vehicle.tesla.model3"), point)
         right: Counter[str] = Counter()

@@ -26,6 +26,7 @@ import numpy as np
 import polars as pl
 
 from fleet_load import record, start
+from processes import processor_s
 from skidpad.core.maths.randomness import stream
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.indicators.catalogue import Indicator
@@ -123,19 +124,21 @@ def ask(port: int, pid: int, tokens: tuple[str, str], times: int) -> tuple[dict[
     with httpx.Client(base_url=base, timeout=120.0, follow_redirects=True) as client:
         answer = client.post("/api/v1/session", headers=_credential(tokens[0]))
         client.get(answer.json()["path"]).raise_for_status()
-        while (before := cpu(pid)) is not None:  # until what the service does by itself is done
+        while (
+            before := processor_s(pid)
+        ) is not None:  # until what the service does by itself is done
             time.sleep(2.0)
-            if cpu(pid) - before < 0.1:
+            if processor_s(pid) - before < 0.1:
                 break
         for page in PAGES:
-            wall, before = [], cpu(pid)
+            wall, before = [], processor_s(pid)
             for _ in range(times):
                 begin = time.perf_counter()
                 answer = client.get(page).raise_for_status()
                 if "could not be read" in answer.text:
                     raise RuntimeError(f"{page} shows an error")
                 wall.append(1000.0 * (time.perf_counter() - begin))
-            each = 1000.0 * (cpu(pid) - before) / times
+            each = 1000.0 * (processor_s(pid) - before) / times
             median, p95 = np.percentile(wall, [50, 95])
             print(f"{page:<10} wall median {median:6.0f} ms, p95 {p95:6.0f} ms; cpu {each:6.0f} ms")
             found[page] = float(p95)
@@ -158,12 +161,6 @@ def shows_after(client: httpx.Client, vehicle: str) -> float:
             return inf
         time.sleep(0.1)
     return time.perf_counter() - begin
-
-
-def cpu(pid: int) -> float:
-    """Processor time of a process so far, s."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def main() -> None:

@@ -120,6 +120,32 @@ def test_two_cars_hear_each_other_and_not_themselves(pair):
     assert heard["body"]["vehicle"]["length"]["value"] == 48  # 4.79 m
 
 
+def written(kind: np.dtype) -> np.ndarray:
+    """Which bytes of a record belong to a field; the others are padding."""
+    if kind.subdtype is not None:
+        base, shape = kind.subdtype
+        return np.tile(written(base), int(np.prod(shape)))
+    if kind.fields is None:
+        return np.ones(kind.itemsize, dtype=bool)
+    found = np.zeros(kind.itemsize, dtype=bool)
+    for part, offset, *_ in kind.fields.values():
+        found[offset : offset + part.itemsize] = written(part)
+    return found
+
+
+def test_no_byte_of_the_servers_memory_goes_out_between_fields(pair):
+    served, hub = pair
+    one, two, _ = (car(served, x) for x in (200.0, 240.0, 280.0))
+    for _ in range(30):
+        served.tick()
+    for sensor in (one, two):
+        for told in hub.told[sensor.stream]:
+            records = np.frombuffer(told[HEADER.size :], np.uint8).reshape(
+                -1, cam.AWARENESS.itemsize
+            )
+            assert not records[:, ~written(cam.AWARENESS)].any()
+
+
 def test_what_stands_between_weakens_and_distance_silences(pair):
     served, hub = pair
     one, near, far = car(served, 200.0), car(served, 240.0), car(served, 750.0)

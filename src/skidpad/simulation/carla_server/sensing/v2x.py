@@ -6,8 +6,6 @@ from collections import deque
 from dataclasses import dataclass, field, replace
 from math import cos, degrees, sin
 
-import numpy as np
-
 from skidpad.core.geometry import Pose
 from skidpad.core.maths.lefthanded import turn_from_carla, vector_from_carla
 from skidpad.sensors import inertial
@@ -102,10 +100,9 @@ def receive(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]
         power = _arriving(around, sensor, own, call)
         if power is not None:
             for message in call.messages:
-                copy = message.copy()
-                copy["power"] = power
-                heard.append(copy)
-    return [(np.array(heard).tobytes(),)] if heard else []
+                message["power"] = power  # of this receiver; a copy of a record would not have
+                heard.append(message.tobytes())  # the zeros between its fields
+    return [(b"".join(heard),)] if heard else []
 
 
 def _arriving(around: Surroundings, sensor: Sensor, own: Call, call: Call) -> float | None:

@@ -79,6 +79,9 @@ class Finish:
         """Takes in where all actors are now, and what shines. indicating: (n, 2), left and right."""
         self._tick, self._ego = tick, states.pose(0)
         self._bodies = bodies_of(self._table, states)
+        present = self._bodies.present.copy()
+        present[0] = False
+        self._others = self._bodies._replace(present=present)
         self._near = _within(self._furniture, self._ego, STANDING_REACH)
         self._sources = self._lamps.shining(states, lights, braking, indicating, self._light)
 
@@ -95,8 +98,8 @@ class Finish:
         if Extra.CLOUDS in extras and self._fog.per_m > 0.0:
             veil_sky(view, self._fog, inverse, out)
         if Extra.SHADOWS in extras:
-            self._bodies.present[0] = own
-            for bodies, reach in ((self._near, STANDING_REACH), (self._bodies, REACH)):
+            cars = self._bodies if own else self._others
+            for bodies, reach in ((self._near, STANDING_REACH), (cars, REACH)):
                 cast_shadows(view, bodies, self._shade, reach, GROUND_MASK, inverse, key, out)
         if Extra.RETRO in extras and light.headlights > 0.0 and light.lamps > 0.0:
             send_back(view, self._ego, light, self._gains, inverse, key, out)

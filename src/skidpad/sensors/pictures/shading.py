@@ -107,7 +107,6 @@ class Shading:
         self.light = light
         self._table = _look_up(_in_season(palette, leafy, light), table, light, snow_on_road)
         self._plain_tail = self._table.reshape(-1, MATERIALS, COLUMNS)[0, Material.TAIL_LAMP].copy()
-        self._work = np.zeros((LANES + MORE_LANES) * BLOCK, dtype=np.float32)
         self._braking = np.zeros(len(table), dtype=np.bool_)
         self._indicating = np.zeros((len(table), 2), dtype=np.bool_)
 
@@ -170,7 +169,7 @@ class Shading:
             self._tiles,
             self._street_light,
             self._settling,
-            self._work,
+            np.zeros((LANES + MORE_LANES) * BLOCK, dtype=np.float32),
             inverse,
             key,
             out,

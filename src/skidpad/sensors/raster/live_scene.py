@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Protocol
 
 import numpy as np
@@ -14,7 +15,7 @@ from skidpad.roads.lanes import LaneSamples, LaneTable
 from skidpad.roads.roadside import Roadside
 from skidpad.sensors.raster import rasteriser, rays
 from skidpad.sensors.raster.passes import Pass
-from skidpad.sensors.raster.projection import make_scratch
+from skidpad.sensors.raster.projection import Scratch, make_scratch
 from skidpad.sensors.raster.rasteriser import Actors
 from skidpad.sensors.raster.rays import Hits, Rays
 from skidpad.sensors.raster.shaped_actors import ShapedActors
@@ -51,7 +52,7 @@ def scene_of(map: SceneMap) -> StaticScene:
 class LiveScene:
     """Triangles of the map and of its actors; whoever moves the world tells it what changed."""
 
-    UNSAVED = ("static", "key", "actors", "_scratch")  # of the map, or set by `place` and `show`
+    UNSAVED = ("static", "key", "actors", "_free")  # of the map, or set by `place` and `show`
 
     def __init__(
         self,
@@ -71,7 +72,8 @@ class LiveScene:
         largest = max(int(clusters.max()), int(self.actors.vertex_count.max(initial=0)))
         if self._shaped is not None:
             largest = max(largest, int(self._shaped.far.vertex_count.max(initial=0)))
-        self._scratch = make_scratch(largest, widest)
+        self._free: list[Scratch] = []  # that no thread uses at present
+        self._largest, self._widest = largest, widest
 
     def place(self, states: ActorStates, elapsed: float) -> None:
         """Puts the actors where they are, `elapsed` s after the last time; vz from the height.
@@ -99,34 +101,46 @@ class LiveScene:
         actors = self.actors
         if self._shaped is not None and level == rasteriser.AUTO_LEVEL:
             actors = self._shaped.select_for(view)
-        rasteriser.raster(
-            self.static.chunks,
-            self.key,
-            actors,
-            hidden,
-            view,
-            level,
-            self._scratch,
-            out.inverse,
-            out.key,
-        )
+        with self._scratch() as scratch:
+            rasteriser.raster(
+                self.static.chunks,
+                self.key,
+                actors,
+                hidden,
+                view,
+                level,
+                scratch,
+                out.inverse,
+                out.key,
+            )
 
     def cast(self, view: View, hidden: int, reach: float, along: Rays, hits: Hits) -> None:
         """Writes the nearest surface on every ray into `hits`; one beyond `reach` m may or may not be told.
 
         hidden: row of the actor that no ray meets, or -1.
         """
-        rays.cast(
-            self.static.chunks,
-            self.key,
-            self.actors,
-            hidden,
-            view,
-            reach,
-            self._scratch,
-            along,
-            hits,
-        )
+        with self._scratch() as scratch:
+            rays.cast(
+                self.static.chunks,
+                self.key,
+                self.actors,
+                hidden,
+                view,
+                reach,
+                scratch,
+                along,
+                hits,
+            )
+
+    @contextmanager
+    def _scratch(self) -> Iterator[Scratch]:
+        """Lends working memory, to each thread its own."""
+        try:
+            scratch = self._free.pop()
+        except IndexError:
+            scratch = make_scratch(self._largest, self._widest)
+        yield scratch
+        self._free.append(scratch)
 
 
 # The moving part of the scene: a mesh per actor, and where each one is now.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Hashable
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,7 +46,8 @@ class Camera:
     """A camera's geometry and its buffers."""
 
     spec: CameraSpec
-    drawn: Pass
+    own: Pass
+    drawn: Pass  # its own, or that of a camera with the same view, which has drawn it
     rgb: NDArray[np.uint32]  # packed red, green, blue, 255
     bgra: NDArray[np.uint8]
     head: bytes
@@ -55,13 +57,19 @@ class Camera:
     def look(self, around: Surroundings, clock: Clock, sensor: Sensor) -> tuple[Pictured, View]:
         """Draws depth and keys, once per frame, and returns what is pictured and the view."""
         actor = sensor.actor
-        scene, view = around.picture(), camera_view(self.spec, around.actors.pose(actor))
+        pose = around.actors.pose(actor)
+        scene, view = around.picture(), camera_view(self.spec, pose)
         if self.frame != clock.frame:
-            scene.live.draw(view, around.hidden_for(actor), AUTO_LEVEL, self.drawn)
             self.frame = clock.frame
             speed = around.speed_of_carrier(actor)
             self.effects.move(around.weather, speed, sensor.share(clock))
-            self.effects.limit_sight(view, self.drawn)
+            hidden = around.hidden_for(actor)
+            seen = (self.spec.view, pose, hidden, self.effects.sight)
+            if seen not in around.drawn:
+                scene.live.draw(view, hidden, AUTO_LEVEL, self.own)
+                self.effects.limit_sight(view, self.own)
+                around.drawn[seen] = self.own
+            self.drawn = around.drawn[seen]
         return scene, view
 
     def paint(self, around: Surroundings, actor: Actor, scene: Pictured, view: View) -> None:
@@ -81,14 +89,22 @@ def make_camera(actor: Actor, seed: int) -> Camera:
     fov = float(actor.attributes["fov"])
     modality = MODALITIES[actor.blueprint.id]
     spec = CameraSpec(str(actor.id), modality, width, height, fov, Pose(0.0, 0.0))
+    drawn = Pass(spec)
     return Camera(
         spec,
-        Pass(spec),
+        drawn,
+        drawn,
         np.zeros((height, width), dtype=np.dtype("<u4")),
         np.zeros((height, width, 4), dtype=np.uint8),
         IMAGE_HEAD.pack(width, height, fov),
         CameraEffects(actor, spec, seed),
     )
+
+
+def view_of(around: Surroundings, sensor: Sensor) -> Hashable:
+    """Returns what decides what a camera draws, but for weather: cameras of one value share it."""
+    camera: Camera = getattr(sensor.equipment, "camera", sensor.equipment)
+    return camera.spec.view, around.actors.pose(sensor.actor)
 
 
 def image(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
@@ -98,8 +114,8 @@ def image(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
 
 def picture(around: Surroundings, clock: Clock, sensor: Sensor, camera: Camera) -> Message:
     """Renders one image of the camera's modality as a message."""
-    drawn, bgra = camera.drawn, camera.bgra
     scene, view = camera.look(around, clock, sensor)
+    drawn, bgra = camera.drawn, camera.bgra
     if camera.spec.modality is Modality.DEPTH:
         bgra_from_inverse_depth(drawn.inverse, bgra)
     elif camera.spec.modality is Modality.SEMANTIC:

@@ -36,6 +36,11 @@ SEMANTIC_POINT = np.dtype(
 )
 
 
+def alone(_: Surroundings, sensor: Sensor) -> int:
+    """Returns what no other sensor looks at: its rays are its own."""
+    return sensor.actor.id
+
+
 @dataclass(slots=True, eq=False)
 class RadarMake:
     """A radar as its attributes describe it."""

@@ -22,25 +22,37 @@ PRODUCERS = {
         gbuffers.colour_image,
         gbuffers.make_colour_camera,
         textures=gbuffers.textures,
+        shares=images.view_of,
     ),
-    "sensor.camera.depth": Producer(SensorType.DEPTH, images.image, images.make_camera),
+    "sensor.camera.depth": Producer(
+        SensorType.DEPTH, images.image, images.make_camera, shares=images.view_of
+    ),
     "sensor.camera.semantic_segmentation": Producer(
-        SensorType.SEMANTIC, images.image, images.make_camera
+        SensorType.SEMANTIC, images.image, images.make_camera, shares=images.view_of
     ),
     "sensor.camera.instance_segmentation": Producer(
-        SensorType.INSTANCE, images.image, images.make_camera
+        SensorType.INSTANCE, images.image, images.make_camera, shares=images.view_of
     ),
     "sensor.camera.optical_flow": Producer(
-        SensorType.OPTICAL_FLOW, flow.optical_flow, flow.make_flow_camera
+        SensorType.OPTICAL_FLOW, flow.optical_flow, flow.make_flow_camera, shares=images.view_of
     ),
-    "sensor.camera.normals": Producer(SensorType.NORMALS, normals.normals, images.make_camera),
+    "sensor.camera.normals": Producer(
+        SensorType.NORMALS, normals.normals, images.make_camera, shares=images.view_of
+    ),
     "sensor.camera.dvs": Producer(
-        SensorType.DVS, events_camera.dynamic_vision, events_camera.make_retina
+        SensorType.DVS,
+        events_camera.dynamic_vision,
+        events_camera.make_retina,
+        shares=images.view_of,
     ),
-    "sensor.other.radar": Producer(SensorType.RADAR, points.radar, points.make_radar),
-    "sensor.lidar.ray_cast": Producer(SensorType.LIDAR, points.plain_lidar, points.make_lidar),
+    "sensor.other.radar": Producer(
+        SensorType.RADAR, points.radar, points.make_radar, shares=points.alone
+    ),
+    "sensor.lidar.ray_cast": Producer(
+        SensorType.LIDAR, points.plain_lidar, points.make_lidar, shares=points.alone
+    ),
     "sensor.lidar.ray_cast_semantic": Producer(
-        SensorType.SEMANTIC_LIDAR, points.semantic_lidar, points.make_lidar
+        SensorType.SEMANTIC_LIDAR, points.semantic_lidar, points.make_lidar, shares=points.alone
     ),
     "sensor.other.imu": Producer(SensorType.IMU, inertial.imu),
     "sensor.other.gnss": Producer(SensorType.GNSS, inertial.gnss),

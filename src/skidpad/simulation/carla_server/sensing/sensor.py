@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -65,3 +65,6 @@ class Producer:
     """What it sends to others of its kind, in every tick and before any of them reads."""
     textures: Callable[[Surroundings, Clock, Sensor, list[int]], list[Message]] | None = None
     """Its G-buffers of these numbers, on streams of their own."""
+    shares: Callable[[Surroundings, Sensor], Hashable] | None = None
+    """What it looks at: sensors of one value read in turns, others beside them, in threads. Such a sensor
+    changes nothing but its equipment and what it shares. None: it reads when all before it have read."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
+from contextlib import nullcontext
 from time import sleep
 
 from skidpad.core.geometry import Pose
+from skidpad.core.kernels.threads import Beside
 from skidpad.core.maths.randomness import stream
 from skidpad.simulation.carla_server import snapshot
 from skidpad.simulation.carla_server.actors.registry import Actor
@@ -19,6 +21,9 @@ from skidpad.simulation.carla_server.snapshot import SensorType
 # s. Every stream has a connection of its own, and the client's threads race: a collision gets ahead
 # of what its tick sends afterwards, so that a client that waits for that has the collision too.
 EVENT_PAUSE = 0.002
+
+
+Reading = tuple[int, tuple[bytes | memoryview, ...]]  # a stream and the parts of a message
 
 
 class SensorSet:
@@ -66,27 +71,46 @@ class SensorSet:
             speak = self._producers[sensor.actor.blueprint.id].speak
             if speak is not None:
                 speak(around, clock, sensor)
-        for sensor in list(self._sensors.values()):
-            if _is_heard(sensor, hub) and sensor.is_due(time):
-                self._read(sensor, around, clock, hub)
+        due = [s for s in self._sensors.values() if _is_heard(s, hub) and s.is_due(time)]
+        together: dict[Hashable, list[Sensor]] = {}
+        for sensor in due:
+            shares = self._producers[sensor.actor.blueprint.id].shares
+            if shares is not None:
+                together.setdefault(shares(around, sensor), []).append(sensor)
 
-    def _read(self, sensor: Sensor, around: Surroundings, clock: Clock, hub: StreamHub) -> None:
-        """Produces and publishes a sensor's messages and textures, only for streams that have listeners."""
+        def read(sensors: list[Sensor]) -> dict[int, list[Reading]]:
+            return {s.actor.id: self._read(s, around, clock, hub) for s in sensors}
+
+        with around.standing_still() if together else nullcontext(), Beside() as threads:
+            began = [(sensors, threads.start(read, sensors)) for sensors in together.values()]
+            coming = {s.actor.id: future for sensors, future in began for s in sensors}
+            for sensor in due:
+                id = sensor.actor.id
+                own = coming[id].result()[id] if id in coming else read([sensor])[id]
+                for stream, parts in own:
+                    hub.publish(stream, *parts)
+                if own and self._producers[sensor.actor.blueprint.id].type is SensorType.COLLISION:
+                    sleep(EVENT_PAUSE)
+
+    def _read(
+        self, sensor: Sensor, around: Surroundings, clock: Clock, hub: StreamHub
+    ) -> list[Reading]:
+        """Returns what a sensor sends and its textures, only for streams that have listeners."""
         producer = self._producers[sensor.actor.blueprint.id]
         place, number = around.actors.pose(sensor.actor), sensor.actor.stream
+        told: list[Reading] = []
         if number is not None and hub.has_listeners(number):
-            messages = producer.produce(around, clock, sensor)
-            for message in messages:
-                hub.publish(number, _head(producer.type, clock, place), *message)
-            if messages and producer.type is SensorType.COLLISION:
-                sleep(EVENT_PAUSE)
+            head = _head(producer.type, clock, place)
+            told += [(number, (head, *m)) for m in producer.produce(around, clock, sensor)]
         wanted = [t for t, stream in sensor.textures.items() if hub.has_listeners(stream)]
         if wanted and producer.textures is not None:
-            head = _head(SensorType.GBUFFER, clock, place)
-            for texture, message in zip(
-                wanted, producer.textures(around, clock, sensor, wanted), strict=False
-            ):
-                hub.publish(sensor.textures[texture], head, *message)
+            head, made = (
+                _head(SensorType.GBUFFER, clock, place),
+                producer.textures(around, clock, sensor, wanted),
+            )
+            streams = (sensor.textures[texture] for texture in wanted)
+            told += [(s, (head, *m)) for s, m in zip(streams, made, strict=False)]
+        return told
 
 
 def _is_heard(sensor: Sensor, hub: StreamHub) -> bool:

@@ -5,6 +5,9 @@ Meshes are made when a camera or ray first needs them, and again when actors com
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Iterator
+from contextlib import contextmanager
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +21,7 @@ from skidpad.roads.queries import RoadMap
 from skidpad.sensors.pictures.lighting import lighting
 from skidpad.sensors.pictures.shading import Shading
 from skidpad.sensors.raster.live_scene import LiveScene
+from skidpad.sensors.raster.passes import Pass
 from skidpad.simulation.carla_server.actors.boxes import Boxes
 from skidpad.simulation.carla_server.actors.catalogue import Family
 from skidpad.simulation.carla_server.actors.registry import SOLID, Actor, ActorTable, Box
@@ -88,9 +92,23 @@ class Surroundings:
         self._cars: tuple[int, Boxes] | None = None
         self._vehicles, self._sky, self._clock = vehicles, sky, clock
         self._pictured: Pictured | None = None
+        self._still: Pictured | None = None
+        self.drawn: dict[Hashable, Pass] = {}  # what cameras have drawn while nothing moves
+
+    @contextmanager
+    def standing_still(self) -> Iterator[None]:
+        """Promises that nothing changes inside, so that all sensors, in threads too, share one picture."""
+        self._still = self.picture()
+        try:
+            yield
+        finally:
+            self._still = None
+            self.drawn.clear()
 
     def picture(self) -> Pictured:
         """Everything with a body as it is now; brought up to date once per frame."""
+        if self._still is not None:
+            return self._still
         members = [a for a in self.actors if a.family in SOLID]
         seen, roads = self._pictured, self._landscape.roads
         if seen is None or seen.members != members or seen.roads is not roads:

@@ -1,4 +1,4 @@
-"""What the cockpit costs: CPU per view, time of a seek, and a drive with a browser beside it.
+"""What the cockpit costs: CPU per view, five views together, a seek, and a drive with a browser beside it.
 
     python tools/cockpit_bench.py [SECONDS] [CHROMIUM]
 
@@ -34,6 +34,7 @@ from skidpad.pages.server import Server
 from skidpad.physics.presets import preset
 from skidpad.stack.configurations import functions_of
 
+FIVE = (View.DRIVER, View.TOP, View.LEFT, View.REAR, View.RIGHT)
 FLAGS = ("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run")
 
 
@@ -58,6 +59,21 @@ def views(recording: RecordedRun, moments: range) -> dict[str, float]:
             took.append(1000.0 * (time.process_time() - begin))
         found[view.value] = median(took[2:])
     return found
+
+
+def together(recording: RecordedRun, moments: range) -> tuple[float, float]:
+    """Median wall and CPU milliseconds of five colour views of a moment, drawn as a page has them drawn."""
+    studio = Studio(
+        recording.map, recording.table, recording.seat(moments[0]).outside, recording.spec.seed
+    )
+    wall, cpu = [], []
+    for k in moments:
+        truth = recording.moment(k).truth
+        begin = time.perf_counter(), time.process_time()
+        studio.draw(studio.look(truth), FIVE)
+        wall.append(1000.0 * (time.perf_counter() - begin[0]))
+        cpu.append(1000.0 * (time.process_time() - begin[1]))
+    return median(wall[2:]), median(cpu[2:])
 
 
 def seeks(recording: RecordedRun) -> tuple[float, float]:
@@ -117,6 +133,8 @@ def main() -> None:
             recording = RecordedRun(folder / weather)
             cost = views(recording, range(200, 300))
             print(weather, msgspec.json.encode({k: round(v, 2) for k, v in cost.items()}).decode())
+            wall, cpu = together(recording, range(200, 300))
+            print(f"five colour views together: median {wall:.1f} ms, CPU {cpu:.1f} ms")
             print("seek: median {:.0f} ms, longest {:.0f} ms".format(*seeks(recording)))
         print(drive(seconds, chromium, folder))
 

@@ -18,7 +18,7 @@ from skidpad.cockpit.marks import LightAhead, Lying, marks_of, patch_marks
 from skidpad.cockpit.pictures import Picture, colours, draw
 from skidpad.cockpit.plots import Plots
 from skidpad.cockpit.source import Source, index_at
-from skidpad.cockpit.studio import FOR_PEOPLE, Looks, Studio, View, plane
+from skidpad.cockpit.studio import FOR_PEOPLE, Looks, Studio, View
 from skidpad.cockpit.turn_signals import TurnSignals
 from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.setup import DT
@@ -95,11 +95,12 @@ def frames(
         studio.change(source.seat(k).outside)
         truth = moment.truth
         images = studio.look(truth, source.crash(k), signals.at(truth.tick))
-        picture = colours(plane(images[view.value]))
+        shown = studio.draw(images, (view, *(v for v, _ in INSETS)))
+        picture = colours(shown[view])
         seen = marks_of(camera, moment.frame.radar, moment.report, light.mark(camera, moment))
         patches = patch_marks(camera, lying.outlines(truth.tick), truth.states.pose(0))
         draw(picture, *msgspec.to_builtins(seen._replace(patches=patches)))
-        _inset(picture, {v: colours(plane(images[v.value])) for v, _ in INSETS})
+        _inset(picture, {v: colours(shown[v]) for v, _ in INSETS})
         _say(
             picture,
             hud.motion(moment),

@@ -15,7 +15,7 @@ from skidpad.campaign.driving.loop import Moment, Sink
 from skidpad.cockpit import hud
 from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.marks import LightAhead, Lying, Marks, marks_of, patch_marks
-from skidpad.cockpit.studio import FOR_PEOPLE, MAIN, Looks, Studio, View, plane
+from skidpad.cockpit.studio import FOR_PEOPLE, MAIN, Looks, Studio, View
 from skidpad.cockpit.words import Link
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Outside
@@ -101,7 +101,7 @@ class Screen(Sink):
         turns = None if self.signals is None else self.signals(truth.tick)
         images = self.studio.look(truth, self.crash, turns)
         views = [v for v in View if self._is_wanted(v)]
-        planes: dict[str, Any] = {v.value: plane(images[v.value]) for v in views}
+        planes = {v.value: shown for v, shown in self.studio.draw(images, views).items()}
         if self.beside is not None:
             planes[BESIDE], said = self.beside(moment, self.link.main, self.link.extras)
             shown = Shown(shown.outside, {**shown.told, BESIDE: said})

@@ -6,9 +6,10 @@ is never touched, a log can be drawn as well as a live drive, and so can a drive
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import replace
 from enum import Enum
+from itertools import chain
 from math import atan2, hypot, radians
 from typing import Any, NamedTuple
 
@@ -18,9 +19,10 @@ from numpy.typing import NDArray
 from skidpad.core.frames import CameraImage
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Outside
+from skidpad.core.kernels.threads import Beside
 from skidpad.core.specs import CameraSpec, Modality, SensorSpec
 from skidpad.core.states import ActorTable, WorldTruth
-from skidpad.core.vocabulary import Bodywork, Scenery
+from skidpad.core.vocabulary import Bodywork, Quality, Scenery
 from skidpad.roads.queries import RoadMap
 from skidpad.scenery.dressing import dress_map
 from skidpad.sensors.finish.extras import ALL_EXTRAS, Extra
@@ -82,6 +84,7 @@ class Looks(NamedTuple):
 
     scenery: Scenery = Scenery.FULL  # beside the roads
     bodywork: Bodywork = Bodywork.SHAPED  # of vehicles and people
+    quality: Quality = Quality.FULL
 
 
 FOR_PEOPLE = Looks()
@@ -106,6 +109,7 @@ class Studio:
             in_cockpit=False,
             extras=extras,
             bodywork=looks.bodywork,
+            quality=looks.quality,
         )
         self.suite = PixelSuite(
             dress_map(map, looks.scenery), table, cameras(), outside.weather, settings
@@ -140,6 +144,23 @@ class Studio:
         return self.suite.observe(
             truth.tick, truth.states, truth.lights, braking, indicating
         ).images
+
+    def draw(self, images: Mapping[str, CameraImage], views: Sequence[View]) -> dict[View, Any]:
+        """Returns what the page shows of the views, drawn in threads beside each other.
+
+        images: as `look` has returned them. Valid as long as they are.
+        """
+        together: dict[Hashable, list[View]] = {}
+        for view in views:  # cameras of one view share what they draw
+            together.setdefault(self.suite.cameras[view.value].view, []).append(view)
+
+        def draw(some: list[View]) -> list[tuple[View, NDArray[Any]]]:
+            return [(view, plane(images[view.value])) for view in some]
+
+        with Beside() as threads:
+            drawn = [threads.start(draw, some) for some in together.values()]
+        found = dict(chain.from_iterable(future.result() for future in drawn))
+        return {view: found[view] for view in views}
 
 
 def watching(place: Pose) -> Pose:

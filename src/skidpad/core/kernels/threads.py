@@ -29,7 +29,8 @@ def _pool() -> ThreadPoolExecutor:
 class Beside(AbstractContextManager["Beside"]):
     """Starts calls in threads; all of them have ended when it is left. A context manager.
 
-    Calls must not share anything that one of them writes. On one processor each is made when it is started.
+    Calls must not share anything that one of them writes, and not start further ones. On one processor each
+    is made when it is started.
     """
 
     def __init__(self) -> None:

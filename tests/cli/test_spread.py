@@ -99,8 +99,7 @@ def test_every_command_that_drives_takes_the_simulator_options(path: str) -> Non
 @pytest.mark.parametrize("path", DRIVING)
 def test_every_command_that_drives_a_run_takes_its_options(path: str) -> None:
     found = options(path, RunSpec)
-    assert {"duration", "sensors", "render", "overlay", "bodywork", "scenery", "govern"} == set(
-        found
-    )
+    named = {"duration", "sensors", "render", "overlay", "bodywork", "scenery", "quality", "govern"}
+    assert named == set(found)
     assert found == options("adas", RunSpec)
     assert {"profile", "set", "surface"} == set(options(path, Tuned))

@@ -68,7 +68,7 @@ def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
         return Shown(desk.outside, told)
 
     stage = stage_of(spec)
-    looks = Looks(spec.scenery, spec.bodywork)
+    looks = Looks(spec.scenery, spec.bodywork, spec.quality)
     laid = [LaidSurface(0, present_patches(stage.setup.patches, spec.weather.air_temperature_c))]
     screen = Screen(feed, link, stage.map, describe, spec.seed, laid, looks)
     time = CockpitPacer(link, screen.show, own_gc=about["own_gc"])

@@ -21,7 +21,7 @@ from skidpad.cockpit.turn_signals import TurnSignals
 from skidpad.cockpit.words import Link
 from skidpad.core.errors import OutputError, SkidpadError
 from skidpad.core.setup import DT
-from skidpad.core.vocabulary import Bodywork, Scenery
+from skidpad.core.vocabulary import Bodywork, Quality, Scenery
 from skidpad.recording.run.surfaces import read_surfaces
 
 PATIENCE = 0.02  # s between two looks at the words
@@ -41,7 +41,9 @@ def replay_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
             feed,
             link,
             other=other,
-            looks=Looks(Scenery(about["scenery"]), Bodywork(about["bodywork"])),
+            looks=Looks(
+                Scenery(about["scenery"]), Bodywork(about["bodywork"]), Quality(about["quality"])
+            ),
         )
         link.seek = opening_tick(source) if about["at"] is None else round(about["at"] / DT)
         replayer.run()

@@ -25,6 +25,7 @@ from skidpad.core.vocabulary import (
     Bodywork,
     Govern,
     GripModel,
+    Quality,
     Scenery,
     SensorLevel,
     Stratum,
@@ -308,6 +309,13 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             "surfaces; plain: one coarse body per kind."
         ),
     ] = Bodywork.PLAIN
+    quality: Annotated[
+        Quality,
+        Meta(
+            description="Of colour pictures: full, or draft, without grain and tracks of the ground, veils "
+            "of the sky and costly additions for people; depth and classes are equal."
+        ),
+    ] = Quality.FULL
     govern: Annotated[
         Govern,
         Meta(
@@ -422,6 +430,7 @@ LEFT_OUT: dict[str, tuple[Any, ...]] = {
     "surface": ((), []),
     "scenery": (Scenery.NONE.value,),
     "bodywork": (Bodywork.PLAIN.value,),
+    "quality": (Quality.FULL.value,),
 }
 OURS = "skidpad."  # stacks of this package are no foreign code
 _DIGITS: dict[type[Struct], int] = {Roads: 3, Scenario: 6, Route: 5}  # of the seed in a name

@@ -19,6 +19,7 @@ from skidpad.core.vocabulary import (
     GripModel,
     Headways,
     LidarModel,
+    Quality,
     RadarModel,
     RadarOutput,
     RangeModel,
@@ -141,6 +142,7 @@ class Setup:
         patches: Parts of the road with a surface of their own.
         scenery: Beside the roads (embedded backend).
         bodywork: Of all actors (embedded backend).
+        quality: Of colour pictures (embedded backend).
         localisation_noise: m, standard deviation of the ego's x and y; 0: exact (L-3).
         dt: s, the length of a tick.
     """
@@ -181,6 +183,7 @@ class Setup:
     patches: tuple[SurfacePatch, ...] = ()
     scenery: Scenery = Scenery.NONE
     bodywork: Bodywork = Bodywork.PLAIN
+    quality: Quality = Quality.FULL
     localisation_noise: float = 0.0
     dt: float = DT
 

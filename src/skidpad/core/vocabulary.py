@@ -126,6 +126,15 @@ class Bodywork(str, Enum):
     SHAPED = "shaped"  # a body per type, with wheels that turn, lamps, mirrors and plates
 
 
+class Quality(str, Enum):
+    """How much of a picture's colours is drawn; size, depth, classes and instances are the same."""
+
+    FULL = "full"
+    DRAFT = (
+        "draft"  # without grain and tracks of the ground, veils of the sky, and costly additions
+    )
+
+
 class Outcome(str, Enum):
     """How a run ended; the last three leave every denominator, counted (decision L-7)."""
 

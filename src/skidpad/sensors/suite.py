@@ -16,11 +16,11 @@ from skidpad.core.inputs import Beam, Outside
 from skidpad.core.setup import DT, CameraOptics
 from skidpad.core.specs import CameraSpec, Modality, RadarSpec, SensorSpec
 from skidpad.core.states import ActorStates, ActorTable
-from skidpad.core.vocabulary import Bodywork, LightState, RangeModel
+from skidpad.core.vocabulary import Bodywork, LightState, Quality, RangeModel
 from skidpad.core.weather import Weather
 from skidpad.physics.grip import rain_rate, road_surface
 from skidpad.physics.optics import depth_range, label_range, radar_range
-from skidpad.sensors.finish.extras import NO_EXTRAS, Extra
+from skidpad.sensors.finish.extras import COSTLY, NO_EXTRAS, Extra
 from skidpad.sensors.finish.finish import Finish
 from skidpad.sensors.finish.fog import light_fog
 from skidpad.sensors.pictures.degradation import CameraNoise, degradation
@@ -28,7 +28,7 @@ from skidpad.sensors.pictures.exposure import expose
 from skidpad.sensors.pictures.lens import LensDrops
 from skidpad.sensors.pictures.lighting import lighting
 from skidpad.sensors.pictures.perception_noise import PerceptionNoise
-from skidpad.sensors.pictures.shading import Shading
+from skidpad.sensors.pictures.shading import shade_scene
 from skidpad.sensors.pictures.spray import veil_by_spray
 from skidpad.sensors.ranging.beam import beam_of
 from skidpad.sensors.ranging.clouds import SprayClouds
@@ -69,7 +69,13 @@ class PixelSettings:
     render_all: bool = False
     level: int = AUTO_LEVEL  # one level of detail for all (tests)
     bodywork: Bodywork = Bodywork.PLAIN
+    quality: Quality = Quality.FULL
     poison_old: bool = False  # spoil buffers that went stale (tests)
+
+    @property
+    def drawn_extras(self) -> frozenset[Extra]:
+        """Returns the additions that are drawn in this quality."""
+        return self.extras - COSTLY if self.quality is Quality.DRAFT else self.extras
 
 
 class PixelSuite:
@@ -120,20 +126,12 @@ class PixelSuite:
         light = lighting(weather, beam, haze=settings.optics.haze)
         if settings.optics.exposure:
             light = expose(light, weather)
-        if Extra.LAMPS in settings.extras:
+        extras = settings.drawn_extras
+        if Extra.LAMPS in extras:
             light = light_fog(light, weather)._replace(onset=BEAM_ONSET)
-        snowed = Extra.SNOW in settings.extras
-        static = self.scene.static
-        self.shading = Shading(
-            static.palette,
-            self._table,
-            light,
-            snowed,
-            static.grain,
-            static.street_light,
-            static.leafy,
-        )
-        if settings.extras:
+        snowed = Extra.SNOW in extras
+        self.shading = shade_scene(self.scene.static, self._table, light, settings.quality, snowed)
+        if extras:
             self._finish.look_out(weather, light)
         self._passes: dict[tuple[object, Sight], Pass] = {}
         self._pass_of: dict[str, Pass] = {}
@@ -142,7 +140,7 @@ class PixelSuite:
             key = (camera.view, eye)
             self._pass_of[camera.id] = self._passes.setdefault(key, Pass(camera, eye))
         effect = degradation(weather, exclusive=settings.exclusive_stages)
-        share = CALM if Extra.CALM in settings.extras else 1.0
+        share = CALM if Extra.CALM in extras else 1.0
         effect = replace(effect, glass=settings.in_cockpit, share=share)
         self._degraded = (
             {id: CameraNoise(id, seed, effect) for id in self._rgb}
@@ -184,7 +182,7 @@ class PixelSuite:
             self.shading.set_braking(braking)
         if indicating is not None:
             self.shading.set_indicating(indicating)
-        if self.settings.extras:
+        if self.settings.drawn_extras:
             n = len(self._table)
             lit = np.zeros(n, dtype=np.bool_) if braking is None else braking
             turns = np.zeros((n, 2), dtype=np.bool_) if indicating is None else indicating
@@ -242,9 +240,10 @@ class PixelSuite:
         """Returns a colour image whose rows of the view are painted, with additions and noise."""
         packed = self._rgb[id]
         self.shading.paint(view, self._ego, one.inverse, one.key, packed)
-        if self.settings.extras:
+        extras = self.settings.drawn_extras
+        if extras:
             own = self.cameras[id].shows_own_body
-            self._finish.add(self.settings.extras, view, own, one, packed)
+            self._finish.add(extras, view, own, one, packed)
         if len(self._clouds):
             veil_by_spray(view, self._clouds, one.inverse, self.shading.light.horizon, packed)
         if id in self._drops:

@@ -77,6 +77,7 @@ class Pixels:
                 render_all=setup.render_all,
                 poison_old=poison,
                 bodywork=setup.bodywork,
+                quality=setup.quality,
             ),
         )
 

@@ -8,6 +8,7 @@ import pytest
 
 from skidpad.core.geometry import Pose
 from skidpad.core.kernels import threads
+from skidpad.core.vocabulary import Quality
 from skidpad.sensors.raster.live_scene import LiveScene
 from skidpad.simulation.carla_server.actors.registry import Attachment
 from skidpad.simulation.carla_server.episode import Wanted
@@ -31,9 +32,9 @@ class Kept(ProducingHub):
         self.told.append((stream, b"".join(parts)))
 
 
-def served_on(map: str) -> tuple[Served, int]:
+def served_on(map: str, quality: Quality = Quality.FULL) -> tuple[Served, int]:
     """A server without a network, and a car on it."""
-    served = Served(ServerOptions(map=map), Kept())
+    served = Served(ServerOptions(map=map, quality=quality), Kept())
     points = served.episode.map.spawn_points
     car, *_ = (
         served.episode.spawn(Wanted("vehicle.tesla.model3", {}), points[k]) for k in (0, 9, 18)
@@ -84,3 +85,21 @@ def test_cameras_of_one_view_draw_it_once(monkeypatch, yaw, passes):
     for _ in range(TICKS):
         served.tick()
     assert len(drawn) == TICKS * passes
+
+
+def test_a_draft_has_other_colours_and_the_same_depth_and_classes():
+    told = {}
+    for quality in Quality:
+        served, car = served_on("town", quality)
+        for kind in ("rgb", "depth", "semantic_segmentation", "instance_segmentation", "normals"):
+            attach(served, car, f"sensor.camera.{kind}")
+        attach(served, car, "sensor.lidar.ray_cast")
+        colours = next(
+            a.stream for a in served.episode.actors if a.blueprint.id == "sensor.camera.rgb"
+        )
+        served.hub.told.clear()
+        served.tick()
+        told[quality] = dict(served.hub.told)
+    full, draft = told[Quality.FULL], told[Quality.DRAFT]
+    assert [len(m) for m in full.values()] == [len(m) for m in draft.values()]
+    assert {s for s in full if full[s] != draft[s]} == {colours}

@@ -364,6 +364,7 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
         patches=spec.surface,
         scenery=spec.scenery,
         bodywork=spec.bodywork,
+        quality=spec.quality,
     )
 
 

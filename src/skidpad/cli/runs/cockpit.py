@@ -15,7 +15,7 @@ from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.run import Roads, RunSpec, Scenario
 from skidpad.core.setup import VEHICLES_MAX
 from skidpad.core.simulator import BackendChoice, BackendKind
-from skidpad.core.vocabulary import Bodywork, Scenery, TrafficStart
+from skidpad.core.vocabulary import Bodywork, Quality, Scenery, TrafficStart
 
 if TYPE_CHECKING:
     from skidpad.cockpit.source import Source
@@ -231,6 +231,9 @@ def replay(
         Bodywork,
         typer.Option(help="Of vehicles and people in the pictures, whatever the run had."),
     ] = Bodywork.SHAPED,
+    quality: Annotated[
+        Quality, typer.Option(help="Of the pictures: draft takes less time, whatever the run had.")
+    ] = Quality.FULL,
 ) -> None:
     """Scrub through a run in a browser: its pictures are drawn again from what was logged."""
     from skidpad.cli.options.folders import require_run
@@ -254,7 +257,7 @@ def replay(
         raise ConfigError("--weather and --drops are of a picture: give it with --picture FILE.png")
     source = open_source(run, hazard)
     other = None if beside is None else open_source(beside)
-    looks, known = Looks(scenery, bodywork), [v.value for v in View]
+    looks, known = Looks(scenery, bodywork, quality), [v.value for v in View]
     if sheet.picture is not None:
         views = [require_choice("--view", v.strip(), known) for v in view.split(",")]
         typer.echo(sheet.write(source, views, at, looks))
@@ -270,6 +273,7 @@ def replay(
         "beside": None if beside is None else str(beside),
         "scenery": scenery.value,
         "bodywork": bodywork.value,
+        "quality": quality.value,
     }
     producer = Producer(replay_job, what)
     parts = list_parts(source.spec) if isinstance(source, RecordedRun) else ()

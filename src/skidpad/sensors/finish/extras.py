@@ -19,5 +19,7 @@ class Extra(str, Enum):
     CALM = "calm"  # less of the published camera effect, so that a night can be read
 
 
+# what a draft leaves out: each reads or writes pixels of the whole picture
+COSTLY = frozenset((Extra.SHADOWS, Extra.REFLECTIONS, Extra.CLOUDS, Extra.EDGES, Extra.TONE))
 NO_EXTRAS: frozenset[Extra] = frozenset()
 ALL_EXTRAS = frozenset(Extra)

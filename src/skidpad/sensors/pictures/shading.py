@@ -13,6 +13,7 @@ from skidpad.core.arrays import Floats32
 from skidpad.core.geometry import Pose
 from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.states import ActorTable
+from skidpad.core.vocabulary import Quality
 from skidpad.physics.camera import share_left
 from skidpad.sensors.pictures.blocks import (
     BLOCK,
@@ -54,6 +55,7 @@ from skidpad.sensors.scene.materials import (
     POLISHED,
     Material,
 )
+from skidpad.sensors.scene.static import StaticScene
 from skidpad.sensors.scene.street_light import NO_STREET_LIGHT, StreetLight
 
 ROADLIKE = (*ASPHALTS, Material.SHOULDER, Material.MARKING, Material.SIDEWALK)
@@ -174,6 +176,20 @@ class Shading:
             key,
             out,
         )
+
+
+def shade_scene(
+    scene: StaticScene,
+    table: ActorTable,
+    light: Lighting,
+    quality: Quality = Quality.FULL,
+    snow_on_road: bool = False,
+) -> Shading:
+    """Returns the colours of a scene and its actors; a draft has no grain. snow_on_road: for people."""
+    grain = NO_GRAIN if quality is Quality.DRAFT else scene.grain
+    return Shading(
+        scene.palette, table, light, snow_on_road, grain, scene.street_light, scene.leafy
+    )
 
 
 def _in_season(palette: Floats32, leafy: NDArray[np.intp], light: Lighting) -> Floats32:

@@ -139,6 +139,7 @@ class Episode:
             self.sky,
             clock,
             stock.options.bodywork,
+            stock.options.quality,
         )
         self.relandscape()
         self.sensors = SensorSet(PRODUCERS, seed)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from skidpad.core.vocabulary import Bodywork, Govern, GripModel, Scenery
+from skidpad.core.vocabulary import Bodywork, Govern, GripModel, Quality, Scenery
 
 MU_REF = 1.5  # of a tyre with tire_friction 3.5 on a dry road, near CARLA's (decision K-3)
 
@@ -31,6 +31,13 @@ class ServerOptions(Struct, frozen=True, kw_only=True):
         Bodywork,
         Meta(description="shaped: a body per blueprint; plain: one coarse body per kind."),
     ] = Bodywork.SHAPED
+    quality: Annotated[
+        Quality,
+        Meta(
+            description="Of colour pictures: draft leaves out grain and tracks of the ground and veils of "
+            "the sky; size, depth and classes are equal."
+        ),
+    ] = Quality.FULL
     weather_grip: Annotated[GripModel, Meta(description="How weather acts on tyres.")] = (
         GripModel.PHYSICAL
     )

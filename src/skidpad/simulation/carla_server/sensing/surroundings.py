@@ -15,11 +15,11 @@ from skidpad.core.geometry import Pose
 from skidpad.core.maths.constants import G
 from skidpad.core.states import ActorStates
 from skidpad.core.states import ActorTable as Bodies
-from skidpad.core.vocabulary import Bodywork
+from skidpad.core.vocabulary import Bodywork, Quality
 from skidpad.core.weather import Weather
 from skidpad.roads.queries import RoadMap
 from skidpad.sensors.pictures.lighting import lighting
-from skidpad.sensors.pictures.shading import Shading
+from skidpad.sensors.pictures.shading import shade_scene
 from skidpad.sensors.raster.live_scene import LiveScene
 from skidpad.sensors.raster.passes import Pass
 from skidpad.simulation.carla_server.actors.boxes import Boxes
@@ -43,9 +43,13 @@ class Pictured:
     """Map and actors with a body for rays and cameras, in the state of one frame."""
 
     def __init__(
-        self, roads: RoadMap, members: list[Actor], bodywork: Bodywork = Bodywork.PLAIN
+        self,
+        roads: RoadMap,
+        members: list[Actor],
+        bodywork: Bodywork = Bodywork.PLAIN,
+        quality: Quality = Quality.FULL,
     ) -> None:
-        self.roads, self.members = roads, members
+        self.roads, self.members, self._quality = roads, members, quality
         self.rows = {a.id: i for i, a in enumerate(members)}
         self.ids = np.array([0, *(a.id for a in members)], dtype=np.int64)  # by instance
         self.bodies = _bodies(members)
@@ -58,15 +62,8 @@ class Pictured:
         """Sets the light of the pictures to that of this weather."""
         if self.weather is not weather:
             self.weather = weather
-            static, light = self.live.static, lighting(weather)
-            self.shading = Shading(
-                static.palette,
-                self.bodies,
-                light,
-                False,
-                static.grain,
-                static.street_light,
-                static.leafy,
+            self.shading = shade_scene(
+                self.live.static, self.bodies, lighting(weather), self._quality
             )
 
 
@@ -82,8 +79,9 @@ class Surroundings:
         sky: Sky,
         clock: Clock,
         bodywork: Bodywork = Bodywork.PLAIN,
+        quality: Quality = Quality.FULL,
     ) -> None:
-        self.bodywork = bodywork
+        self.bodywork, self._quality = bodywork, quality
         self.map, self.actors, self.moving = map, actors, vehicles.moving
         self._landscape = landscape
         self.gravity = G  # m/s^2, as set by clients
@@ -112,7 +110,7 @@ class Surroundings:
         members = [a for a in self.actors if a.family in SOLID]
         seen, roads = self._pictured, self._landscape.roads
         if seen is None or seen.members != members or seen.roads is not roads:
-            self._pictured = seen = Pictured(roads, members, self.bodywork)
+            self._pictured = seen = Pictured(roads, members, self.bodywork, self._quality)
         now = self._clock.elapsed
         if seen.elapsed != now:
             seen.states = self._states(members)

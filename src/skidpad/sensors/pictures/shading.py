@@ -93,21 +93,21 @@ class Shading:
         palette: Floats32,
         table: ActorTable,
         light: Lighting,
-        snow_on_road: bool = False,
+        for_people: bool = False,
         grain: Floats32 = NO_GRAIN,
         street_light: StreetLight = NO_STREET_LIGHT,
         leafy: NDArray[np.intp] = NO_LEAVES,
     ) -> None:
-        """snow_on_road: for people; what a stack reads has snow beside the road only.
+        """for_people: for people; what a stack reads has snow beside the road only.
 
         grain, street_light, leafy: of the scene (`StaticScene`).
         """
         self._street_light = street_light
-        self._grain = _grain_in(light, grain, snow_on_road)
-        self._settling = _settling(light) if snow_on_road else NOTHING_SETTLES
+        self._grain = _grain_in(light, grain, for_people)
+        self._settling = _settling(light) if for_people else NOTHING_SETTLES
         self._tiles = make_tiles() if grain.size else NO_TILES
         self.light = light
-        self._table = _look_up(_in_season(palette, leafy, light), table, light, snow_on_road)
+        self._table = _look_up(_in_season(palette, leafy, light), table, light, for_people)
         self._plain_tail = self._table.reshape(-1, MATERIALS, COLUMNS)[0, Material.TAIL_LAMP].copy()
         self._braking = np.zeros(len(table), dtype=np.bool_)
         self._indicating = np.zeros((len(table), 2), dtype=np.bool_)
@@ -201,7 +201,7 @@ def _in_season(palette: Floats32, leafy: NDArray[np.intp], light: Lighting) -> F
     return result
 
 
-def _look_up(palette: Floats32, table: ActorTable, light: Lighting, snow_on_road: bool) -> Floats32:
+def _look_up(palette: Floats32, table: ActorTable, light: Lighting, for_people: bool) -> Floats32:
     """Returns ((n + 1) * 256, COLUMNS): colour and behaviour of each material, on the map and each actor."""
     n = len(table)
     out = np.zeros((n + 1, MATERIALS, COLUMNS), dtype=np.float32)
@@ -214,7 +214,7 @@ def _look_up(palette: Floats32, table: ActorTable, light: Lighting, snow_on_road
     out[:, list(GLOSSY), GLOSS] = 1.0
     for material in SNOWY:
         out[:, material, :3] += light.snow * (SNOW - out[:, material, :3])
-    if snow_on_road:
+    if for_people:
         for material in SNOWED:
             left = SNOW_IN_TRACKS if material in POLISHED else SNOW_LEFT
             out[:, material, :3] += left * light.snow * (SNOW - out[:, material, :3])
@@ -231,11 +231,11 @@ def _look_up(palette: Floats32, table: ActorTable, light: Lighting, snow_on_road
     return out.reshape(-1, COLUMNS)
 
 
-def _grain_in(light: Lighting, grain: Floats32, snow_on_road: bool) -> Floats32:
+def _grain_in(light: Lighting, grain: Floats32, for_people: bool) -> Floats32:
     """Returns the unevenness of surfaces in a weather: snow evens it out and hides their tints."""
     left = grain * np.float32(1.0 - 0.6 * light.snow)
     if grain.size:
-        white = [*SNOWY, *(SNOWED if snow_on_road else ())]
+        white = [*SNOWY, *(SNOWED if for_people else ())]
         left[white, 2] *= np.float32(1.0 - (1.0 - STAINED) * light.snow)
     result: Floats32 = left
     return result

@@ -168,6 +168,22 @@ def test_snow_lies_on_the_road_for_people_only():
     assert not both(preset("clear-noon"), Extra.SNOW)[2].any()
 
 
+def test_ice_lies_on_the_road_for_people_only():
+    icy = preset("icy_70")
+    plain, added, changed = both(icy, Extra.SNOW)
+    assert np.array_equal(plain.rgb, Seen(replace(icy, ice_thickness=0.0), NO_EXTRAS).rgb)
+    asphalt = plain.material == Material.ASPHALT
+    assert changed[asphalt].all()
+    assert not changed[(plain.instance > 0) | (plain.labels == SemanticClass.SKY)].any()
+    wet, ice = plain.rgb[asphalt].mean(axis=0), added.rgb[asphalt].mean(axis=0)
+    assert (ice > wet + 25.0).all()
+    assert ice[2] - ice[0] > wet[2] - wet[0] + 5.0, "and it is bluish"
+    snow = Seen(preset("snow"), {Extra.SNOW}).rgb[asphalt].mean(axis=0)
+    assert (ice < snow - 15.0).all()
+    thin = Seen(preset("icy_10"), {Extra.SNOW}).rgb[asphalt].mean(axis=0)
+    assert (thin < ice).all(), "2 mm of ice are nearly black"
+
+
 def test_markings_signs_and_plates_send_the_headlights_back():
     plain, added, changed = both(preset("clear-night"), Extra.RETRO)
     returned = np.isin(plain.labels, [SemanticClass.ROAD_LINE, SemanticClass.TRAFFIC_SIGN])
@@ -178,6 +194,8 @@ def test_markings_signs_and_plates_send_the_headlights_back():
     line = plain.labels == SemanticClass.ROAD_LINE
     assert changed[sign].mean() > 0.9
     assert changed[line].any()
+    icy = replace(preset("clear-night"), ice_thickness=50.0)
+    assert not both(icy, Extra.RETRO)[2][line].any(), "under milky ice"
     for weather, beam in ((preset("clear-noon"), None), (preset("clear-night"), Beam.OFF)):
         assert not both(weather, Extra.RETRO, beam=beam)[2].any()
 

@@ -47,7 +47,7 @@ EXTRAS = {
     Extra.RETRO: "reflective signs, lines",
     Extra.CLOUDS: "clouds, stars",
     Extra.EDGES: "soft edges",
-    Extra.SNOW: "snow on the road",
+    Extra.SNOW: "snow, ice on the road",
     Extra.TONE: "contrast, dim corners",
     Extra.CALM: "less camera noise",
 }

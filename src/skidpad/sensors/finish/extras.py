@@ -14,7 +14,7 @@ class Extra(str, Enum):
     RETRO = "retro"  # markings, signs and plates send the headlights back
     CLOUDS = "clouds"  # and stars, where there are few of them at night; fog before both
     EDGES = "edges"  # softened where one surface meets another
-    SNOW = "snow"  # on the road, not only beside it
+    SNOW = "snow"  # on the road, not only beside it; ice, and frost beside the road
     TONE = "tone"  # the contrast of a camera by day, and less light towards the corners
     CALM = "calm"  # less of the published camera effect, so that a night can be read
 

@@ -46,7 +46,7 @@ def gains(light: Lighting) -> NDArray[np.float32]:
     """Returns gains by class and material, in one weather."""
     found: NDArray[np.float32] = GAIN.copy()
     found[SemanticClass.ROAD_LINE] *= 1.0 - (1.0 - WET_SHARE) * light.wet
-    found[SemanticClass.ROAD_LINE] *= 1.0 - light.snow
+    found[SemanticClass.ROAD_LINE] *= 1.0 - max(light.snow, light.ice)
     return found
 
 

@@ -21,6 +21,7 @@ from skidpad.physics.optics import Air, air_of, extinction
 Colour = NDArray[np.float32]
 
 NIGHT_BELOW, DAY_ABOVE = -8.0, 12.0  # deg of sun altitude between which dusk happens
+MILKY = 30.0  # percent of ice_thickness, from which on no road is seen through it; by eye
 
 
 class Lighting(NamedTuple):
@@ -37,6 +38,7 @@ class Lighting(NamedTuple):
     curved: float  # 1: contrast falls as by Koschmieder, 0: as in the published pictures
     wet: float  # 0 dry .. 1 water on the road
     snow: float  # 0 .. 1 share of white ground
+    ice: float  # 0 .. 1, 0 where it is none or as clear as water
     headlights: float  # strength of the ego's beam, 0 off
     high: bool  # it is the high beam
     lamps: float  # strength of other vehicles' lamps, 0 by day
@@ -85,6 +87,7 @@ def lighting(weather: Weather, beam: Beam | None = None, *, haze: bool = False) 
         float(haze),
         max(weather.wetness, weather.precipitation_deposits) / 100.0,
         _smooth(weather.snow_depth_mm / 20.0),
+        _smooth(weather.ice_thickness / MILKY),
         0.0 if beam is Beam.OFF else 1.0,
         beam is Beam.HIGH,
         night,

@@ -71,11 +71,15 @@ SNOWY = (
 SNOWED = (*ASPHALTS, Material.MARKING)
 SNOW_LEFT = 0.72  # share of a driven road that packed snow covers; by eye
 SNOW_IN_TRACKS = 0.56  # and of it where wheels roll
+ICE_LEFT = 0.62  # share of a driven road that ice hides; by eye
+ICE_IN_TRACKS = 0.44  # and of it where wheels roll
+FROSTED = 0.5  # share of snow's white that hoar frost has, wherever there is ice; by eye
 SETTLED = 0.92  # share of what looks up, off the road, that snow covers
 STAINED = 0.06  # share of the tints of surfaces that is left on snow
 GLOSSY = (Material.PAINT, Material.GLASS, Material.LAMP_GLASS)
 WET_DARKENING = 0.52  # of asphalt's albedo; Lekner and Dorf (1988) give 0.4 to 0.7
 SNOW = np.array([0.80, 0.83, 0.88], dtype=np.float32)
+ICE = np.array([0.52, 0.63, 0.76], dtype=np.float32)
 TWIGS = np.array([98, 86, 76], dtype=np.float32)  # grey levels of bare crowns
 BARE = 0.85  # share of a crown's colour that twigs make where snow lies
 NO_LEAVES = np.zeros(0, dtype=np.intp)
@@ -98,10 +102,12 @@ class Shading:
         street_light: StreetLight = NO_STREET_LIGHT,
         leafy: NDArray[np.intp] = NO_LEAVES,
     ) -> None:
-        """for_people: for people; what a stack reads has snow beside the road only.
+        """for_people: what a stack reads has snow beside the road only, and no ice.
 
         grain, street_light, leafy: of the scene (`StaticScene`).
         """
+        if not for_people:
+            light = light._replace(ice=0.0)
         self._street_light = street_light
         self._grain = _grain_in(light, grain, for_people)
         self._settling = _settling(light) if for_people else NOTHING_SETTLES
@@ -193,11 +199,12 @@ def shade_scene(
 
 
 def _in_season(palette: Floats32, leafy: NDArray[np.intp], light: Lighting) -> Floats32:
-    """Returns the palette with bare crowns where snow lies; leafy: materials of broad-leaved crowns."""
-    if light.snow <= 0.0 or not leafy.size:
+    """Returns the palette with bare crowns in snow and ice; leafy: materials of broad-leaved crowns."""
+    winter = max(light.snow, light.ice)
+    if winter <= 0.0 or not leafy.size:
         return palette
     result: Floats32 = palette.copy()
-    result[leafy] += np.float32(BARE * light.snow) * (TWIGS - result[leafy])
+    result[leafy] += np.float32(BARE * winter) * (TWIGS - result[leafy])
     return result
 
 
@@ -213,11 +220,13 @@ def _look_up(palette: Floats32, table: ActorTable, light: Lighting, for_people: 
     out[:, list(ROADLIKE), WETTABLE] = 1.0
     out[:, list(GLOSSY), GLOSS] = 1.0
     for material in SNOWY:
-        out[:, material, :3] += light.snow * (SNOW - out[:, material, :3])
+        out[:, material, :3] += _whiteness(light) * (SNOW - out[:, material, :3])
     if for_people:
         for material in SNOWED:
-            left = SNOW_IN_TRACKS if material in POLISHED else SNOW_LEFT
-            out[:, material, :3] += left * light.snow * (SNOW - out[:, material, :3])
+            is_rolled = material in POLISHED
+            ice, snow = (ICE_IN_TRACKS, SNOW_IN_TRACKS) if is_rolled else (ICE_LEFT, SNOW_LEFT)
+            out[:, material, :3] += ice * light.ice * (ICE - out[:, material, :3])
+            out[:, material, :3] += snow * light.snow * (SNOW - out[:, material, :3])
     out[:, Material.HEADLAMP, GLOW] = 0.9 * light.lamps
     shining = out[:, Material.HEADLAMP, :3] - out[:, Material.LAMP_GLASS, :3]
     out[:, Material.LAMP_GLASS, :3] += min(light.lamps, 1.0) * shining
@@ -231,21 +240,26 @@ def _look_up(palette: Floats32, table: ActorTable, light: Lighting, for_people: 
     return out.reshape(-1, COLUMNS)
 
 
+def _whiteness(light: Lighting) -> float:
+    """Returns how white the ground beside a driven road is, 0 .. 1: of snow, or of frost where ice is."""
+    return max(light.snow, FROSTED * light.ice)
+
+
 def _grain_in(light: Lighting, grain: Floats32, for_people: bool) -> Floats32:
-    """Returns the unevenness of surfaces in a weather: snow evens it out and hides their tints."""
+    """Returns the unevenness of surfaces in a weather: snow evens it out, ice and it hide their tints."""
     left = grain * np.float32(1.0 - 0.6 * light.snow)
     if grain.size:
         white = [*SNOWY, *(SNOWED if for_people else ())]
-        left[white, 2] *= np.float32(1.0 - (1.0 - STAINED) * light.snow)
+        left[white, 2] *= np.float32(1.0 - (1.0 - STAINED) * max(light.snow, light.ice))
     result: Floats32 = left
     return result
 
 
 def _settling(light: Lighting) -> Floats32:
-    """Returns (256,) shares of each material of the map that snow covers on top; empty without snow."""
-    if light.snow <= 0.0:
+    """Returns (256,) shares of each material of the map that snow or frost covers; empty without both."""
+    if _whiteness(light) <= 0.0:
         return NOTHING_SETTLES
-    shares = np.full(MATERIALS, SETTLED * light.snow, dtype=np.float32)
+    shares = np.full(MATERIALS, SETTLED * _whiteness(light), dtype=np.float32)
     shares[[*SNOWY, *SNOWED, *EMISSIVE, Material.LAMP_HOUSING, Material.LAMP_DARK]] = 0.0
     return shares
 

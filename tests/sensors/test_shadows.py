@@ -7,6 +7,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.specs import CameraSpec, Modality
 from skidpad.core.vocabulary import ActorKind, SemanticClass
 from skidpad.core.weather import Weather
+from skidpad.physics.optics import fog_extinction
 from skidpad.physics.presets import preset
 from skidpad.roads.roadside import Box, Shape
 from skidpad.sensors.finish.extras import NO_EXTRAS, Extra
@@ -89,6 +90,16 @@ def test_without_sun_there_is_no_edge_but_still_contact():
     sharp = Weather(sun_altitude_deg=20.0, sun_azimuth_deg=90.0)
     bright = seen(sharp, False)[0] - seen(sharp, True)[0]
     assert (dull > 3.0).sum() < 0.7 * (bright > 3.0).sum()
+
+
+def test_fog_before_a_shadow_veils_it():
+    """20 m of dense fog leave (1 + 1.2 / 16)^-16 = 0.31 of the dark."""
+    fog = Weather(fog_density=100.0)
+    assert fog_extinction(fog) == pytest.approx(0.06, rel=0.01)
+    clear = (seen(Weather(), True)[0] / seen(Weather(), False)[0]) ** 2
+    veiled = (seen(fog, True)[0] / seen(fog, False)[0]) ** 2
+    assert clear.min() < 0.5
+    assert veiled.min() == pytest.approx(1.0 - 0.31 * (1.0 - clear.min()), abs=0.03)
 
 
 def test_a_crown_throws_a_round_shadow_beside_its_stem_and_a_beam_over_the_road_none():

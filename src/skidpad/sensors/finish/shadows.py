@@ -17,6 +17,8 @@ from skidpad.core.arrays import Floats
 from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind
+from skidpad.physics.camera import share_left
+from skidpad.physics.optics import Air, air_depth
 from skidpad.roads.roadside import Box, Shape
 from skidpad.sensors.finish.outline import MOST, spans
 from skidpad.sensors.pictures.lighting import Lighting
@@ -68,6 +70,8 @@ class Shade(NamedTuple):
     sun_x: float  # m of shadow per m of height, away from the sun
     sun_y: float
     sun: float  # share of the light that comes from the sun's direction
+    air: Air  # between a shadow and the eye
+    curved: float  # as in `Lighting`
 
 
 def bodies_of(table: ActorTable, states: ActorStates) -> Bodies:
@@ -105,7 +109,8 @@ def shade_of(light: Lighting) -> Shade:
     direction, sun, sky = light.sun_direction, float(light.sun.mean()), float(light.sky.mean())
     up = max(float(direction[2]), 0.05)
     share = sun * max(float(direction[2]), 0.0) / max(sun * up + sky, 1e-6)
-    return Shade(-float(direction[0]) / up, -float(direction[1]) / up, share)
+    x, y = -float(direction[0]) / up, -float(direction[1]) / up
+    return Shade(x, y, share, light.air, light.curved)
 
 
 GROUND_MASK = np.zeros(MATERIALS, dtype=np.bool_)  # by material: shadows are seen on it
@@ -242,6 +247,7 @@ def _darken(
     bodies: Bodies,
     i: int,
     cast: _Cast,
+    shade: Shade,
     rows: tuple[int, int],
     columns: NDArray[np.int64],
     ground: NDArray[np.bool_],
@@ -249,7 +255,8 @@ def _darken(
     key: NDArray[np.int32],
     out: NDArray[np.uint32],
 ) -> None:
-    """Draws one body's shadow into `out`, in the spans that it can reach."""
+    """Draws one body's shadow into `out`, in the spans that it can reach, as much as the air lets through."""
+    air, curved = shade.air, np.float32(shade.curved)
     r, per = view.rotation, 1.0 / view.focal
     ox, oy = view.centre[0] - bodies.x[i], view.centre[1] - bodies.y[i]
     oz = view.centre[2] - bodies.z[i] + bodies.lift[i]
@@ -275,6 +282,8 @@ def _darken(
             lx, ly = z * (x_v + x_u * u) + x0, z * (y_v + y_u * u) + y0
             light = _light_at(cast, lx, ly, hangs)
             if light < 0.995:
+                way = z * np.sqrt(1.0 + v * v + per * per * u * u)
+                light = 1.0 - (1.0 - light) * share_left(np.float32(air_depth(air, way)), curved)
                 out[row, column] = _dim_pixel(out[row, column], light)
 
 
@@ -300,4 +309,4 @@ def cast_shadows(
         cast = _cast_of(bodies, i, shade)
         _corners(bodies, i, cast, corners)
         rows = spans(view, corners, points, ring, columns)
-        _darken(view, bodies, i, cast, rows, columns, ground, inverse, key, out)
+        _darken(view, bodies, i, cast, shade, rows, columns, ground, inverse, key, out)

@@ -14,7 +14,7 @@ from skidpad.core.vocabulary import ActorKind, GripModel, LightState, RangeModel
 from skidpad.core.weather import Weather
 from skidpad.physics.optics import transmission
 from skidpad.physics.presets import preset
-from skidpad.roads.roadside import Box, SignalHead
+from skidpad.roads.roadside import Box, Shape, SignalHead
 from skidpad.sensors.finish.extras import ALL_EXTRAS, NO_EXTRAS, Extra
 from skidpad.sensors.finish.outline import MOST, spans
 from skidpad.sensors.finish.tone import CURVE, curve_of, set_tone
@@ -166,6 +166,25 @@ def test_snow_lies_on_the_road_for_people_only():
     assert changed[others].mean() < 0.1, "elsewhere it lies on what looks up only"
     assert added.rgb[asphalt].mean() > plain.rgb[asphalt].mean() + 40.0
     assert not both(preset("clear-noon"), Extra.SNOW)[2].any()
+
+
+def test_no_dots_of_snow_lie_along_the_ridges_of_a_conifer():
+    """A pixel of a ridge has one slope of either face, which together may look up where neither does."""
+    cone = Box(
+        SemanticClass.VEGETATION, 116.0, -1.0, 1.0, 0.2, 4.0, 4.0, 7.0, rgb=(40, 80, 45),
+        shape=Shape.CONE,
+    )  # fmt: skip
+    camera = CameraSpec("rgb", Modality.RGB, 800, 600, 75.0, DRIVER)
+    settings = PixelSettings(camera_effect=False, extras=frozenset({Extra.SNOW}))
+    suite = PixelSuite(
+        straight(300, boxes=[cone]), table_of([]), [camera], preset("snow"), settings
+    )
+    rgb = suite.observe(0, states_at(MOMENT[:1]), {}).images["rgb"].rgb.astype(int).max(axis=2)
+    tree = (suite._pass_of["rgb"].key & 255) == Material.FIRST_FREE
+    assert 5000 < tree.sum() < 100_000
+    inside = tree[:, 1:-1] & tree[:, :-2] & tree[:, 2:]
+    above = rgb[:, 1:-1] - np.maximum(rgb[:, :-2], rgb[:, 2:])
+    assert (above[inside] < 40).all()
 
 
 def test_ice_lies_on_the_road_for_people_only():

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from skidpad.core.arrays import Floats32
 from skidpad.core.kernels.jit import inner_kernel
 from skidpad.sensors.pictures.blocks import GX, GY, ONE, ZERO, B, G, R, U, W, end_of_run
+from skidpad.sensors.pictures.roughness import A
 
 NOTHING_SETTLES = np.zeros(0, dtype=np.float32)
 _STEEP, _PER = (
@@ -29,6 +30,8 @@ def settle_snow(
 ) -> None:
     """Covers surfaces of the map in a block with snow, the more the more they look up.
 
+    A pixel takes the least of itself and its neighbours along the row: on a ridge it has one slope of either
+    face, which together may look up where neither does.
     v: m down per m ahead of the block's row; shares: (256,) that snow covers of a level surface, by
     material; up: (3,) camera axes.
     """
@@ -47,7 +50,11 @@ def settle_snow(
             n_up = -(gx * up0 + gy * up1 + gz * up2) / np.sqrt(gx * gx + gy * gy + gz * gz + _TINY)
             t = (n_up - _STEEP) * _PER
             t = t if t > ZERO else ZERO
-            t = t if t < ONE else ONE
+            run[A + n] = t if t < ONE else ONE
+        for n in range(size):
+            t, before, after = run[A + n], run[A + max(n - 1, 0)], run[A + min(n + 1, size - 1)]
+            t = t if t < before else before
+            t = t if t < after else after
             cover = share * t * t * (_THREE - _TWO * t)
             run[R + n] += cover * (_SNOW_R - run[R + n])
             run[G + n] += cover * (_SNOW_G - run[G + n])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from math import cos, pi, sin
 from typing import NamedTuple
 
@@ -43,12 +44,12 @@ def merge(meshes: Sequence[Mesh]) -> Mesh:
     """Returns all the meshes as one mesh; EMPTY for none."""
     if not meshes:
         return EMPTY
-    offsets = np.cumsum([0, *(len(m.vertices) for m in meshes[:-1])])
+    sizes = np.array([len(m.vertices) for m in meshes], dtype=np.int32)
+    offsets = np.cumsum(sizes, dtype=np.int32) - sizes
     return Mesh(
         np.concatenate([m.vertices for m in meshes]),
-        np.concatenate(
-            [m.triangles + np.int32(o) for m, o in zip(meshes, offsets, strict=True)]
-        ).astype(np.int32),
+        np.concatenate([m.triangles for m in meshes])
+        + np.repeat(offsets, [len(m.triangles) for m in meshes])[:, None],
         np.concatenate([m.label for m in meshes]),
         np.concatenate([m.material for m in meshes]),
     )
@@ -62,10 +63,14 @@ def quads(corners: NDArray[np.int32]) -> NDArray[np.int32]:
 
 def ribbon(left: Points, right: Points, label: int, material: int) -> Mesh:
     """Returns the strip between two polylines of k points each, k >= 2."""
-    k = len(left)
+    return Mesh.of(np.concatenate([left, right]), _strip(len(left)), label, material)
+
+
+@lru_cache(maxsize=1024)
+def _strip(k: int) -> NDArray[np.int32]:
+    """Returns the triangles between a polyline of k points and another one, whose points follow."""
     i = np.arange(k - 1, dtype=np.int32)
-    corners = np.stack([i, i + 1, i + 1 + k, i + k], axis=1)
-    return Mesh.of(np.concatenate([left, right]), quads(corners), label, material)
+    return _freeze(quads(np.stack([i, i + 1, i + 1 + k, i + k], axis=1)))
 
 
 def patches(
@@ -74,8 +79,19 @@ def patches(
     """Returns separate quads between two polylines, from index pairs[:, 0] to pairs[:, 1] of each."""
     a, b = pairs[:, 0], pairs[:, 1]
     vertices = np.stack([left[a], left[b], right[b], right[a]], axis=1).reshape(-1, 3)
-    corners = np.arange(4 * len(pairs), dtype=np.int32).reshape(-1, 4)
-    return Mesh.of(vertices, quads(corners), label, material)
+    return Mesh.of(vertices, _separate(len(pairs)), label, material)
+
+
+@lru_cache(maxsize=1024)
+def _separate(n: int) -> NDArray[np.int32]:
+    """Returns the triangles of n quads without a common corner."""
+    return _freeze(quads(np.arange(4 * n, dtype=np.int32).reshape(-1, 4)))
+
+
+def _freeze(triangles: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Returns the triangles, which many meshes hold, after they were made read-only."""
+    triangles.setflags(write=False)
+    return triangles
 
 
 _BOX_FACES = np.array(

@@ -44,8 +44,14 @@ AGES = (  # drawn from: what lies on a stretch of road or lane
     Material.NEW_ASPHALT, Material.WORN_ASPHALT,
     Material.ASPHALT, Material.ASPHALT, Material.ASPHALT, Material.WORN_ASPHALT,
 )  # fmt: skip
+PAINT = (SemanticClass.ROAD_LINE, Material.MARKING)
+KERB = (SemanticClass.SIDEWALK, Material.KERB)
+EMBANKMENT = (SemanticClass.TERRAIN, Material.EMBANKMENT)
 OWN_AGES = 2  # so many of AGES, from the first, let a lane's stretch differ from its road's
 STRETCH = 2  # chunks, the shortest that is laid anew
+LINES = (Marking.SOLID, Marking.SOLID_SOLID, Marking.SOLID_BROKEN, Marking.BROKEN_SOLID)
+IS_LINE = np.isin(np.arange(256), LINES)  # by the number of a marking
+BROKEN, CURB = int(Marking.BROKEN), int(Marking.CURB)
 RAISED = (LaneKind.SIDEWALK, LaneKind.MEDIAN, LaneKind.BORDER, LaneKind.OTHER)  # beyond a kerb
 TRACK_LEVELS = 2  # a wheel's track beyond them is a pixel wide
 # m from the middle of a lane: where what drips ends, and from where to where wheels roll
@@ -147,8 +153,9 @@ def _outermost(lanes: LaneTable) -> NDArray[np.bool_]:
 def _stations(s: NDArray[np.float64], chord: float) -> NDArray[np.intp]:
     """Returns indices of the samples that a level keeps: both ends, and one per `chord` m of s."""
     bins = np.floor(s / chord + 1e-9)
-    inner = np.flatnonzero(np.diff(bins)) + 1
-    return np.unique(np.concatenate([[0], inner, [len(s) - 1]]))
+    starts = bins[1:] != bins[:-1]
+    starts[-1] = True
+    return np.concatenate([[0], np.flatnonzero(starts) + 1])
 
 
 def _levels(
@@ -180,9 +187,9 @@ def _levels(
             if (is_raised or is_outer) and level < LEVELS - 1:
                 parts += _kerb(ground, at, side, is_raised)
         if level < LEVELS - 1:  # beyond that a line is a quarter of a pixel wide
-            parts.append(_paint_edge(piece, at, level, 1))
+            parts += _paint_edge(piece, at, level, 1)
             if kind in DRIVABLE and lanes.left[lane] < 0:
-                parts.append(_paint_edge(piece, at, level, 0))
+                parts += _paint_edge(piece, at, level, 0)
         meshes.append(merge(parts))
     return meshes
 
@@ -215,7 +222,7 @@ def _raise_beyond_kerbs(piece: Edges, kind: LaneKind) -> tuple[Edges, bool]:
 
     Only kinds in RAISED with a kerb are; any other piece comes back as it is.
     """
-    kerbs = (piece.marking_left == Marking.CURB) | (piece.marking_right == Marking.CURB)
+    kerbs = (piece.marking_left == CURB) | (piece.marking_right == CURB)
     if kind not in RAISED or not kerbs.any():
         return piece, False
     lift = np.stack([np.zeros(len(kerbs)), np.zeros(len(kerbs)), KERB_HEIGHT * kerbs], axis=1)
@@ -228,7 +235,7 @@ def _kerb(piece: Edges, at: NDArray[np.intp], side: int, inside: bool) -> list[M
     at: indices of the samples; side: 0 left, 1 right; inside: the stones lie inside the edge.
     """
     style = (piece.marking_left, piece.marking_right)[side][at]
-    stretches = np.flatnonzero((style[:-1] == Marking.CURB) & (style[1:] == Marking.CURB))
+    stretches = np.flatnonzero((style[:-1] == CURB) & (style[1:] == CURB))
     if not len(stretches):
         return []
     pairs = np.stack([stretches, stretches + 1], axis=1)
@@ -236,10 +243,9 @@ def _kerb(piece: Edges, at: NDArray[np.intp], side: int, inside: bool) -> list[M
     outward = piece.normal[at] * (KERB_WIDTH if side == 0 else -KERB_WIDTH)
     up = np.array([0.0, 0.0, KERB_HEIGHT + (MARKING_LIFT if inside else 0.0)])
     behind = foot - outward if inside else foot + outward
-    look = (SemanticClass.SIDEWALK, Material.KERB)
-    faces = [patches(foot + up, foot, pairs, *look), patches(behind + up, foot + up, pairs, *look)]
+    faces = [patches(foot + up, foot, pairs, *KERB), patches(behind + up, foot + up, pairs, *KERB)]
     if not inside:
-        faces.append(patches(behind + up, behind, pairs, *look))
+        faces.append(patches(behind + up, behind, pairs, *KERB))
     return faces
 
 
@@ -248,31 +254,36 @@ def _skirt(piece: Edges, at: NDArray[np.intp], side: int) -> Mesh:
     edge = (piece.left, piece.right)[side][at]
     out = edge + piece.normal[at] * (SKIRT_WIDTH if side == 0 else -SKIRT_WIDTH)
     out[:, 2] = edge[:, 2] - SKIRT_DROP
-    return ribbon(edge, out, SemanticClass.TERRAIN, Material.EMBANKMENT)
+    return ribbon(edge, out, *EMBANKMENT)
 
 
-def _paint_edge(piece: Edges, at: NDArray[np.intp], level: int, side: int) -> Mesh:
-    """Returns the paint on one edge of a piece of lane; side: 0 left, 1 right; level: of detail."""
-    edge = (piece.left, piece.right)[side] + (0.0, 0.0, MARKING_LIFT)
-    half = piece.normal * (MARKING_WIDTH / 2.0)
+def _paint_edge(piece: Edges, at: NDArray[np.intp], level: int, side: int) -> list[Mesh]:
+    """Returns the paint on one edge of a piece of lane; [] where there is none.
+
+    side: 0 left, 1 right; level: of detail.
+    """
     style = (piece.marking_left, piece.marking_right)[side]
     pairs = _painted_stretches(piece.s, at, style, level)
-    return patches(edge + half, edge - half, pairs, SemanticClass.ROAD_LINE, Material.MARKING)
+    if not len(pairs):
+        return []
+    edge = (piece.left, piece.right)[side] + (0.0, 0.0, MARKING_LIFT)
+    half = piece.normal * (MARKING_WIDTH / 2.0)
+    return [patches(edge + half, edge - half, pairs, *PAINT)]
 
 
 def _painted_stretches(
     s: NDArray[np.float64], at: NDArray[np.intp], style: NDArray[np.uint8], level: int
 ) -> NDArray[np.intp]:
     """Returns (q, 2) index pairs of the painted stretches; dashes are left out from DASHED_LEVELS on."""
-    solid = np.stack([at[:-1], at[1:]], axis=1)
-    lines = (Marking.SOLID, Marking.SOLID_SOLID, Marking.SOLID_BROKEN, Marking.BROKEN_SOLID)
-    solid = solid[np.isin(style[at[:-1]], [int(m) for m in lines])]
-    on = (style == Marking.BROKEN) & (np.mod(s, DASH_PERIOD) < DASH)
+    solid = np.stack([at[:-1], at[1:]], axis=1)[IS_LINE[style[at[:-1]]]]
+    if level >= DASHED_LEVELS:
+        return solid
+    on = (style == BROKEN) & (np.mod(s, DASH_PERIOD) < DASH)
+    if not on.any():
+        return solid
     bounds = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(np.int8)))
     runs = bounds.reshape(-1, 2)
     runs[:, 1] = np.minimum(runs[:, 1], len(s) - 1)
-    if level >= DASHED_LEVELS:
-        return solid
     if level == 0:
         runs = np.array(
             [(i, min(i + 2, b)) for a, b in runs for i in range(a, b, 2)], dtype=np.intp

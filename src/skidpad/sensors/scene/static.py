@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain
-from typing import NamedTuple
+from itertools import chain, groupby, islice
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ FIELD = (3, 2)  # tiles of 48 m, along and across
 GROWN = (Material.GRASS, Material.HAY, Material.GRASS, Material.CROP, Material.PLOUGHED)
 ROAD_STEP = 8  # samples of a lane, of which one is looked at
 SIZE = 16  # triangles: 16 m of one lane at full detail
+BATCH = 1024  # chunks that are meshes at a time, while a map is packed
 MARGIN = 1e-6  # m, more than rounding can put a vertex outside its sphere
 # A lamp lights up in its own colour; everything else is dark.
 LIT: dict[LightState, tuple[int, Material]] = {
@@ -38,6 +40,9 @@ LIT: dict[LightState, tuple[int, Material]] = {
     LightState.YELLOW: (1, Material.LAMP_YELLOW),
     LightState.GREEN: (2, Material.LAMP_GREEN),
 }
+
+
+Block = list[list[Mesh]]  # the pieces of a chunk, each a mesh per level
 
 
 class Chunks(NamedTuple):
@@ -88,28 +93,48 @@ def build_scene(samples: LaneSamples, lanes: LaneTable, roadside: Roadside) -> S
     """Returns a map's scene: about 2000 triangles per 48 m of a four-lane road at full detail."""
     palette = base_palette()
     box_material = _box_materials({b.rgb for b in roadside.boxes}, palette)
-    pieces = chain(
-        road_pieces(samples, lanes, ages=_is_dressed(roadside)),
-        ground_pieces(samples, fields=_is_dressed(roadside)),
-        furniture_pieces(roadside, box_material),
-    )
-    grouped: dict[ChunkKey, list[list[Mesh]]] = {}
-    for key, levels in pieces:
-        grouped.setdefault(key, []).append(levels)
-    lamps = [(head, place, lamp_mesh(head, place)) for head in roadside.heads for place in range(3)]
-    for head, _, mesh in lamps:
-        grouped.setdefault(cell(head.x, head.y), []).append([mesh] * LEVELS)
-    blocks = {
-        key: [merge([p[level] for p in parts]) for level in range(LEVELS)]
-        for key, parts in grouped.items()
-    }
-    chunks = pack(blocks.values())
-    lamps_found = _find_lamps(chunks, roadside, blocks, grouped)
+    blocks = _blocks(samples, lanes, roadside, box_material)
+    keys: list[ChunkKey] = []
+    packed = []
+    while batch := list(islice(blocks, BATCH)):
+        keys += [key for key, _ in batch]
+        packed.append(pack([pieces for _, pieces in batch]))
+    chunks = _join(packed)
+    lamps = _find_lamps(chunks, roadside, keys)
     street_light = street_light_of(roadside.boxes)
     grain = _grain_of(roadside, box_material)
     crowns = {box_material[b.rgb] for b in roadside.boxes if b.shape is Shape.CROWN}
     leafy = np.array(sorted(crowns), dtype=np.intp)
-    return StaticScene(chunks, lamps_found, palette, street_light, grain, leafy)
+    return StaticScene(chunks, lamps, palette, street_light, grain, leafy)
+
+
+def _blocks(
+    samples: LaneSamples,
+    lanes: LaneTable,
+    roadside: Roadside,
+    box_material: dict[tuple[int, int, int], int],
+) -> Iterator[tuple[ChunkKey, Block]]:
+    """Yields all chunks with their keys, road by road, then what stands or lies beside the roads."""
+    is_dressed = _is_dressed(roadside)
+    for _, pieces in groupby(road_pieces(samples, lanes, is_dressed), lambda piece: piece[0][:2]):
+        yield from _group_pieces(pieces)
+    lamps = (
+        (cell(head.x, head.y), [lamp_mesh(head, place)] * LEVELS)
+        for head in roadside.heads
+        for place in range(3)
+    )
+    ground = ground_pieces(samples, fields=is_dressed)
+    yield from _group_pieces(chain(ground, furniture_pieces(roadside, box_material), lamps))
+
+
+def _group_pieces(
+    pieces: Iterable[tuple[ChunkKey, list[Mesh]]],
+) -> Iterable[tuple[ChunkKey, Block]]:
+    """Returns the pieces of each chunk together, chunks in the order of their first pieces."""
+    grouped: dict[ChunkKey, Block] = {}
+    for key, levels in pieces:
+        grouped.setdefault(key, []).append(levels)
+    return grouped.items()
 
 
 def _is_dressed(roadside: Roadside) -> bool:
@@ -126,25 +151,53 @@ def _grain_of(
     return grain_table((b.label, box_material[b.rgb]) for b in roadside.boxes)
 
 
-def pack(blocks: Iterable[list[Mesh]]) -> Chunks:
-    """Returns meshes per chunk and level as flat arrays."""
-    blocks = list(blocks)
-    flat = [mesh for levels in blocks for mesh in levels]
-    shape = (len(blocks), LEVELS)
-    count = np.array([len(m.triangles) for m in flat], dtype=np.int32)
+def pack(blocks: Sequence[Block]) -> Chunks:
+    """Returns the pieces of chunks as flat arrays; each chunk has one piece or more."""
+    flat = [levels[level] for block in blocks for level in range(LEVELS) for levels in block]
+    pieces = np.repeat([len(block) for block in blocks], LEVELS)
+    triangles = np.array([len(m.triangles) for m in flat], dtype=np.int32)
+    count = np.add.reduceat(triangles, _starts(pieces), dtype=np.int32)
     everything = merge(flat)
     clusters, per_block = cluster(everything.vertices, everything.triangles, count)
-    centre, radius = _spheres(blocks)
+    vertices = np.array([len(m.vertices) for m in flat], dtype=np.int32)
+    ends = LEVELS * np.cumsum([len(block) for block in blocks])
+    centre, radius = _spheres(everything.vertices, np.cumsum(vertices)[ends - 1])
+    count, per_block = count.reshape(-1, LEVELS), per_block.reshape(-1, LEVELS)
     return Chunks(
         clusters,
         pixel_key(everything),
         centre,
         radius,
-        (np.cumsum(count) - count).astype(np.int32).reshape(shape),
-        count.reshape(shape),
-        (np.cumsum(per_block) - per_block).astype(np.int32).reshape(shape),
-        per_block.reshape(shape),
+        _starts(count),
+        count,
+        _starts(per_block),
+        per_block,
     )
+
+
+def _join(parts: list[Chunks]) -> Chunks:
+    """Returns packed chunks as one; empties `parts`, so that hardly anything is held twice."""
+    columns = list(zip(*((*part.clusters, *part[1:]) for part in parts), strict=True))[::-1]
+    parts.clear()
+    joined = []
+    while columns:
+        joined.append(np.concatenate(columns.pop()))
+    clusters = Clusters(*joined[: len(Clusters._fields)])
+    chunks = Chunks(clusters, *joined[len(Clusters._fields) :])
+    return chunks._replace(
+        clusters=clusters._replace(
+            vertex_start=_starts(clusters.vertex_count),
+            triangle_start=_starts(clusters.triangle_count),
+        ),
+        triangle_start=_starts(chunks.triangle_count),
+        cluster_start=_starts(chunks.cluster_count),
+    )
+
+
+def _starts(count: NDArray[Any]) -> Ints32:
+    """Returns where runs of these lengths begin that lie one after the other, in the same shape."""
+    starts: Ints32 = (np.cumsum(count).reshape(count.shape) - count).astype(np.int32)
+    return starts
 
 
 def pixel_key(mesh: Mesh) -> Ints32:
@@ -152,15 +205,16 @@ def pixel_key(mesh: Mesh) -> Ints32:
     return mesh.label.astype(np.int32) << 8 | mesh.material.astype(np.int32)
 
 
-def _spheres(blocks: list[list[Mesh]]) -> tuple[Floats, Floats]:
-    """Returns centres (n, 3) and radii (n,) in m of spheres that enclose each block."""
-    centre = np.empty((len(blocks), 3))
-    radius = np.empty(len(blocks))
-    for i, levels in enumerate(blocks):
-        points = np.concatenate([m.vertices for m in levels])
-        centre[i] = (points.min(axis=0) + points.max(axis=0)) / 2.0
-        radius[i] = np.sqrt(((points - centre[i]) ** 2).sum(axis=1).max())
-    return centre, radius
+def _spheres(vertices: Floats, ends: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """Returns centres (n, 3) and radii (n,) in m of spheres that enclose runs of the vertices.
+
+    ends: (n,) one more than the last row of each run.
+    """
+    starts = np.concatenate([[0], ends[:-1]])
+    low, high = np.minimum.reduceat(vertices, starts), np.maximum.reduceat(vertices, starts)
+    centre = (low + high) / 2.0
+    away = vertices - np.repeat(centre, ends - starts, axis=0)
+    return centre, np.sqrt(np.maximum.reduceat((away**2).sum(axis=1), starts))
 
 
 def _box_materials(
@@ -183,18 +237,16 @@ def _box_materials(
     return given
 
 
-def _find_lamps(
-    chunks: Chunks,
-    roadside: Roadside,
-    blocks: Mapping[ChunkKey, list[Mesh]],
-    grouped: Mapping[ChunkKey, list[list[Mesh]]],
-) -> Lamps:
-    """Returns the rows of the lamp triangles: they stand last in their chunk, in the order of the heads."""
-    order = {key: i for i, key in enumerate(blocks)}
+def _find_lamps(chunks: Chunks, roadside: Roadside, keys: Sequence[ChunkKey]) -> Lamps:
+    """Returns the rows of the lamp triangles: they stand last in their chunk, in the order of the heads.
+
+    keys: of the chunks.
+    """
+    order = {key: i for i, key in enumerate(keys)}
     signal: list[int] = []
     place: list[int] = []
     rows: list[int] = []
-    behind: dict[ChunkKey, int] = dict.fromkeys(grouped, 0)
+    behind: dict[ChunkKey, int] = defaultdict(int)
     for head in reversed(roadside.heads):
         key = cell(head.x, head.y)
         for lamp in (2, 1, 0):

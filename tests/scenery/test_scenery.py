@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,7 @@ from skidpad.roads.opendrive.bake import bake
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.roadside import UNPAINTED, Shape
 from skidpad.roads.walkable import walk_mesh
+from skidpad.scenery import dressing
 from skidpad.scenery.dressing import (
     LOWER_EDGE,
     count_things,
@@ -95,6 +97,15 @@ def test_things_do_not_stand_in_each_other_or_in_what_the_file_names() -> None:
         for b in road_map.roadside.boxes
     ]
     assert not shapely.STRtree(outlines).query(own, predicate="intersects").size
+
+
+def test_a_map_that_is_too_large_is_left_as_it_is(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    road_map = copy(load_map("straight"))  # which no cache knows
+    monkeypatch.setattr(dressing, "LARGEST", 3_000.0)
+    assert dress_map(road_map, Scenery.FULL) is road_map
+    assert "map straight: no scenery beside 9 km of driving lanes, at most 3 km" in caplog.text
 
 
 def test_none_is_the_map_itself_and_full_leaves_the_roads_as_they_are() -> None:

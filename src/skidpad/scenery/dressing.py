@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from copy import copy
@@ -22,6 +23,8 @@ from skidpad.scenery.rows import backdrop_of, rows_of
 from skidpad.scenery.sides import sides_of
 from skidpad.scenery.things import STOREY, WALLS, Thing
 
+log = logging.getLogger("skidpad.scenery")
+LARGEST = 500_000.0  # m of driving lanes: the triangles of what would stand beside more take 2 GB
 PLATE = 0.7  # m, German size 2 is 0.6 m for discs and 0.9 m for others (VwV-StVO, table 2)
 LOWER_EDGE = 2.0  # m above the road, VwV-StVO to sections 39 to 43, III 13 a
 POST = 0.08  # m
@@ -39,13 +42,23 @@ SUNK = 0.3  # m that things reach into the ground, whose triangles are coarse
 
 
 def dress_map(map: RoadMap, scenery: Scenery) -> RoadMap:
-    """Returns the map with this scenery; the map itself for none."""
+    """Returns the map with this scenery; the map itself for none, and where it is larger than LARGEST."""
     return map if scenery is Scenery.NONE else _dress_fully(map)
 
 
 @lru_cache(maxsize=4)
 def _dress_fully(map: RoadMap) -> RoadMap:
-    """Returns a copy of the map with generated roadside, facades, signs and kerbs; cached for four maps."""
+    """Returns a copy of the map with generated roadside, facades, signs and kerbs; cached for four maps.
+
+    The map itself, with a line in the log, where it is larger than LARGEST.
+    """
+    driven = float(map.lanes.length[map.lanes.kind == LaneKind.DRIVING].sum())
+    if driven > LARGEST:
+        log.warning(
+            "map %s: no scenery beside %.0f km of driving lanes, at most %.0f km get it",
+            map.name, driven / 1000.0, LARGEST / 1000.0,
+        )  # fmt: skip
+        return map
     dressed = copy(map)
     boxes = boxes_of(things_of(map), terrain_of(map.samples))
     own = (add_facade(box) for box in map.roadside.boxes)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +14,15 @@ import shapely
 from skidpad.roads.bundled import FOLDER, bake_file, load_map
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import RoadMap
-from skidpad.roads.walkable import WalkArea, WalkMesh, _areas_of, _outline, walk_mesh
+from skidpad.roads.walkable import (
+    WalkArea,
+    WalkMesh,
+    _areas_of,
+    _convex_parts,
+    _kinds,
+    _outline,
+    walk_mesh,
+)
 
 
 def mesh_of(name: str) -> WalkMesh:
@@ -176,3 +186,35 @@ def test_towns_have_walking_surfaces_with_their_sidewalks(towns: Path, town: str
     crossings = [shapely.Polygon(c[:, :2]) for c in map.roadside.crosswalks]
     if crossings:
         assert plan(mesh, WalkArea.CROSSWALK)
+
+
+def lowest_time(work: Callable[[], object]) -> float:
+    """s of processor time, the least of three."""
+    times = []
+    for _ in range(3):
+        began = time.process_time()
+        work()
+        times.append(time.process_time() - began)
+    return min(times)
+
+
+def test_the_corners_of_other_faces_cost_a_face_nothing() -> None:
+    """Each face copied all corners found before it: most of a network of 10 x 10 km was that."""
+    ring = [(10.0 * np.cos(a), 10.0 * np.sin(a)) for a in np.linspace(0.0, 2.0 * np.pi, 40)[:-1]]
+    face = shapely.Polygon(ring)
+    few = {(float(k), 1e6): k for k in range(10)}
+    many = {(float(k), 1e6): k for k in range(1_000_000)}
+    assert lowest_time(lambda: _convex_parts(face, many)) < 5.0 * lowest_time(
+        lambda: _convex_parts(face, few)
+    )
+
+
+def test_the_kinds_of_four_times_as_many_faces_take_four_times_as_long() -> None:
+    def work(n: int) -> Callable[[], object]:
+        places = [(3.0 * (k % 50), 3.0 * (k // 50)) for k in range(n)]
+        faces = [shapely.box(x, y, x + 1.0, y + 1.0) for x, y in places]
+        surfaces = {WalkArea.ROAD: shapely.MultiPolygon(faces)}
+        assert set(_kinds(surfaces, faces)) == {WalkArea.ROAD}
+        return lambda: _kinds({WalkArea.ROAD: shapely.MultiPolygon(faces)}, faces)
+
+    assert lowest_time(work(8000)) < 9.0 * lowest_time(work(2000))  # 15 when each looks at all

@@ -7,7 +7,7 @@ strip of its own, so that a shoulder may pass above another.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -21,6 +21,8 @@ from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import RoadMap
 
 Ring = tuple[int, ...]
+Place = tuple[float, float]  # x and y in m
+Places = Mapping[int, Place]  # of vertices, by index
 
 VERGE = 4.0  # m beside the lanes of a junction on which one walks around its corners
 SIMPLIFY = 0.25  # m, root of the area by which an outline may change at a corner left out
@@ -161,11 +163,11 @@ def _town(map: RoadMap, kept: NDArray[np.bool_]) -> WalkMesh:
     surfaces = _surfaces(map, kept)
     lines = shapely.unary_union([g.boundary for g in surfaces.values()], grid_size=GRID)
     faces = [f for f in shapely.get_parts(shapely.polygonize([lines])) if f.area > SLIVER]
-    kinds = [_kind(surfaces, face) for face in faces]
+    kinds = _kinds(surfaces, faces)
     faces = [f for f, kind in zip(faces, kinds, strict=True) if kind is not None]
     areas = [kind for kind in kinds if kind is not None]
     cover = shapely.coverage_simplify(np.array(faces), SIMPLIFY)
-    corners: dict[tuple[float, float], int] = {}
+    corners: dict[Place, int] = {}
     rings: list[Ring] = []
     owned: list[WalkArea] = []
     for face, area in zip(cover, areas, strict=True):
@@ -214,10 +216,17 @@ def _outline(map: RoadMap, lane: int) -> shapely.Geometry:
     return shapely.Polygon(np.concatenate((left[:, :2], right[::-1, :2]))).buffer(GRID)
 
 
-def _kind(surfaces: dict[WalkArea, shapely.Geometry], face: shapely.Geometry) -> WalkArea | None:
-    """Returns the kind of area in which a face lies; None where it lies in none."""
-    point = face.representative_point()
-    return next((area for area, g in surfaces.items() if g.contains(point)), None)
+def _kinds(
+    surfaces: dict[WalkArea, shapely.Geometry], faces: list[shapely.Geometry]
+) -> list[WalkArea | None]:
+    """Returns the kind of area in which each face lies, the first of `surfaces` first; None where in none."""
+    points = shapely.point_on_surface(faces)
+    kinds: list[WalkArea | None] = [None] * len(faces)
+    for area, surface in reversed(surfaces.items()):
+        shapely.prepare(surface)
+        for i in np.flatnonzero(shapely.contains(surface, points)).tolist():
+            kinds[i] = area
+    return kinds
 
 
 def _heights(map: RoadMap, plan: Floats, kept: NDArray[np.bool_]) -> Floats:
@@ -227,17 +236,19 @@ def _heights(map: RoadMap, plan: Floats, kept: NDArray[np.bool_]) -> Floats:
     return np.asarray(s.z[rows[nearest]], dtype=np.float64)
 
 
-def _convex_parts(face: shapely.Geometry, corners: dict[tuple[float, float], int]) -> list[Ring]:
+def _convex_parts(face: shapely.Geometry, corners: dict[Place, int]) -> list[Ring]:
     """Returns a face cut into convex polygons of vertex indices; new vertices are entered into `corners`."""
     triangles = []
+    own: dict[int, Place] = {}
     for part in shapely.get_parts(shapely.constrained_delaunay_triangles(face)):
         points = [(float(x), float(y)) for x, y in part.exterior.coords[:3]]
         ring = tuple(corners.setdefault(p, len(corners)) for p in points)
+        own.update(zip(ring, points, strict=True))
         triangles.append(ring if part.exterior.is_ccw else ring[::-1])
-    return _merge_polygons(triangles, list(corners))
+    return _merge_polygons(triangles, own)
 
 
-def _merge_polygons(rings: list[Ring], points: list[tuple[float, float]]) -> list[Ring]:
+def _merge_polygons(rings: list[Ring], points: Places) -> list[Ring]:
     """Returns polygons joined over their longest common edges while convex and of CORNERS at most."""
     alive = dict(enumerate(rings))
     owner = {edge: i for i, ring in alive.items() for edge in _edges(ring)}
@@ -261,17 +272,20 @@ def _join_polygons(one: Ring, two: Ring, a: int, b: int) -> Ring:
     return around + (two[m:] + two[:m])[1:-1]  # and from a back to b
 
 
-def _convex(ring: Ring, points: list[tuple[float, float]]) -> bool:
+def _convex(ring: Ring, points: Places) -> bool:
     """Returns whether a ring of point indices is convex, counter-clockwise and without repetitions."""
     if len(set(ring)) != len(ring):
         return False
-    p = np.array([points[i] for i in ring])
-    d = np.roll(p, -1, axis=0) - p
-    e = np.roll(d, -1, axis=0)
-    return bool(np.all(d[:, 0] * e[:, 1] - d[:, 1] * e[:, 0] > -STRAIGHT))
+    p = [points[i] for i in ring]
+    return all(_turn(p[k - 2], p[k - 1], p[k]) > -STRAIGHT for k in range(len(p)))
 
 
-def _length(points: list[tuple[float, float]], edge: tuple[int, int]) -> float:
+def _turn(a: Place, b: Place, c: Place) -> float:
+    """Returns twice the area in m^2 of the triangle of three points, below 0 for a turn to the right."""
+    return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+
+
+def _length(points: Places, edge: tuple[int, int]) -> float:
     """Returns the length in m of the edge between two points."""
     (xa, ya), (xb, yb) = points[edge[0]], points[edge[1]]
     return float(np.hypot(xb - xa, yb - ya))

@@ -1,5 +1,8 @@
 """Traffic in town: who yields to whom, and an hour without deadlock (decision C-11)."""
 
+import dataclasses
+import time
+
 import numpy as np
 import pytest
 from msgspec.structs import replace
@@ -11,7 +14,7 @@ from skidpad.roads.bundled import load_map
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.simulation.world.lights import Lights
 from skidpad.simulation.world.traffic.manager import priority_of
-from skidpad.simulation.world.traffic.priority import STOP, YIELD
+from skidpad.simulation.world.traffic.priority import STOP, YIELD, bake_priority
 from support.runs import segment_run
 
 TOWN = load_map("town")
@@ -34,6 +37,22 @@ def conflicts(lane: int) -> dict[int, bool]:
     entry, conflict, _, _ = priority_of(TOWN)
     rows = conflict[entry["first"][lane] : entry["first"][lane] + entry["size"][lane]]
     return {int(r["other"]): bool(r["yields"]) for r in rows}
+
+
+def test_zebras_far_away_cost_the_lanes_nothing():
+    """Each lane was compared with each zebra."""
+    near = TOWN.roadside.crosswalks
+
+    def seconds(copies: int) -> float:
+        far = [np.add(zebra, (1e4 + 10.0 * k, 0.0, 0.0)) for k in range(copies) for zebra in near]
+        roadside = dataclasses.replace(TOWN.roadside, crosswalks=(*near, *far))
+        began = time.process_time()
+        rows = bake_priority(TOWN.samples, TOWN.lanes, TOWN.signals, roadside)[2]
+        taken = time.process_time() - began
+        assert rows.tolist() == priority_of(TOWN)[2].tolist()
+        return taken
+
+    assert min(seconds(250) for _ in range(3)) < 8.0 * min(seconds(0) for _ in range(3))
 
 
 @pytest.mark.req("C-210")

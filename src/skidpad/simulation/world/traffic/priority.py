@@ -10,6 +10,7 @@ from collections import defaultdict
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from skidpad.core.arrays import Floats
 from skidpad.roads.lanes import LaneKind, LaneSamples, LaneTable, SignalKind, SignalTable
@@ -189,12 +190,12 @@ def _zebras(roadside: Roadside | None) -> Floats:
 def _zebra_rows(bake: _Bake, boxes: Floats) -> NDArray[np.void]:
     """Returns where each drivable lane meets each zebra (ZEBRA); writes their numbers into the entries."""
     rows: list[tuple[float, int]] = []
+    near = _zebras_near(bake, boxes)
     for lane in range(len(bake.lanes.first)):
         bake.entry["zebra_first"][lane] = len(rows)
-        if bake.lanes.kind[lane] not in (LaneKind.DRIVING, LaneKind.RAMP):
-            continue
-        points, s = bake.points(lane)
-        for z, (x, y, h, half_l, half_w) in enumerate(boxes.tolist()):
+        for z in near.get(lane, ()):
+            x, y, h, half_l, half_w = boxes[z].tolist()
+            points, s = bake.points(lane)
             d = points - (x, y)
             along = d @ (np.cos(h), np.sin(h))
             across = d @ (-np.sin(h), np.cos(h))
@@ -203,3 +204,18 @@ def _zebra_rows(bake: _Bake, boxes: Floats) -> NDArray[np.void]:
                 rows.append((float(s[inside[0]]), z))
         bake.entry["zebras"][lane] = len(rows) - int(bake.entry["zebra_first"][lane])
     return np.array(rows, dtype=ZEBRA)
+
+
+def _zebras_near(bake: _Bake, boxes: Floats) -> dict[int, list[int]]:
+    """Returns, by drivable lane, the zebras within whose corners' distance it has a sample, ascending."""
+    near: dict[int, list[int]] = defaultdict(list)
+    if not len(boxes):
+        return near
+    drivable = np.isin(bake.lanes.kind, (LaneKind.DRIVING, LaneKind.RAMP))
+    rows = np.flatnonzero(drivable[bake.samples.lane])
+    plan = cKDTree(np.column_stack((bake.samples.x[rows], bake.samples.y[rows])))
+    reach = np.hypot(boxes[:, 3], boxes[:, 4])
+    for z, met in enumerate(plan.query_ball_point(boxes[:, :2], reach)):
+        for lane in np.unique(bake.samples.lane[rows[met]]).tolist():
+            near[lane].append(z)
+    return near

@@ -87,13 +87,13 @@ CELLS = {
     "slowdown": Cell(
         "lead_slowdown",
         ("TriggerDistance=normal(40,8,8:80)", "Deceleration=normal(4,1.2,1:9)",
-         "LeadSpeed=normal(20,0.9,10:26)", "weather.ice_thickness=0:10"),
+         "LeadSpeed=normal(20,0.75,10:26)", "weather.ice_thickness=0:10"),
         20,
     ),
     "accident": Cell(
         "front_accident",
         ("TriggerDistance=normal(45,8,8:90)", "SwerveTime=normal(1.5,0.4,0.4:4)",
-         "SecondDeceleration=normal(5,1.2,1:9)", "LeadSpeed=normal(19,0.65,10:26)",
+         "SecondDeceleration=normal(5,1.2,1:9)", "LeadSpeed=normal(19,0.38,10:26)",
          "weather.ice_thickness=0:10"),
         20,
     ),

@@ -24,6 +24,7 @@ MORE_LANES = 3  # of the array of a block, behind those of shading
 SIZE, COARSE_SIZE = 256, 512  # texels of the edges of the tiles of grains and of patches
 FINE, COARSE = 0.04, 0.3  # m, a texel of grains and one of patches
 REPAIRS = 420  # rectangles in a tile, which cover about a fifth of it
+EDGE = 1.2  # texels, the standard deviation of what softens their edges
 OCTAVES = (4, 8, 32, 64)  # texels from one value of the noise to the next
 NO_TILES = np.zeros(0, dtype=np.int8)
 
@@ -63,8 +64,11 @@ def _quantize(octaves: Sequence[Floats]) -> NDArray[np.int8]:
 
 
 def _lay_repairs(rng: np.random.Generator) -> NDArray[np.int8]:
-    """Returns (COARSE_SIZE, COARSE_SIZE) how much darker (below 0) or paler repaired rectangles are."""
-    tile = np.zeros((COARSE_SIZE, COARSE_SIZE), dtype=np.int8)
+    """Returns (COARSE_SIZE, COARSE_SIZE) how much darker (below 0) or paler repaired rectangles are.
+
+    Their edges are soft, as grains would tear a hard one (`_SPREAD`).
+    """
+    tile = np.zeros((COARSE_SIZE, COARSE_SIZE))
     for _ in range(REPAIRS):
         sizes = rng.permutation([rng.integers(12, 48), rng.integers(6, 14)])
         row, column = rng.integers(0, COARSE_SIZE, 2)
@@ -72,7 +76,8 @@ def _lay_repairs(rng: np.random.Generator) -> NDArray[np.int8]:
             (at + np.arange(n)) % COARSE_SIZE for at, n in zip((row, column), sizes, strict=True)
         )
         tile[np.ix_(rows, columns)] = rng.choice((-127, -90, -50, 60))
-    return tile
+    soft: NDArray[np.int8] = ndimage.gaussian_filter(tile, EDGE, mode="wrap").astype(np.int8)
+    return soft
 
 
 A, C, F = (np.intp((LANES + n) * BLOCK) for n in range(MORE_LANES))

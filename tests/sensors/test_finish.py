@@ -17,6 +17,7 @@ from skidpad.physics.presets import preset
 from skidpad.roads.roadside import Box, Shape, SignalHead
 from skidpad.sensors.finish.extras import ALL_EXTRAS, NO_EXTRAS, Extra
 from skidpad.sensors.finish.outline import MOST, spans
+from skidpad.sensors.finish.stars import starlight_of
 from skidpad.sensors.finish.tone import CURVE, curve_of, set_tone
 from skidpad.sensors.pictures.lighting import lighting
 from skidpad.sensors.raster.view import camera_view
@@ -79,6 +80,17 @@ def test_stars_shine_in_a_clear_night_sky_only():
     assert not changed[~sky].any()
     assert (added.rgb >= plain.rgb).all()
     assert not both(preset("rain-night"), Extra.CLOUDS)[2].any()
+
+
+def test_stars_come_after_dusk_and_no_rain_falls_from_them():
+    night = preset("clear-night")
+    share = [
+        starlight_of(w)
+        for w in (replace(night, sun_altitude_deg=sun) for sun in (3.0, -5.0, -9.0, -13.0))
+    ]
+    assert share[0] == share[1] == 0.0 < share[2] < share[3]
+    shower = replace(night, precipitation=20.0)
+    assert starlight_of(shower) == 0.0
 
 
 def test_dense_fog_hides_the_sky_as_it_hides_the_ground():

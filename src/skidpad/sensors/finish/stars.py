@@ -10,13 +10,16 @@ from skidpad.core.kernels.jit import kernel
 from skidpad.core.maths.randomness import stream
 from skidpad.core.weather import Weather
 from skidpad.sensors.finish.glow import add_light
-from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.raster.view import View
 
 COUNT = 1400  # above the horizon; some 2000 are bright enough for the eye in a dark place
 LOWEST = 0.05  # of a star's climb: those below drown in haze
 BRIGHTEST = 1.0  # light of the brightest, by eye
 LEAST = 0.02  # of starlight, below which none is drawn
+DUSK, DARK = (
+    -6.0,
+    -12.0,
+)  # deg of sun: ends of civil twilight, with the first stars, and of nautical twilight
 
 
 def _scatter() -> Floats:
@@ -33,10 +36,11 @@ def _scatter() -> Floats:
 STARS = _scatter()
 
 
-def starlight_of(weather: Weather, light: Lighting) -> float:
-    """Returns the share of the stars' light that is seen: at night, between clouds, 0 by day."""
-    share = float(light.lamps) * max(1.0 - weather.cloudiness / 60.0, 0.0)
-    return share if share > LEAST else 0.0
+def starlight_of(weather: Weather) -> float:
+    """Returns the share of the stars' light that is seen: at night, between clouds that bring no rain."""
+    dark = float(np.clip((weather.sun_altitude_deg - DUSK) / (DARK - DUSK), 0.0, 1.0))
+    share = dark * max(1.0 - weather.cloudiness / 60.0, 0.0)
+    return share if share > LEAST and weather.precipitation == 0.0 else 0.0
 
 
 @kernel

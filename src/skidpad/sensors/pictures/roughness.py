@@ -24,7 +24,7 @@ MORE_LANES = 3  # of the array of a block, behind those of shading
 SIZE, COARSE_SIZE = 256, 512  # texels of the edges of the tiles of grains and of patches
 FINE, COARSE = 0.04, 0.3  # m, a texel of grains and one of patches
 REPAIRS = 420  # rectangles in a tile, which cover about a fifth of it
-EDGE = 1.2  # texels, the standard deviation of what softens their edges
+EDGE = 0.9  # texels, the standard deviation of what softens their edges
 OCTAVES = (4, 8, 32, 64)  # texels from one value of the noise to the next
 NO_TILES = np.zeros(0, dtype=np.int8)
 

@@ -245,7 +245,8 @@ def table(out: Path) -> str:
             for method in (*OWN, *VERIFAI):
                 row = _row(out, cell, stack, method)
                 if row is not None:
-                    lines.append(f"| {cell} | {stack} | {share} | {method} | {row} |")
+                    said = share if method == "random" else ""
+                    lines.append(f"| {cell} | {stack} | {said} | {method} | {row} |")
     return "\n".join(lines)
 
 

@@ -189,12 +189,12 @@ def shade_scene(
     table: ActorTable,
     light: Lighting,
     quality: Quality = Quality.FULL,
-    snow_on_road: bool = False,
+    for_people: bool = False,
 ) -> Shading:
-    """Returns the colours of a scene and its actors; a draft has no grain. snow_on_road: for people."""
+    """Returns the colours of a scene and its actors; a draft has no grain. for_people: as in `Shading`."""
     grain = NO_GRAIN if quality is Quality.DRAFT else scene.grain
     return Shading(
-        scene.palette, table, light, snow_on_road, grain, scene.street_light, scene.leafy
+        scene.palette, table, light, for_people, grain, scene.street_light, scene.leafy
     )
 
 

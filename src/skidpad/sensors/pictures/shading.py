@@ -193,9 +193,7 @@ def shade_scene(
 ) -> Shading:
     """Returns the colours of a scene and its actors; a draft has no grain. for_people: as in `Shading`."""
     grain = NO_GRAIN if quality is Quality.DRAFT else scene.grain
-    return Shading(
-        scene.palette, table, light, for_people, grain, scene.street_light, scene.leafy
-    )
+    return Shading(scene.palette, table, light, for_people, grain, scene.street_light, scene.leafy)
 
 
 def _in_season(palette: Floats32, leafy: NDArray[np.intp], light: Lighting) -> Floats32:

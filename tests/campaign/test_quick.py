@@ -32,6 +32,7 @@ from skidpad.recording.run.ticks import copy_actors
 from skidpad.scenarios.playing.table_kernel import play_tick
 from skidpad.scenarios.shipped import NAMES
 from skidpad.sensors.object_level.objects import sense
+from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.simulation.recovery import RecoverySettings, Supervisor, find_ego, has_reason
 from skidpad.simulation.world.feel import feel_motion
 from skidpad.simulation.world.step import advance
@@ -265,6 +266,29 @@ def test_a_script_that_changes_what_is_seen_and_felt_gives_the_same_bits(tmp_pat
     assert opened.quick is not None
     # a second of it something is hidden; after the rain has begun it goes on as before
     assert 0.75 * len(one.log) < opened.quick_ticks < 0.85 * len(one.log)
+
+
+def test_lamps_that_flash_are_told_in_the_same_ticks(tmp_path: Path, monkeypatch: Any) -> None:
+    flash = private("""<AppearanceAction><LightStateAction><LightType>
+<VehicleLight vehicleLightType="brakeLights"/></LightType>
+<LightState mode="flashing"/></LightStateAction></AppearanceAction>""")
+    file = write(
+        tmp_path, stories=story(event("flash", flash, time(1.0)), actor="other"), end=6.0, minor=3,
+        init=at("ego", -1, 100, 15) + at("other", -1, 160, 12),
+    )  # fmt: skip
+    told: list[list[int]] = []
+    change = EmbeddedBackend.change
+
+    def note(backend: EmbeddedBackend, outside: Outside) -> None:
+        told[-1].append(backend.world.tick)
+        change(backend, outside)
+
+    monkeypatch.setattr(EmbeddedBackend, "change", note)
+    for drive in (drive_stepwise, drive_quickly):
+        told.append([])
+        drive(scenario_run(file))
+    assert told[0] == told[1]
+    assert len(told[0]) > 5
 
 
 @pytest.mark.parametrize("number", [0, 4])

@@ -170,6 +170,11 @@ class FileChanges:
         """Whether the file has nothing new to say, and has changed nothing since it was asked for notices."""
         return self.done == self.logged and len(self.player.scene.notices) == self.noticed
 
+    @property
+    def depends_on_time(self) -> bool:
+        """Whether surroundings may change while nothing happens in the file, as by lamps that flash."""
+        return bool(self.player.scene.lamps)
+
     def new_notices(self) -> list[str]:
         """Returns what the scenario could not do since the last call, empty mostly."""
         new = self.player.scene.notices[self.noticed :]

@@ -266,8 +266,9 @@ class QuickDrive:
         """Returns the story that the kernel is given, and how many ticks it may drive with it."""
         if self.parts.changed is None:
             return None, 1
-        player, world = self.parts.changed[1].player, self.parts.world
-        if player.table is None or not self.parts.backend.steps_alone or world.has_drivers:
+        changes, world = self.parts.changed[1], self.parts.world
+        player, is_free = changes.player, self.parts.backend.steps_alone and not world.has_drivers
+        if player.table is None or not is_free or changes.depends_on_time:
             return hold_no_story(), 1
         return player.table.held, min(most, player.count_ahead(world.tick))
 

@@ -124,9 +124,8 @@ def ask(port: int, pid: int, tokens: tuple[str, str], times: int) -> tuple[dict[
     with httpx.Client(base_url=base, timeout=120.0, follow_redirects=True) as client:
         answer = client.post("/api/v1/session", headers=_credential(tokens[0]))
         client.get(answer.json()["path"]).raise_for_status()
-        while (
-            before := processor_s(pid)
-        ) is not None:  # until what the service does by itself is done
+        while True:  # until what the service does by itself is done
+            before = processor_s(pid)
             time.sleep(2.0)
             if processor_s(pid) - before < 0.1:
                 break

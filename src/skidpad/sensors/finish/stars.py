@@ -16,10 +16,8 @@ COUNT = 1400  # above the horizon; some 2000 are bright enough for the eye in a 
 LOWEST = 0.05  # of a star's climb: those below drown in haze
 BRIGHTEST = 1.0  # light of the brightest, by eye
 LEAST = 0.02  # of starlight, below which none is drawn
-DUSK, DARK = (
-    -6.0,
-    -12.0,
-)  # deg of sun: ends of civil twilight, with the first stars, and of nautical twilight
+DUSK = -6.0  # deg of sun at the end of civil twilight, when the first stars are seen
+DARK = -12.0  # and of nautical twilight
 
 
 def _scatter() -> Floats:

@@ -31,8 +31,8 @@ def test_every_acting_attribute_exists() -> None:
 def test_vain_attributes_are_remarked_once() -> None:
     remarks = Remarks()
     blueprint = load_catalogue()["sensor.camera.rgb"]
-    remarks.remark(blueprint, {"gamma": "2.2", "fov": "60"})
+    remarks.remark(blueprint, {"calibration_constant": "16.0", "fov": "60"})
     assert not remarks.made
     for _ in range(3):
-        remarks.remark(blueprint, {"gamma": "1.0"})
-    assert remarks.made == {("sensor.camera.rgb", "attribute gamma")}
+        remarks.remark(blueprint, {"calibration_constant": "1.0"})
+    assert remarks.made == {("sensor.camera.rgb", "attribute calibration_constant")}

@@ -111,8 +111,16 @@ def slopes(
 
 
 @inner_kernel
-def develop(count: int, work: Floats32, out: NDArray[np.uint32]) -> None:
-    """Writes a block's linear light into `out` as bytes: gamma 2, clipped, packed red, green, blue, 255."""
+def develop(count: int, exposure: np.float32, work: Floats32, out: NDArray[np.uint32]) -> None:
+    """Writes a block's linear light into `out` as bytes: gamma 2, clipped, packed red, green, blue, 255.
+
+    exposure: what the light is multiplied by before.
+    """
+    if exposure != ONE:
+        for x in range(count):
+            work[R + x] *= exposure
+            work[G + x] *= exposure
+            work[B + x] *= exposure
     for x in range(count):
         r, g, b = work[R + x], work[G + x], work[B + x]
         r = np.sqrt(r if r < ONE else ONE) * _WHITE

@@ -76,8 +76,9 @@ class LensDrops:
         if self.swept <= 0.0 or self._drops.density <= 0.0:
             return
         glass = glass_of(self._camera, float(view.focal), self._drops)
-        sky = 0.5 * (light.zenith + light.horizon)
-        ground = GROUND * (light.sky + max(float(light.sun_direction[2]), 0.0) * light.sun)
+        sky = light.exposure * 0.5 * (light.zenith + light.horizon)
+        sun = max(float(light.sun_direction[2]), 0.0) * light.sun
+        ground = light.exposure * GROUND * (light.sky + sun)
         rows = view.height - view.top
         work = np.zeros((3, rows, image.shape[1]), dtype=np.float32)
         work[0] = 1.0

@@ -43,6 +43,7 @@ class Lighting(NamedTuple):
     high: bool  # it is the high beam
     lamps: float  # strength of other vehicles' lamps, 0 by day
     onset: float = 0.0  # m over which the beam rises before the lamps; 0: at once, as published
+    exposure: float = 1.0  # what all light of a picture is multiplied by
 
 
 def lighting(weather: Weather, beam: Beam | None = None, *, haze: bool = False) -> Lighting:

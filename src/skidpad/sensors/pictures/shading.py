@@ -435,7 +435,7 @@ def shade(
     """
     width = inverse.shape[1]
     work[H : H + BLOCK] = ZERO
-    clear = np.float32(light.disc)
+    clear, exposure = np.float32(light.disc), np.float32(light.exposure)
     mirrored = sun - np.float32(2.0) * (sun[0] * up[0] + sun[1] * up[1] + sun[2] * up[2]) * up
     for y in range(view.top, view.height):
         v = np.float32((y + 0.5 - view.cy) / view.focal)
@@ -475,4 +475,4 @@ def shade(
                     vary_sky(view, v, count, light, sun, tiles, work)
                 if light.disc > 0.0:
                     disc(v, count, light, sun, work)
-            develop(count, work, out[y, first : first + count])
+            develop(count, exposure, work, out[y, first : first + count])

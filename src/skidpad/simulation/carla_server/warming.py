@@ -27,7 +27,10 @@ from skidpad.physics.segments import static_segments
 from skidpad.physics.vehicle import step_vehicles
 from skidpad.sensors.physical_radar.radar import find_detections
 from skidpad.sensors.pictures.degradation import degrade
+from skidpad.sensors.pictures.film import grade
+from skidpad.sensors.pictures.fringes import split_colours
 from skidpad.sensors.pictures.lens import show_drops
+from skidpad.sensors.pictures.lens_distortion import resample
 from skidpad.sensors.pictures.spray import veil_by_spray
 from skidpad.sensors.ranging.lidar_returns import find_returns
 from skidpad.sensors.raster import rays
@@ -50,7 +53,14 @@ from skidpad.simulation.world.rows import Rows, bodies_of
 
 CONTEXT = multiprocessing.get_context("spawn")
 LIMIT = 600.0  # s that the child may take
-EFFECTS = (find_detections, find_returns, show_drops, veil_by_spray, degrade)
+EFFECTS = (
+    find_detections, find_returns, show_drops, veil_by_spray, degrade, grade, split_colours, resample
+)  # fmt: skip
+LENS = {"lens_circle_multiplier": "3.0"}
+OPTICS = {
+    "sensor.camera.rgb": LENS | {"gamma": "2.0", "chromatic_aberration_intensity": "0.5"},
+    "sensor.camera.optical_flow": LENS,
+}  # by which a client's cameras run their kernels, with pixels of four and of eight bytes
 STORM = {
     "precipitation": 100.0,
     "precipitation_deposits": 100.0,
@@ -146,11 +156,13 @@ def run_effects(options: ServerOptions) -> None:
     for one in (lead, car):
         vx, vy = FAST * np.cos(start.yaw), FAST * np.sin(start.yaw)
         episode.vehicles.set_velocity(one.id, (float(vx), float(vy), 0.0))
+    mount = Pose(2.4, 0.0, 0.5)
     for kind, names in load_acting().additions.items():
         known = served.stock.blueprint(kind).attributes
         strongest = {name: known[name].recommended[-1] for name in names}
-        mount = Pose(2.4, 0.0, 0.5)
         episode.attach(Wanted(kind, SMALL | strongest), mount, car.id, Attachment.RIGID)
+    for kind, given in OPTICS.items():
+        episode.attach(Wanted(kind, SMALL | given), mount, car.id, Attachment.RIGID)
     for _ in range(3):
         served.tick()
 

@@ -1,4 +1,4 @@
-"""What weather does to one camera's pictures, as its attributes say; by default no more than light does.
+"""What weather and exposure do to one camera's pictures, as its attributes say; by default light alone acts.
 
 The order is that of runs (`sensors.suite`): spray, drops on the glass, then the published stages. A camera
 of a client stands in no cockpit, so its whole picture is behind the glass.
@@ -30,6 +30,7 @@ from skidpad.sensors.raster.passes import UNLIMITED, Pass, Sight
 from skidpad.sensors.raster.view import View
 from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.sensing.additions import read_addition
+from skidpad.simulation.carla_server.sensing.exposure_control import ExposureControl
 from skidpad.simulation.carla_server.sensing.surroundings import Pictured
 
 
@@ -49,6 +50,7 @@ class CameraEffects:
         self._sprays = read_addition(actor, "camera_spray")
         self._weather: Weather | None = None
         self._light: Lighting | None = None  # that the camera records; None: the scene's
+        self._exposure = ExposureControl(actor)
         self._film = 0.0  # m of water on the road
         self._noise: CameraNoise | None = None
         self._drops: LensDrops | None = None
@@ -58,6 +60,7 @@ class CameraEffects:
     def move(self, weather: Weather, speed: float, dt: float) -> None:
         """Begins a reading `dt` s after the last one. speed: of the camera in m/s."""
         self._reading += 1
+        self._exposure.move(weather, dt)
         if self._wets and (self._drops is None or self._dt != dt):
             self._drops, self._dt = LensDrops(self._spec, self._seed, rain_rate(weather), dt), dt
         if self._weather is not weather:
@@ -88,20 +91,33 @@ class CameraEffects:
 
     def shading(self, scene: Pictured) -> Shading:
         """Returns the colours of the scene in the light that this camera records."""
-        if self._light is None:
+        light = self._exposed_light(scene)
+        if light is scene.shading.light:
             return scene.shading
         shading = copy(scene.shading)  # snow and lamps are the same, so all else is
-        shading.light = self._light
+        shading.light = light
         return shading
 
-    def add(self, scene: Pictured, view: View, drawn: Pass, rgb: NDArray[np.uint32]) -> None:
-        """Adds spray, drops and the published stages to a painted picture (H, W), in place."""
+    def _exposed_light(self, scene: Pictured) -> Lighting:
+        """Returns the light of the scene as this camera exposes it."""
         light = self._light or scene.shading.light
+        factor = self._exposure.factor
+        return light if factor == 1.0 else light._replace(exposure=factor)
+
+    def add_weather(
+        self, scene: Pictured, view: View, drawn: Pass, rgb: NDArray[np.uint32]
+    ) -> None:
+        """Adds spray and drops to a painted picture (H, W), in place."""
+        light = self._exposed_light(scene)
         if self._sprays:
             clouds = SprayClouds(scene.bodies, self._film).at(scene.states)
             if len(clouds):
-                veil_by_spray(view, clouds, drawn.inverse, light.horizon, rgb)
+                haze = light.horizon * np.float32(light.exposure)
+                veil_by_spray(view, clouds, drawn.inverse, haze, rgb)
         if self._drops is not None:
             self._drops.draw(view, light, rgb)
+
+    def add_noise(self, rgb: NDArray[np.uint32]) -> None:
+        """Adds the published stages to a finished picture (H, W), in place."""
         if self._noise is not None:
             self._noise.apply(self._reading, rgb)

@@ -72,7 +72,8 @@ def dynamic_vision(around: Surroundings, clock: Clock, sensor: Sensor) -> list[M
     camera = retina.camera
     scene, view = camera.look(around, clock, sensor)
     camera.paint(around, sensor.actor, scene, view)
-    rgb = camera.rgb.view(np.uint8).reshape(*camera.rgb.shape, 4)[..., :3]
+    shown = camera.finish()
+    rgb = shown.view(np.uint8).reshape(*shown.shape, 4)[..., :3]
     grey: Floats = rgb @ GREY
     light = np.log(retina.log_eps + grey / 255.0) if retina.logarithmic else grey
     events = crossings(retina, light, round(clock.elapsed * NS), sensor.rng)

@@ -65,7 +65,7 @@ def optical_flow(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Mes
     made: FlowCamera = sensor.equipment
     camera = made.camera
     scene, view = camera.look(around, clock, sensor)
-    return [(camera.head, made.memory.since(scene, view, camera.drawn).tobytes())]
+    return [(camera.head, camera.see_bent(made.memory.since(scene, view, camera.drawn)))]
 
 
 def _copy_motions(scene: Pictured) -> dict[int, tuple[Floats, Floats]]:

@@ -99,6 +99,7 @@ def textures(
         out = np.zeros_like(camera.bgra)
         if texture == Texture.SCENE_COLOUR:
             camera.paint(around, sensor.actor, scene, view)
+            camera.effects.add_noise(camera.rgb)
             pixels.bgra_from_rgb(camera.rgb, out)
         elif texture == Texture.VELOCITY:
             _velocity(made.memory.since(scene, view, camera.drawn), camera, out)

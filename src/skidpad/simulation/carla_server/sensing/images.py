@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Hashable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.protocol import wire
 from skidpad.simulation.carla_server.sensing import pixels
 from skidpad.simulation.carla_server.sensing.camera_effects import CameraEffects
+from skidpad.simulation.carla_server.sensing.optics import ColourGrading, Fringing, Lens
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
 from skidpad.simulation.carla_server.sensing.surroundings import (
     WIDEST,
@@ -52,6 +54,9 @@ class Camera:
     bgra: NDArray[np.uint8]
     head: bytes
     effects: CameraEffects
+    lens: Lens
+    fringing: Fringing
+    grading: ColourGrading
     frame: int = -1  # that is drawn
 
     def look(self, around: Surroundings, clock: Clock, sensor: Sensor) -> tuple[Pictured, View]:
@@ -77,7 +82,21 @@ class Camera:
         lamps = headlights(around.actors, actor)
         shading = self.effects.shading(scene)
         shading.paint(view, lamps, self.drawn.inverse, self.drawn.key, self.rgb)
-        self.effects.add(scene, view, self.drawn, self.rgb)
+        self.effects.add_weather(scene, view, self.drawn, self.rgb)
+
+    def finish(self) -> NDArray[np.uint32]:
+        """Returns the painted picture as the camera's optics and its sensor make it."""
+        self.fringing.apply(self.rgb)
+        self.grading.apply(self.rgb)
+        bent: NDArray[np.uint32] = self.lens.bend(self.rgb)
+        self.effects.add_noise(bent)
+        return bent
+
+    def see_bent(self, picture: NDArray[Any]) -> bytes:
+        """Returns the bytes of a picture (H, W, ...) as the lens shows it; no value is mixed with another."""
+        whole = picture.reshape(*picture.shape[:2], -1)
+        pixel = np.dtype(f"<u{whole.itemsize * whole.shape[2]}")
+        return self.lens.bend(whole.view(pixel)[..., 0]).tobytes()
 
 
 def make_camera(actor: Actor, seed: int) -> Camera:
@@ -98,6 +117,9 @@ def make_camera(actor: Actor, seed: int) -> Camera:
         np.zeros((height, width, 4), dtype=np.uint8),
         IMAGE_HEAD.pack(width, height, fov),
         CameraEffects(actor, spec, seed),
+        Lens(actor, spec),
+        Fringing(actor, spec),
+        ColourGrading(actor),
     )
 
 
@@ -116,13 +138,14 @@ def picture(around: Surroundings, clock: Clock, sensor: Sensor, camera: Camera) 
     """Renders one image of the camera's modality as a message."""
     scene, view = camera.look(around, clock, sensor)
     drawn, bgra = camera.drawn, camera.bgra
+    if camera.spec.modality is Modality.RGB:
+        camera.paint(around, sensor.actor, scene, view)
+        pixels.bgra_from_rgb(camera.finish(), bgra)
+        return camera.head, bgra.tobytes()
     if camera.spec.modality is Modality.DEPTH:
         bgra_from_inverse_depth(drawn.inverse, bgra)
     elif camera.spec.modality is Modality.SEMANTIC:
         pixels.bgra_from_labels(drawn.labels, bgra)
-    elif camera.spec.modality is Modality.INSTANCE:
-        pixels.bgra_from_instances(drawn.labels, drawn.instances, scene.ids, bgra)
     else:
-        camera.paint(around, sensor.actor, scene, view)
-        pixels.bgra_from_rgb(camera.rgb, bgra)
-    return camera.head, bgra.tobytes()
+        pixels.bgra_from_instances(drawn.labels, drawn.instances, scene.ids, bgra)
+    return camera.head, camera.see_bent(bgra)

@@ -28,7 +28,7 @@ def normals(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]
     camera: Camera = sensor.equipment
     _, view = camera.look(around, clock, sensor)
     bgra_from_normals(world_normals(view, camera.drawn.inverse), camera.bgra)
-    return [(camera.head, camera.bgra.tobytes())]
+    return [(camera.head, camera.see_bent(camera.bgra))]
 
 
 def bgra_from_normals(found: Floats, out: NDArray[np.uint8]) -> None:

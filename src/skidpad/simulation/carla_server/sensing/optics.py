@@ -1,0 +1,99 @@
+"""The optics of a client's camera: its lens, and what is done to colours after the light is on the sensor.
+
+In Unreal's order: fringes, white balance, film and gamma, then the lens, which CARLA's cameras have as a
+material over the finished picture. Attributes that have their default values change no byte and cost nothing.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.specs import CameraSpec
+from skidpad.sensors.pictures.film import GAMMA, Film, grade, tone_table, white_balance
+from skidpad.sensors.pictures.fringes import fringes_of, split_colours
+from skidpad.sensors.pictures.lens_distortion import LensShape, resample, source_pixels
+from skidpad.simulation.carla_server.actors.registry import Actor
+from skidpad.simulation.carla_server.sensing.settings import PostSettings, Settings
+
+NEUTRAL = (6500.0, 0.0)  # K and tint: by default no colour changes
+ANY = 1e6  # of coefficients that CARLA's documentation gives no range
+
+
+class Lens:
+    """The lens of one camera."""
+
+    def __init__(self, actor: Actor, spec: CameraSpec) -> None:
+        """WireError for values outside the ranges of CARLA's documentation."""
+        read = Settings(actor)
+        shape = LensShape(
+            read.number("lens_circle_falloff", 5.0, 0.0, 10.0),
+            read.number("lens_circle_multiplier", 0.0, 0.0, 10.0),
+            read.number("lens_k", -1.0, -ANY, ANY),
+            read.number("lens_kcube", 0.0, -ANY, ANY),
+            read.number("lens_x_size", 0.08, 0.0, 1.0),
+            read.number("lens_y_size", 0.08, 0.0, 1.0),
+        )
+        self._source = source_pixels(shape, spec.width, spec.height) if shape.bends else None
+        self._bent: NDArray[Any] | None = None
+
+    def bend(self, picture: NDArray[Any]) -> NDArray[Any]:
+        """Returns a picture (H, W) as the lens shows it: the same array, or one that the next call fills."""
+        if self._source is None:
+            return picture
+        if self._bent is None:
+            self._bent = np.empty_like(picture)
+        resample(self._source, picture, self._bent)
+        return self._bent
+
+
+class Fringing:
+    """Chromatic aberration of one camera."""
+
+    def __init__(self, actor: Actor, spec: CameraSpec) -> None:
+        """WireError for values outside the ranges of Unreal's documentation."""
+        read = PostSettings(actor)
+        intensity = read.number("chromatic_aberration_intensity", 0.0, 0.0, 100.0)
+        start = read.number("chromatic_aberration_offset", 0.0, 0.0, 1.0)
+        self._acts = intensity > 0.0 and start < 1.0
+        if self._acts:
+            self._fringes = fringes_of(intensity, start, spec.width, spec.height)
+            self._plain = np.empty((spec.height, spec.width), dtype=np.uint32)
+
+    def apply(self, rgb: NDArray[np.uint32]) -> None:
+        """Splits the colours of a picture (H, W), packed, in place."""
+        if self._acts:
+            self._plain[:] = rgb
+            split_colours(self._fringes, self._plain, rgb)
+
+
+class ColourGrading:
+    """White balance, film and gamma of one camera."""
+
+    def __init__(self, actor: Actor) -> None:
+        """WireError for values that no camera has."""
+        read = PostSettings(actor)
+        film = Film(
+            read.number("slope", Film().slope, 0.01, 2.0),
+            read.number("toe", Film().toe, 0.0, 1.0),
+            read.number("shoulder", Film().shoulder, 0.0, 1.0),
+            read.number("black_clip", Film().black_clip, 0.0, 1.0),
+            read.number("white_clip", Film().white_clip, 0.0, 1.0),
+        )
+        gamma = read.number("gamma", GAMMA, 0.1, 10.0)
+        balance = (
+            read.number("temp", NEUTRAL[0], 1000.0, 25_000.0),
+            read.number("tint", NEUTRAL[1], -1.0, 1.0),
+        )
+        self._acts = film != Film() or gamma != GAMMA or balance != NEUTRAL
+        if self._acts:
+            self._table = tone_table(film, gamma)
+            matrix = white_balance(*balance) if balance != NEUTRAL else np.eye(3)
+            self._matrix = matrix.astype(np.float32)
+
+    def apply(self, rgb: NDArray[np.uint32]) -> None:
+        """Changes the colours of a picture (H, W), packed, in place."""
+        if self._acts:
+            grade(self._matrix, self._table, rgb)

@@ -11,7 +11,7 @@ from skidpad.simulation.carla_server.actors.registry import Attachment
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.sensing.events_camera import EVENT, Retina, crossings
-from skidpad.simulation.carla_server.sensing.flow import compute_flow
+from skidpad.simulation.carla_server.sensing.motion import compute_flow
 from skidpad.simulation.carla_server.sensing.normals import world_normals
 from skidpad.simulation.carla_server.served import Served
 from support.carla_streams import Kept

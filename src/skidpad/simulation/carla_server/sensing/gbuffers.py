@@ -21,8 +21,8 @@ from skidpad.simulation.carla_server.actors.registry import Actor
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.protocol.streams import StreamHub
 from skidpad.simulation.carla_server.sensing import pixels
-from skidpad.simulation.carla_server.sensing.flow import Memory
 from skidpad.simulation.carla_server.sensing.images import Camera, make_camera, picture
+from skidpad.simulation.carla_server.sensing.motion import Memory
 from skidpad.simulation.carla_server.sensing.normals import (
     bgra_from_normals,
     camera_normals,

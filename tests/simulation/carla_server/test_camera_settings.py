@@ -229,6 +229,35 @@ def test_fringes_leave_blue_where_it_is() -> None:
     assert not np.array_equal(fringed[..., 2], plain[..., 2])
 
 
+BLURRED = {"motion_blur_intensity": 1.0, "motion_blur_max_distortion": 5.0}
+
+
+def test_what_moves_in_the_picture_is_blurred_and_nothing_else() -> None:
+    """The camera drives at 20 m/s behind a car as fast: road moves, the car stays in its place."""
+    stage = Stage()
+    stage.spawn("vehicle.audi.etron", Pose(14.0, 0.0))
+    variants = ({}, BLURRED, {**BLURRED, "motion_blur_intensity": 0.0},
+                {**BLURRED, "motion_blur_max_distortion": 0.0}, {"motion_blur_intensity": 0.2})  # fmt: skip
+    told = stage.run("sensor.camera.rgb", *({**SIZE, **v} for v in variants), ticks=3)
+    sharp, blurred, none, limited, short = (pictures(m)[2][..., :3] for m in told)
+    assert np.array_equal(none, sharp)
+    assert np.array_equal(limited, sharp)
+    change = np.abs(blurred - sharp).max(axis=-1)
+    assert change[-20:].mean() > 2.0 * np.abs(short - sharp).max(axis=-1)[-20:].mean()
+    assert change[-20:].mean() > 4.0 * change[45:75, 65:95].mean()
+    first = [pictures(m)[0] for m in told[:2]]
+    assert np.array_equal(*first)  # nothing is known of what was before
+
+
+def test_bloom_adds_light_beside_lamps_at_night() -> None:
+    plain, none, more = shots(
+        "sensor.camera.rgb", {}, {"bloom_intensity": 0.0}, {"bloom_intensity": 4.0}, **NIGHT
+    )
+    assert np.array_equal(plain, none)
+    assert (more >= plain).all()
+    assert more.mean() > plain.mean() + 0.5
+
+
 def test_without_post_processing_none_of_it_acts_but_the_lens() -> None:
     strange = {
         "gamma": 1.0,

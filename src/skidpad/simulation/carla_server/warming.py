@@ -31,6 +31,7 @@ from skidpad.sensors.pictures.film import grade
 from skidpad.sensors.pictures.fringes import split_colours
 from skidpad.sensors.pictures.lens import show_drops
 from skidpad.sensors.pictures.lens_distortion import resample
+from skidpad.sensors.pictures.motion_blur import smear
 from skidpad.sensors.pictures.spray import veil_by_spray
 from skidpad.sensors.ranging.lidar_returns import find_returns
 from skidpad.sensors.raster import rays
@@ -54,11 +55,13 @@ from skidpad.simulation.world.rows import Rows, bodies_of
 CONTEXT = multiprocessing.get_context("spawn")
 LIMIT = 600.0  # s that the child may take
 EFFECTS = (
-    find_detections, find_returns, show_drops, veil_by_spray, degrade, grade, split_colours, resample
+    find_detections, find_returns, show_drops, veil_by_spray, degrade, grade, split_colours, resample,
+    smear,
 )  # fmt: skip
 LENS = {"lens_circle_multiplier": "3.0"}
 OPTICS = {
-    "sensor.camera.rgb": LENS | {"gamma": "2.0", "chromatic_aberration_intensity": "0.5"},
+    "sensor.camera.rgb": LENS
+    | {"gamma": "2.0", "chromatic_aberration_intensity": "0.5", "motion_blur_intensity": "1.0"},
     "sensor.camera.optical_flow": LENS,
 }  # by which a client's cameras run their kernels, with pixels of four and of eight bytes
 STORM = {

@@ -72,7 +72,7 @@ def dynamic_vision(around: Surroundings, clock: Clock, sensor: Sensor) -> list[M
     camera = retina.camera
     scene, view = camera.look(around, clock, sensor)
     camera.paint(around, sensor.actor, scene, view)
-    shown = camera.finish()
+    shown = camera.finish(scene, view, sensor.share(clock))
     rgb = shown.view(np.uint8).reshape(*shown.shape, 4)[..., :3]
     grey: Floats = rgb @ GREY
     light = np.log(retina.log_eps + grey / 255.0) if retina.logarithmic else grey

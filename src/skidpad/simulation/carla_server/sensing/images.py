@@ -21,7 +21,7 @@ from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.protocol import wire
 from skidpad.simulation.carla_server.sensing import pixels
 from skidpad.simulation.carla_server.sensing.camera_effects import CameraEffects
-from skidpad.simulation.carla_server.sensing.optics import ColourGrading, Fringing, Lens
+from skidpad.simulation.carla_server.sensing.optics import ColourOptics, Lens
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
 from skidpad.simulation.carla_server.sensing.surroundings import (
     WIDEST,
@@ -55,8 +55,7 @@ class Camera:
     head: bytes
     effects: CameraEffects
     lens: Lens
-    fringing: Fringing
-    grading: ColourGrading
+    optics: ColourOptics
     frame: int = -1  # that is drawn
 
     def look(self, around: Surroundings, clock: Clock, sensor: Sensor) -> tuple[Pictured, View]:
@@ -84,10 +83,9 @@ class Camera:
         shading.paint(view, lamps, self.drawn.inverse, self.drawn.key, self.rgb)
         self.effects.add_weather(scene, view, self.drawn, self.rgb)
 
-    def finish(self) -> NDArray[np.uint32]:
-        """Returns the painted picture as the camera's optics and its sensor make it."""
-        self.fringing.apply(self.rgb)
-        self.grading.apply(self.rgb)
+    def finish(self, scene: Pictured, view: View, dt: float) -> NDArray[np.uint32]:
+        """Returns the painted picture as optics and sensor of the camera make it, `dt` s after the last."""
+        self.optics.apply(scene, view, self.drawn, dt, self.rgb)
         bent: NDArray[np.uint32] = self.lens.bend(self.rgb)
         self.effects.add_noise(bent)
         return bent
@@ -118,8 +116,7 @@ def make_camera(actor: Actor, seed: int) -> Camera:
         IMAGE_HEAD.pack(width, height, fov),
         CameraEffects(actor, spec, seed),
         Lens(actor, spec),
-        Fringing(actor, spec),
-        ColourGrading(actor),
+        ColourOptics(actor, spec),
     )
 
 
@@ -140,7 +137,8 @@ def picture(around: Surroundings, clock: Clock, sensor: Sensor, camera: Camera) 
     drawn, bgra = camera.drawn, camera.bgra
     if camera.spec.modality is Modality.RGB:
         camera.paint(around, sensor.actor, scene, view)
-        pixels.bgra_from_rgb(camera.finish(), bgra)
+        finished = camera.finish(scene, view, sensor.share(clock))
+        pixels.bgra_from_rgb(finished, bgra)
         return camera.head, bgra.tobytes()
     if camera.spec.modality is Modality.DEPTH:
         bgra_from_inverse_depth(drawn.inverse, bgra)

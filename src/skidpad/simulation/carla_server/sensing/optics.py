@@ -1,7 +1,8 @@
 """The optics of a client's camera: its lens, and what is done to colours after the light is on the sensor.
 
-In Unreal's order: fringes, white balance, film and gamma, then the lens, which CARLA's cameras have as a
-material over the finished picture. Attributes that have their default values change no byte and cost nothing.
+In Unreal's order: motion blur, bloom, fringes, white balance, film and gamma, then the lens, which CARLA's
+cameras have as a material over the finished picture. Attributes that have their default values change no byte
+and cost nothing.
 """
 
 from __future__ import annotations
@@ -12,12 +13,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.specs import CameraSpec
+from skidpad.sensors.pictures.bloom import add_bloom
 from skidpad.sensors.pictures.film import GAMMA, Film, grade, tone_table, white_balance
 from skidpad.sensors.pictures.fringes import fringes_of, split_colours
 from skidpad.sensors.pictures.lens_distortion import LensShape, resample, source_pixels
+from skidpad.sensors.pictures.motion_blur import FRAME, smear
+from skidpad.sensors.raster.passes import Pass
+from skidpad.sensors.raster.view import View
 from skidpad.simulation.carla_server.actors.registry import Actor
+from skidpad.simulation.carla_server.sensing.motion import Memory
 from skidpad.simulation.carla_server.sensing.settings import PostSettings, Settings
+from skidpad.simulation.carla_server.sensing.surroundings import Pictured
 
+MOTION_BLUR = (
+    0.45,
+    0.35,
+)  # intensity and percent of the width: by default pictures are of one moment
+BLOOM = 0.675  # by default nothing shines beside itself
 NEUTRAL = (6500.0, 0.0)  # K and tint: by default no colour changes
 ANY = 1e6  # of coefficients that CARLA's documentation gives no range
 
@@ -47,6 +59,29 @@ class Lens:
             self._bent = np.empty_like(picture)
         resample(self._source, picture, self._bent)
         return self._bent
+
+
+class MotionBlur:
+    """Motion blur of one camera."""
+
+    def __init__(self, actor: Actor, spec: CameraSpec) -> None:
+        """WireError for values that no camera has."""
+        read = PostSettings(actor)
+        given = (
+            read.number("motion_blur_intensity", MOTION_BLUR[0], 0.0, 1.0),
+            read.number("motion_blur_max_distortion", MOTION_BLUR[1], 0.0, 100.0),
+        )
+        self._exposed, self._longest = FRAME * given[0], 0.01 * spec.width * given[1]
+        self._acts = given != MOTION_BLUR and min(given) > 0.0
+        self._memory = Memory()
+
+    def apply(
+        self, scene: Pictured, view: View, drawn: Pass, dt: float, rgb: NDArray[np.uint32]
+    ) -> None:
+        """Blurs a picture (H, W), packed, in place; dt: s since the last one."""
+        if self._acts:
+            flow = self._memory.since(scene, view, drawn)
+            smear(flow, self._exposed / dt, self._longest, rgb.copy(), rgb)
 
 
 class Fringing:
@@ -97,3 +132,23 @@ class ColourGrading:
         """Changes the colours of a picture (H, W), packed, in place."""
         if self._acts:
             grade(self._matrix, self._table, rgb)
+
+
+class ColourOptics:
+    """All that happens to the colours of one camera before its lens bends the picture."""
+
+    def __init__(self, actor: Actor, spec: CameraSpec) -> None:
+        """WireError for values that no camera has."""
+        self._blur, self._fringing = MotionBlur(actor, spec), Fringing(actor, spec)
+        self._grading = ColourGrading(actor)
+        self._bloom = PostSettings(actor).number("bloom_intensity", BLOOM, 0.0, 8.0)
+
+    def apply(
+        self, scene: Pictured, view: View, drawn: Pass, dt: float, rgb: NDArray[np.uint32]
+    ) -> None:
+        """Changes a painted picture (H, W), packed, in place; dt: s since the last one."""
+        self._blur.apply(scene, view, drawn, dt, rgb)
+        if self._bloom not in (0.0, BLOOM):
+            add_bloom(self._bloom, rgb)
+        self._fringing.apply(rgb)
+        self._grading.apply(rgb)

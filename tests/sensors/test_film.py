@@ -8,6 +8,7 @@ from skidpad.sensors.pictures.film import (
     daylight_colour,
     film_curve,
     grade,
+    replace_levels,
     tone_table,
     white_balance,
 )
@@ -83,6 +84,12 @@ def test_grading_is_the_table_and_the_matrix():
     same = picture.copy()
     grade(np.eye(3, dtype=np.float32), LEVELS.astype(np.float32), same)
     assert np.array_equal(same, picture)
+    for film in (Film(), Film(slope=1.0, toe=0.3)):
+        graded, replaced = picture.copy(), picture.copy()
+        grade(np.eye(3, dtype=np.float32), tone_table(film, 1.8), graded)
+        levels = np.rint(tone_table(film, 1.8)).astype(np.uint8)
+        replace_levels(levels, replaced.view(np.uint8).reshape(2, 256, 4))
+        assert np.array_equal(graded, replaced)
     halved = picture.copy()
     matrix = np.diag([0.25, 1.0, 1.0]).astype(np.float32)
     grade(matrix, LEVELS.astype(np.float32), halved)

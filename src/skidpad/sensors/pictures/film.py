@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.arrays import Floats, Floats32
+from skidpad.core.arrays import Bytes, Floats, Floats32
 from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.sensors.pictures.packing import pack, rounded, unpack
 
@@ -176,3 +176,14 @@ def grade(matrix: Floats32, table: Floats32, out: NDArray[np.uint32]) -> None:
             blue = matrix[2, 0] * r + matrix[2, 1] * g + matrix[2, 2] * b
             red, green, blue = _look_up(red, table), _look_up(green, table), _look_up(blue, table)
             row[x] = pack(rounded(red), rounded(green), rounded(blue))
+
+
+@kernel
+def replace_levels(levels: Bytes, out: Bytes) -> None:
+    """Replaces red, green and blue of a picture `out` (H, W, 4) by what `levels` (256,) has for each."""
+    for y in range(out.shape[0]):
+        row = out[y]
+        for x in range(row.shape[0]):
+            row[x, 0] = levels[row[x, 0]]
+            row[x, 1] = levels[row[x, 1]]
+            row[x, 2] = levels[row[x, 2]]

@@ -27,7 +27,7 @@ from skidpad.physics.segments import static_segments
 from skidpad.physics.vehicle import step_vehicles
 from skidpad.sensors.physical_radar.radar import find_detections
 from skidpad.sensors.pictures.degradation import degrade
-from skidpad.sensors.pictures.film import grade
+from skidpad.sensors.pictures.film import grade, replace_levels
 from skidpad.sensors.pictures.fringes import split_colours
 from skidpad.sensors.pictures.lens import show_drops
 from skidpad.sensors.pictures.lens_distortion import resample
@@ -55,13 +55,14 @@ from skidpad.simulation.world.rows import Rows, bodies_of
 CONTEXT = multiprocessing.get_context("spawn")
 LIMIT = 600.0  # s that the child may take
 EFFECTS = (
-    find_detections, find_returns, show_drops, veil_by_spray, degrade, grade, split_colours, resample,
-    smear,
+    find_detections, find_returns, show_drops, veil_by_spray, degrade, grade, replace_levels,
+    split_colours, resample, smear,
 )  # fmt: skip
 LENS = {"lens_circle_multiplier": "3.0"}
 OPTICS = {
     "sensor.camera.rgb": LENS
     | {"gamma": "2.0", "chromatic_aberration_intensity": "0.5", "motion_blur_intensity": "1.0"},
+    "sensor.camera.dvs": {"temp": "5000.0"},
     "sensor.camera.optical_flow": LENS,
 }  # by which a client's cameras run their kernels, with pixels of four and of eight bytes
 STORM = {

@@ -12,9 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.arrays import Floats32
 from skidpad.core.specs import CameraSpec
 from skidpad.sensors.pictures.bloom import add_bloom
-from skidpad.sensors.pictures.film import GAMMA, Film, grade, tone_table, white_balance
+from skidpad.sensors.pictures.film import (
+    GAMMA,
+    Film,
+    grade,
+    replace_levels,
+    tone_table,
+    white_balance,
+)
 from skidpad.sensors.pictures.fringes import fringes_of, split_colours
 from skidpad.sensors.pictures.lens_distortion import LensShape, resample, source_pixels
 from skidpad.sensors.pictures.motion_blur import FRAME, smear
@@ -123,14 +131,19 @@ class ColourGrading:
             read.number("tint", NEUTRAL[1], -1.0, 1.0),
         )
         self._acts = film != Film() or gamma != GAMMA or balance != NEUTRAL
-        if self._acts:
-            self._table = tone_table(film, gamma)
-            matrix = white_balance(*balance) if balance != NEUTRAL else np.eye(3)
-            self._matrix = matrix.astype(np.float32)
+        self._table = tone_table(film, gamma)
+        self._levels = np.rint(self._table).astype(np.uint8)
+        self._matrix: Floats32 | None = None  # None: white stays as it is
+        if balance != NEUTRAL:
+            self._matrix = white_balance(*balance).astype(np.float32)
 
     def apply(self, rgb: NDArray[np.uint32]) -> None:
         """Changes the colours of a picture (H, W), packed, in place."""
-        if self._acts:
+        if not self._acts:
+            return
+        if self._matrix is None:
+            replace_levels(self._levels, rgb.view(np.uint8).reshape(*rgb.shape, 4))
+        else:
             grade(self._matrix, self._table, rgb)
 
 

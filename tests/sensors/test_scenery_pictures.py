@@ -13,12 +13,13 @@ from skidpad.physics.presets import preset
 from skidpad.roads.bundled import load_map
 from skidpad.roads.roadside import Box, Shape
 from skidpad.scenery.dressing import dress_map
-from skidpad.sensors.finish.extras import ALL_EXTRAS
+from skidpad.sensors.finish.extras import ALL_EXTRAS, Extra
 from skidpad.sensors.pictures.blocks import BLOCK, COLUMNS, LANES, R, W, gather
 from skidpad.sensors.pictures.lane_wear import soften_border
 from skidpad.sensors.pictures.roughness import COARSE_SIZE, SIZE, make_tiles
 from skidpad.sensors.pictures.settled_snow import NOTHING_SETTLES
-from skidpad.sensors.scene.grain import NO_GRAIN
+from skidpad.sensors.scene.grain import BENEATH, NO_GRAIN
+from skidpad.sensors.scene.grain import COLUMNS as GRAIN_COLUMNS
 from skidpad.sensors.scene.materials import ASPHALTS, FIELDS, MATERIALS, Material, base_palette
 from skidpad.sensors.scene.mesh import Mesh
 from skidpad.sensors.scene.road_mesh import road_pieces
@@ -26,7 +27,7 @@ from skidpad.sensors.scene.shapes import shape_levels
 from skidpad.sensors.scene.static import build_scene, ground_pieces
 from skidpad.sensors.scene.street_light import NO_STREET_LIGHT, street_light_of
 from skidpad.sensors.suite import PixelSettings, PixelSuite
-from support.sensors.worlds import states_at, table_of
+from support.sensors.worlds import states_at, straight, table_of
 
 EYE = Pose(0.5, 0.0, 1.5)
 
@@ -72,7 +73,7 @@ def test_a_street_shows_buildings_trees_and_posts_that_it_did_not_have() -> None
 
 def test_grain_changes_colours_only() -> None:
     suite, rgb, labels, depth = look(Scenery.FULL, 3, 0.5)
-    assert suite.shading._grain.shape == (256, 5)
+    assert suite.shading._grain.shape == (256, GRAIN_COLUMNS)
     suite.shading._grain = NO_GRAIN
     ego = suite._ego
     plain = suite.observe(1, states_at([(ego.x, ego.y, ego.z, ego.yaw)]), {}).images
@@ -85,7 +86,7 @@ def test_grain_changes_colours_only() -> None:
 def test_without_scenery_there_is_no_grain() -> None:
     road_map = load_map("town")
     scene = build_scene(road_map.samples, road_map.lanes, road_map.roadside)
-    assert scene.grain.shape == (0, 5)
+    assert scene.grain.shape == (0, GRAIN_COLUMNS)
 
 
 def test_every_shape_stays_in_its_box_and_farther_levels_have_no_more_triangles() -> None:
@@ -256,3 +257,38 @@ def test_street_lamps_are_seen_shining_at_night_and_not_by_day() -> None:
         near = np.hypot(places[:, 0] - suite._ego.x, places[:, 1] - suite._ego.y) < 100.0
         assert near.any()
         assert on[near].all() if shining else not on.any()
+
+
+def test_near_the_camera_no_grain_is_seen_as_a_square() -> None:
+    """From 1 m above the road 4 cm are 8 px: a square of one colour would show as a run of them."""
+    _, rgb, labels, _ = look(Scenery.FULL, 3, 0.5, eye=Pose(3.0, 0.0, 1.0, pitch=np.pi / 2))
+    road = labels == SemanticClass.ROAD
+    inside = road[:, 1:] & road[:, :-1]
+    assert inside.mean() > 0.9
+    same = (np.diff(rgb.astype(int), axis=1) == 0).all(axis=2)
+    assert same[inside].mean() < 0.5
+
+
+def test_leaves_are_darker_beneath_and_snow_lies_on_the_sides_of_conifers() -> None:
+    def crown(shape: Shape, weather: str) -> tuple[PixelSuite, np.ndarray, np.ndarray]:
+        box = Box(SemanticClass.VEGETATION, 112.0, -8.0, 2.0, 0.0, 6.0, 6.0, 7.0, rgb=(60, 90, 45),
+                  shape=shape)  # fmt: skip
+        cameras = [CameraSpec("rgb", Modality.RGB, 400, 300, 75.0, EYE)]
+        settings = PixelSettings(camera_effect=False, extras=frozenset({Extra.SNOW}))
+        world = straight(300, boxes=[box])
+        suite = PixelSuite(world, table_of([]), cameras, preset(weather), settings)
+        rgb = suite.observe(0, states_at([(100.0, -8.0, 0.0, 0.0)]), {}).images["rgb"].rgb
+        seen = (suite._pass_of["rgb"].key & 255) == Material.FIRST_FREE
+        return suite, rgb.astype(float).mean(axis=2), seen
+
+    suite, shaded, seen = crown(Shape.CROWN, "clear-noon")
+    suite.shading._grain[:, BENEATH] = 0.0
+    plain = suite.observe(1, states_at([(100.0, -8.0, 0.0, 0.0)]), {}).images["rgb"].rgb
+    left = shaded / np.maximum(plain.astype(float).mean(axis=2), 1.0)
+    rows = np.flatnonzero(seen.any(axis=1))
+    quarter = len(rows) // 4
+    ends = (rows[:quarter], rows[-quarter:])
+    above, beneath = (np.median(left[part][seen[part]]) for part in ends)
+    assert beneath < 0.9 * above
+    _, light, seen = crown(Shape.CONE, "snow")
+    assert 0.15 < (light[seen] > 140.0).mean() < 0.9, "white and green"

@@ -15,15 +15,38 @@ from scipy import ndimage
 
 from skidpad.core.arrays import Floats, Floats32
 from skidpad.core.kernels.jit import inner_kernel
-from skidpad.sensors.pictures.blocks import BLOCK, LANES, ONE, ZERO, B, G, R, U, W, end_of_run
+from skidpad.sensors.pictures.blocks import (
+    BLOCK,
+    GX,
+    GY,
+    LANES,
+    ONE,
+    ZERO,
+    B,
+    G,
+    R,
+    U,
+    W,
+    end_of_run,
+)
 from skidpad.sensors.pictures.lane_wear import soften_border
 from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.raster.view import View
+from skidpad.sensors.scene.grain import (
+    BENEATH,
+    GRAINS,
+    GRAZING,
+    NEAR,
+    PATCHES,
+    REPAIRS,
+    TEXEL,
+    TINTS,
+)
 
 MORE_LANES = 3  # of the array of a block, behind those of shading
 SIZE, COARSE_SIZE = 256, 512  # texels of the edges of the tiles of grains and of patches
-FINE, COARSE = 0.04, 0.3  # m, a texel of grains and one of patches
-REPAIRS = 420  # rectangles in a tile, which cover about a fifth of it
+COARSE = 0.3  # m, a texel of patches; that of grains is the material's
+RECTANGLES = 420  # rectangles in a tile, which cover about a fifth of it
 EDGE = 0.9  # texels, the standard deviation of what softens their edges
 OCTAVES = (4, 8, 32, 64)  # texels from one value of the noise to the next
 NO_TILES = np.zeros(0, dtype=np.int8)
@@ -69,7 +92,7 @@ def _lay_repairs(rng: np.random.Generator) -> NDArray[np.int8]:
     Their edges are soft, as grains would tear a hard one (`_SPREAD`).
     """
     tile = np.zeros((COARSE_SIZE, COARSE_SIZE))
-    for _ in range(REPAIRS):
+    for _ in range(RECTANGLES):
         sizes = rng.permutation([rng.integers(12, 48), rng.integers(6, 14)])
         row, column = rng.integers(0, COARSE_SIZE, 2)
         rows, columns = (
@@ -85,9 +108,9 @@ _PATCHES, _STEP = np.uint64(SIZE * SIZE), np.uint64(4)
 _TINT, _REPAIR = np.uint64(1), np.uint64(2)
 _SIZE, _COARSE_SIZE = np.float32(SIZE), np.float32(COARSE_SIZE)
 _PER_BYTE = np.float32(1.0 / 127.0)
-_PER_FINE, _PER_COARSE = np.float32(1.0 / FINE), np.float32(1.0 / COARSE)
+_PER_COARSE = np.float32(1.0 / COARSE)
 _LEAN_X, _LEAN_Y = np.float32(0.37), np.float32(0.91)  # m per m of height, so that walls vary too
-_NEAR = np.float32(9.0)  # m beyond which grains fade
+_WIDE = np.float32(2.5)  # px of a texel of grains, from which on one of half its size is taken
 _FORE, _EVEN = np.float32(3.0), np.float32(0.42)  # m; rough ground is brighter at grazing angles
 _SPREAD = np.float32(0.35)  # m by which grains blur the edges of patches
 _FARTHEST = np.float32(1e-5)
@@ -97,9 +120,15 @@ _VEIL = np.float32(1.0 / 70.0)  # texels of a layer of veils per metre of its he
 _SOFT = np.float32(6.0)  # veils reach their full strength this steeply above the horizon
 _AROUND, _CLOSE, _DEEP = np.float32(0.26), np.float32(0.26), np.float32(0.32)
 _VEILED, _TINTED, _WARM = np.float32(0.28), np.float32(0.11), np.float32(0.08)
-_HALF = np.float32(0.5)
+_HALF, _TWO, _FOUR, _EIGHT = np.float32(0.5), np.float32(2.0), np.float32(4.0), np.float32(8.0)
 _COOL = np.float32(0.14)  # of what grazing light adds: it comes from the sky, not from the sun
 _GREEN = np.float32(0.35)
+_TINY = np.float32(1e-12)
+_SIDE, _STEEPLY = (
+    np.float32(0.45),
+    np.float32(1.4),
+)  # of the dark beneath: on what stands upright, per climb
+_TURNED = np.float32(0.55)  # by which grains of leaves turn them up or down
 _SHEEN = np.float32(0.5)  # of rough ground towards the sun's image, by eye
 
 
@@ -117,13 +146,13 @@ def _texel(a: np.float32, b: np.float32, size: np.float32) -> np.float32:
 @inner_kernel
 def roughen(
     view: View, v: np.float32, count: int, keys: NDArray[np.int32], table: Floats32, grain: Floats32,
-    tiles: NDArray[np.int8], clear: np.float32, mirrored: Floats32, work: Floats32,
+    tiles: NDArray[np.int8], clear: np.float32, up: Floats32, mirrored: Floats32, work: Floats32,
 ) -> None:  # fmt: skip
     """Changes the colours of a block's surfaces in `work` by where they lie and how they lie to the sun.
 
-    v: m down per m ahead of the block's row; clear: of 1, light of the sun's disc; mirrored: (3,) towards the
-    sun's image below the ground, camera axes; table: colours as in `gather`; grain: (256, 5) strengths
-    by material; tiles: `make_tiles`.
+    v: m down per m ahead of the block's row; clear: of 1, light of the sun's disc; up, mirrored: (3,) camera
+    axes, the latter towards the sun's image below the ground; table: colours as in `gather`; grain, tiles:
+    `grain_table`, `make_tiles`. Near the camera grains are finer, so that no texel is seen as a square.
     """
     r = view.rotation
     x_u, x_1 = np.float32(r[0, 0]), np.float32(r[1, 0]) * v + np.float32(r[2, 0])
@@ -138,8 +167,13 @@ def roughen(
     x, begin, focal = 0, 0, np.float32(view.focal)
     while x < count:
         m, end = keys[x] & 255, end_of_run(keys, x)
-        grains, patches, tints, repairs = grain[m, 0], grain[m, 1], grain[m, 2], grain[m, 3]
-        graze = grain[m, 4]
+        grains, patches, tints, repairs = (
+            grain[m, GRAINS],
+            grain[m, PATCHES],
+            grain[m, TINTS],
+            grain[m, REPAIRS],
+        )
+        graze, texel, reach = grain[m, GRAZING], grain[m, TEXEL], grain[m, NEAR]
         per_patch, per_repair = patches * _PER_BYTE, repairs * _PER_BYTE
         if x > 0:
             soften_border(focal, begin, x, end, keys, table, work)
@@ -147,11 +181,15 @@ def roughen(
         x = end
         if patches == ZERO:
             continue
+        wide, per = focal * texel / _WIDE, ONE / texel
         for n in range(size):  # reading a tile may not stand in a loop that shall be vectorised
             u, w = run[U + n], run[W + n]
             z = ONE / (w if w > _FARTHEST else _FARTHEST)
             run[A + n], run[C + n] = a_0 + z * (a_u * u + a_1), b_0 + z * (b_u * u + b_1)
-            run[F + n] = _texel(run[A + n] * _PER_FINE, run[C + n] * _PER_FINE, _SIZE)
+            fine = per if w * wide < ONE else _TWO * per
+            fine = fine if w * wide < _TWO else _FOUR * per
+            fine = fine if w * wide < _FOUR else _EIGHT * per
+            run[F + n] = _texel(run[A + n] * fine, run[C + n] * fine, _SIZE)
         for n in range(size):
             run[F + n] = _PER_BYTE * tiles[np.uint64(run[F + n])]
         for n in range(size):
@@ -164,7 +202,7 @@ def roughen(
             run[A + n] = per_patch * tiles[at] + per_repair * tiles[at + _REPAIR]
             run[C + n] = _PER_BYTE * tiles[at + _TINT]
         for n in range(size):
-            fade = _NEAR * run[W + n]
+            fade = reach * run[W + n]
             fade = fade if fade < ONE else ONE
             near = _FORE * run[W + n]
             near = _EVEN - near / (ONE + near)
@@ -181,6 +219,29 @@ def roughen(
             run[R + n] *= share + hue
             run[G + n] *= share + _GREEN * hue
             run[B + n] *= share - hue
+        if grain[m, BENEATH] > ZERO:
+            _dim_beneath(v, size, grain[m, BENEATH], up, run)
+
+
+@inner_kernel
+def _dim_beneath(
+    v: np.float32, size: int, beneath: np.float32, up: Floats32, run: Floats32
+) -> None:
+    """Takes light from a run's surfaces, up to `beneath`, the more they look down, unevenly as leaves do.
+
+    up: (3,) camera axes. Lane F of the run has its grains.
+    """
+    up0, up1, up2 = up[0], up[1], up[2]
+    for n in range(size):
+        u, gx, gy = run[U + n], run[GX + n], run[GY + n]
+        gz = run[W + n] - u * gx - v * gy
+        n_up = -(gx * up0 + gy * up1 + gz * up2) / np.sqrt(gx * gx + gy * gy + gz * gz + _TINY)
+        down = _SIDE - _STEEPLY * n_up - _TURNED * run[F + n]
+        down = down if down > ZERO else ZERO
+        left = ONE - beneath * (down if down < ONE else ONE)
+        run[R + n] *= left
+        run[G + n] *= left
+        run[B + n] *= left
 
 
 @inner_kernel

@@ -41,11 +41,11 @@ from skidpad.sensors.pictures.blocks import (
 )
 from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.pictures.roughness import MORE_LANES, NO_TILES, make_tiles, roughen, vary_sky
-from skidpad.sensors.pictures.settled_snow import NOTHING_SETTLES, settle_snow
+from skidpad.sensors.pictures.settled_snow import NOTHING_SETTLES, SHARE, STEEP, settle_snow
 from skidpad.sensors.pictures.sky import disc, sky
 from skidpad.sensors.pictures.street_lamps import add_street_light
 from skidpad.sensors.raster.view import View
-from skidpad.sensors.scene.grain import NO_GRAIN
+from skidpad.sensors.scene.grain import NO_GRAIN, TINTS
 from skidpad.sensors.scene.materials import (
     ACTOR_PAINTED,
     ASPHALTS,
@@ -75,6 +75,10 @@ ICE_LEFT = 0.62  # share of a driven road that ice hides; by eye
 ICE_IN_TRACKS = 0.44  # and of it where wheels roll
 FROSTED = 0.5  # share of snow's white that hoar frost has, wherever there is ice; by eye
 SETTLED = 0.92  # share of what looks up, off the road, that snow covers
+STEEPER, TWIGS_STEEPER = (
+    0.25,
+    0.08,
+)  # of 1, how much less evergreens and bare crowns must look up for it
 STAINED = 0.06  # share of the tints of surfaces that is left on snow
 GLOSSY = (Material.PAINT, Material.GLASS, Material.LAMP_GLASS)
 WET_DARKENING = 0.52  # of asphalt's albedo; Lekner and Dorf (1988) give 0.4 to 0.7
@@ -101,16 +105,17 @@ class Shading:
         grain: Floats32 = NO_GRAIN,
         street_light: StreetLight = NO_STREET_LIGHT,
         leafy: NDArray[np.intp] = NO_LEAVES,
+        green: NDArray[np.intp] = NO_LEAVES,
     ) -> None:
         """for_people: what a stack reads has snow beside the road only, and no ice.
 
-        grain, street_light, leafy: of the scene (`StaticScene`).
+        grain, street_light, leafy, green: of the scene (`StaticScene`).
         """
         if not for_people:
             light = light._replace(ice=0.0)
         self._street_light = street_light
         self._grain = _grain_in(light, grain, for_people)
-        self._settling = _settling(light) if for_people else NOTHING_SETTLES
+        self._settling = _settling(light, leafy, green) if for_people else NOTHING_SETTLES
         self._tiles = make_tiles() if grain.size else NO_TILES
         self.light = light
         self._table = _look_up(_in_season(palette, leafy, light), table, light, for_people)
@@ -193,7 +198,8 @@ def shade_scene(
 ) -> Shading:
     """Returns the colours of a scene and its actors; a draft has no grain. for_people: as in `Shading`."""
     grain = NO_GRAIN if quality is Quality.DRAFT else scene.grain
-    return Shading(scene.palette, table, light, for_people, grain, scene.street_light, scene.leafy)
+    plants = (scene.leafy, scene.green)
+    return Shading(scene.palette, table, light, for_people, grain, scene.street_light, *plants)
 
 
 def _in_season(palette: Floats32, leafy: NDArray[np.intp], light: Lighting) -> Floats32:
@@ -248,17 +254,22 @@ def _grain_in(light: Lighting, grain: Floats32, for_people: bool) -> Floats32:
     left = grain * np.float32(1.0 - 0.6 * light.snow)
     if grain.size:
         white = [*SNOWY, *(SNOWED if for_people else ())]
-        left[white, 2] *= np.float32(1.0 - (1.0 - STAINED) * max(light.snow, light.ice))
+        left[white, TINTS] *= np.float32(1.0 - (1.0 - STAINED) * max(light.snow, light.ice))
     result: Floats32 = left
     return result
 
 
-def _settling(light: Lighting) -> Floats32:
-    """Returns (256,) shares of each material of the map that snow or frost covers; empty without both."""
+def _settling(light: Lighting, leafy: NDArray[np.intp], green: NDArray[np.intp]) -> Floats32:
+    """Returns (256, 2) how snow or frost lies on each material of the map; empty without both.
+
+    leafy, green: materials of bare crowns, and of what keeps its leaves or needles.
+    """
     if _whiteness(light) <= 0.0:
         return NOTHING_SETTLES
-    shares = np.full(MATERIALS, SETTLED * _whiteness(light), dtype=np.float32)
-    shares[[*SNOWY, *SNOWED, *EMISSIVE, Material.LAMP_HOUSING, Material.LAMP_DARK]] = 0.0
+    shares = np.zeros((MATERIALS, 2), dtype=np.float32)
+    shares[:, SHARE] = SETTLED * _whiteness(light)
+    shares[leafy, STEEP], shares[green, STEEP] = TWIGS_STEEPER, STEEPER
+    shares[[*SNOWY, *SNOWED, *EMISSIVE, Material.LAMP_HOUSING, Material.LAMP_DARK], SHARE] = 0.0
     return shares
 
 
@@ -436,6 +447,7 @@ def shade(
     width = inverse.shape[1]
     work[H : H + BLOCK] = ZERO
     clear, exposure = np.float32(light.disc), np.float32(light.exposure)
+    uneven = ONE if grain.shape[0] > 0 else ZERO
     mirrored = sun - np.float32(2.0) * (sun[0] * up[0] + sun[1] * up[1] + sun[2] * up[2]) * up
     for y in range(view.top, view.height):
         v = np.float32((y + 0.5 - view.cy) / view.focal)
@@ -454,11 +466,12 @@ def shade(
                         grain,
                         tiles,
                         clear,
+                        up,
                         mirrored,
                         work,
                     )
                 if settling.size > 0:
-                    settle_snow(v, count, key[y, first : first + count], settling, up, work)
+                    settle_snow(v, count, key[y, first : first + count], settling, up, uneven, work)
                 if light.headlights > 0.0:
                     if behind_lamps(view, v, first, count, to_body, offset[0] - _LAMP_X):
                         work[H : H + BLOCK] = ZERO

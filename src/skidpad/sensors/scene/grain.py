@@ -10,7 +10,12 @@ from skidpad.core.arrays import Floats32
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.sensors.scene.materials import MATERIALS, TRACKS, Material
 
-NO_GRAIN = np.zeros((0, 5), dtype=np.float32)
+# by material: strengths as in GRAIN, then m of a grain's texel, m beyond which grains fade, and the share of
+# light that what looks down has less than what looks up
+GRAINS, PATCHES, TINTS, REPAIRS, GRAZING, TEXEL, NEAR, BENEATH = range(8)
+COLUMNS = 8
+NO_GRAIN = np.zeros((0, COLUMNS), dtype=np.float32)
+GROUND_GRAIN, LEAF_GRAIN = (0.04, 9.0, 0.0), (0.16, 45.0, 0.58)
 
 # shares by which grains, patches, tints and repairs change a colour, about three standard deviations, and by
 # which it is brighter at grazing angles
@@ -32,15 +37,16 @@ GRAIN: dict[Material, tuple[float, float, float, float, float]] = {
     Material.FENCE: (0.12, 0.20, 0.08, 0.0, 0.20),
     Material.ROOF: (0.20, 0.34, 0.12, 0.0, 0.30),
 }
-LEAVES, WALLS = (0.70, 0.60, 0.30, 0.0, 0.40), (0.12, 0.36, 0.10, 0.0, 0.30)
+LEAVES, WALLS = (1.20, 0.50, 0.34, 0.0, 0.30), (0.12, 0.36, 0.10, 0.0, 0.30)
 
 
 def grain_table(boxes: Iterable[tuple[int, int]]) -> Floats32:
-    """Returns (256, 5) strengths by material; boxes: class and material of what stands beside the road."""
-    table = np.zeros((MATERIALS, 5), dtype=np.float32)
+    """Returns (256, COLUMNS) grain by material; boxes: class and material of what stands beside the road."""
+    table = np.zeros((MATERIALS, COLUMNS), dtype=np.float32)
     for material, strengths in GRAIN.items():
         for one in (material, *TRACKS.get(material, ())):
-            table[one] = strengths
+            table[one] = (*strengths, *GROUND_GRAIN)
     for label, number in boxes:
-        table[number] = LEAVES if label == SemanticClass.VEGETATION else WALLS
+        is_leaf = label == SemanticClass.VEGETATION
+        table[number] = (*LEAVES, *LEAF_GRAIN) if is_leaf else (*WALLS, *GROUND_GRAIN)
     return table

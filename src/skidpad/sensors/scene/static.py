@@ -31,6 +31,7 @@ FARMED_FROM = 75.0  # m from the nearest lane to the middle of a tile
 FIELD = (3, 2)  # tiles of 48 m, along and across
 GROWN = (Material.GRASS, Material.HAY, Material.GRASS, Material.CROP, Material.PLOUGHED)
 ROAD_STEP = 8  # samples of a lane, of which one is looked at
+EVERGREEN = (Shape.CONE, Shape.HEDGE, Shape.WOOD)
 SIZE = 16  # triangles: 16 m of one lane at full detail
 BATCH = 1024  # chunks that are meshes at a time, while a map is packed
 MARGIN = 1e-6  # m, more than rounding can put a vertex outside its sphere
@@ -76,6 +77,7 @@ class StaticScene:
     street_light: StreetLight
     grain: NDArray[np.float32]  # unevenness by material; of dressed maps only
     leafy: NDArray[np.intp]  # materials of crowns that are bare in winter
+    green: NDArray[np.intp]  # and of conifers, hedges and woods, which are not
 
     def lamp_keys(self, lights: Mapping[int, LightState]) -> Ints32:
         """Returns (n,) keys of the lamp triangles while the lights show these states; others are dark."""
@@ -103,9 +105,13 @@ def build_scene(samples: LaneSamples, lanes: LaneTable, roadside: Roadside) -> S
     lamps = _find_lamps(chunks, roadside, keys)
     street_light = street_light_of(roadside.boxes)
     grain = _grain_of(roadside, box_material)
-    crowns = {box_material[b.rgb] for b in roadside.boxes if b.shape is Shape.CROWN}
-    leafy = np.array(sorted(crowns), dtype=np.intp)
-    return StaticScene(chunks, lamps, palette, street_light, grain, leafy)
+    plants = (
+        np.array(
+            sorted({box_material[b.rgb] for b in roadside.boxes if b.shape in shapes}), np.intp
+        )
+        for shapes in ((Shape.CROWN,), EVERGREEN)
+    )
+    return StaticScene(chunks, lamps, palette, street_light, grain, *plants)
 
 
 def _blocks(

@@ -1,5 +1,5 @@
 from dataclasses import replace
-from math import exp, log
+from math import exp, log, radians, sin
 from pathlib import Path
 
 import pytest
@@ -17,6 +17,7 @@ from skidpad.physics.optics import (
     radar_range,
     rain_attenuation_db_km,
     sight,
+    sunlight,
     transmission,
 )
 from skidpad.physics.presets import preset
@@ -69,6 +70,17 @@ def test_heavy_rain_costs_radar_a_few_decibels():
     assert 2.0 < radar_loss_db(rain, 80.0) < 5.0
     assert 65.0 < radar_range(rain, 80.0) < 75.0
     assert radar_range(Weather(), 80.0) == 80.0
+
+
+def test_sun_and_sky_add_up_to_daylight_and_a_low_sun_keeps_some_light():
+    for altitude in (20.0, 45.0, 75.0):
+        sky = Weather(sun_altitude_deg=altitude)
+        sun, diffuse = sunlight(sky)
+        level = sun * sin(radians(altitude)) + diffuse
+        assert level == pytest.approx(daylight(sky), rel=0.02)
+    assert 3_000 < sunlight(Weather(sun_altitude_deg=3.0))[0] < 10_000
+    assert sunlight(Weather(sun_altitude_deg=-1.0)) == (0.0, 0.0)
+    assert sunlight(Weather(sun_altitude_deg=30.0, cloudiness=100.0))[0] == 0.0
 
 
 def test_daylight():

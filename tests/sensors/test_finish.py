@@ -18,6 +18,7 @@ from skidpad.roads.roadside import Box, Shape, SignalHead
 from skidpad.sensors.finish.extras import ALL_EXTRAS, NO_EXTRAS, Extra
 from skidpad.sensors.finish.outline import MOST, spans
 from skidpad.sensors.finish.stars import starlight_of
+from skidpad.sensors.finish.sun import sun_of
 from skidpad.sensors.finish.tone import CURVE, curve_of, set_tone
 from skidpad.sensors.pictures.lighting import lighting
 from skidpad.sensors.raster.view import camera_view
@@ -71,6 +72,24 @@ def test_clouds_change_the_sky_only_and_drift():
     assert changed[sky].mean() > 0.3
     assert not changed[~sky].any()
     assert not both(Weather(cloudiness=0.0), Extra.CLOUDS)[2].any()
+
+
+def test_a_low_sun_has_a_disc_and_its_glare_lies_over_what_stands_before_the_sky():
+    low = Weather(sun_altitude_deg=6.0, sun_azimuth_deg=0.0)  # straight ahead
+    plain, added, changed = both(low, Extra.LAMPS)
+    sky = plain.labels == SemanticClass.SKY
+    white = sky & (added.rgb.min(axis=2) > 250)
+    rows, columns = np.nonzero(white)
+    focal = 200.0 / np.tan(np.radians(37.5))
+    assert abs(columns.mean() - 200.0) < 8.0
+    assert abs(150.0 - rows.mean() - focal * np.tan(np.radians(6.0))) < 8.0
+    assert changed[~sky].mean() > 0.5
+    fog = replace(low, fog_density=90.0)
+    assert sun_of(fog, lighting(fog)).colour.max() == 0.0
+    for hidden in (replace(low, cloudiness=100.0), replace(low, sun_azimuth_deg=180.0)):
+        plain, added, _ = both(hidden, Extra.LAMPS)
+        lit = (added.rgb - plain.rgb)[np.isin(plain.labels, (SemanticClass.TERRAIN,))]
+        assert abs(lit).mean() < 1.0
 
 
 def test_stars_shine_in_a_clear_night_sky_only():

@@ -226,13 +226,13 @@ def test_noise_of_surfaces_repeats_without_a_seam() -> None:
     assert np.abs(patches[0] - patches[-1]).mean() < 1.5 * inside
 
 
-def test_street_lamps_light_the_ground_at_night_only_and_fade_as_a_point_of_light() -> None:
+def test_street_lamps_light_the_ground_at_night_only_and_fade_around_their_pools() -> None:
     lamp = Box(SemanticClass.POLE, 10.0, 20.0, 7.0, 0.0, 0.3, 0.8, 0.2, shape=Shape.LAMP)
     light = street_light_of([lamp])
     grid = light.light.reshape(light.rows, light.columns)
     i, j = round(10.0 - light.x0), round(20.0 - light.y0)
     assert grid.argmax() == i * light.columns + j
-    share = (1.0 - (7.0 / 30.0) ** 2) / 2.0**1.5  # as far away as the lamp is high
+    share = (1.0 - (7.0 / 30.0) ** 2) / 2.0**2.5  # as far away as the lamp is high
     assert grid[i + 7, j] / grid[i, j] == pytest.approx(share, rel=1e-4)
     assert street_light_of([]).light.size == 0
     for weather, brighter in (("clear-noon", False), ("clear-night", True)):

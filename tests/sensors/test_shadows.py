@@ -111,7 +111,7 @@ def test_a_crown_throws_a_round_shadow_beside_its_stem_and_a_beam_over_the_road_
     bodies = standing([stem, crown, box(40.0, 6.0, 1.0, 2.0, Shape.BOX)])
     assert bodies.lift.tolist() == [0.0, 2.0, 0.0]
     assert bodies.round.tolist() == [False, True, False]
-    light = lighting(Weather(sun_altitude_deg=45.0, sun_azimuth_deg=0.0))
+    weather = Weather(sun_altitude_deg=45.0, sun_azimuth_deg=0.0)
     view = camera_view(CameraSpec("rgb", Modality.RGB, 400, 400, 90.0, ABOVE), Pose(10.0, 0.0, 0.0))
     ground = np.full((400, 400), Material.GRASS, dtype=np.int32)
     inverse = np.full((400, 400), 1.0 / 20.0, dtype=np.float32)
@@ -119,7 +119,8 @@ def test_a_crown_throws_a_round_shadow_beside_its_stem_and_a_beam_over_the_road_
     def dark(only):
         picture = np.full((400, 400), 0xFF808080, dtype=np.uint32)
         one = Bodies._make(field[only] for field in bodies)
-        cast_shadows(view, one, shade_of(light), 90.0, GROUND_MASK, inverse, ground, picture)
+        shade = shade_of(weather, lighting(weather))
+        cast_shadows(view, one, shade, GROUND_MASK, inverse, ground, picture)
         return (200 - np.nonzero(picture != 0xFF808080)[0]) / PX
 
     way = dark([1])  # m behind the stem: the sun stands ahead of it, 1 m of shadow per m of height
@@ -127,3 +128,50 @@ def test_a_crown_throws_a_round_shadow_beside_its_stem_and_a_beam_over_the_road_
     assert way.min() == pytest.approx(-6.0 - 0.85 * 1.5, abs=0.25)
     assert dark([0]).size > 0
     assert dark([2]).size == 0
+
+
+def shadows_of(boxes, weather, ground_at=0.0):
+    """Returns the light that shadows leave, by row, along the middle column from 40 m above the place 20, 0.
+
+    The view shows 2 * 40 m, 5 px a metre, ahead is up. ground_at: m of the ground above the boxes' feet.
+    """
+    view = camera_view(
+        CameraSpec("rgb", Modality.RGB, 400, 400, 90.0, Pose(0.0, 0.0, 40.0, 0.0, np.pi / 2, 0.0)),
+        Pose(20.0, 0.0, 0.0),
+    )
+    keys = np.full((400, 400), Material.GRASS, dtype=np.int32)
+    inverse = np.full((400, 400), 1.0 / (40.0 - ground_at), dtype=np.float32)
+    picture = np.full((400, 400), 0xFFFFFFFF, dtype=np.uint32)
+    shade = shade_of(weather, lighting(weather))
+    cast_shadows(view, standing(boxes), shade, GROUND_MASK, inverse, keys, picture)
+    return picture.view(np.uint8).reshape(400, 400, 4)[:, 200, 1] / 255.0
+
+
+def post(x, height):
+    return Box(SemanticClass.POLE, x, 0.0, 0.0, 0.0, 1.0, 1.0, height)
+
+
+def test_a_low_sun_throws_shadows_of_tens_of_metres_that_fade():
+    low = Weather(sun_altitude_deg=8.0, sun_azimuth_deg=180.0)
+    left = shadows_of([post(10.0, 5.0)], low)  # 5 m / tan 8 deg = 36 m ahead of it
+    at = {m: left[round(200 - 5 * (m - 20.0))] for m in (8.0, 14.0, 20.0, 44.0, 50.0)}
+    assert at[8.0] == at[50.0] == 1.0
+    assert at[14.0] < 0.65
+    assert at[14.0] < at[44.0] < 1.0
+    cloudy = Weather(sun_altitude_deg=8.0, sun_azimuth_deg=180.0, cloudiness=80.0)
+    assert shadows_of([post(10.0, 5.0)], cloudy)[230] > at[14.0] + 0.1
+
+
+def test_where_two_shadows_meet_it_is_no_darker():
+    low = Weather(sun_altitude_deg=15.0, sun_azimuth_deg=180.0)
+    one = shadows_of([post(10.0, 8.0)], low)
+    two = shadows_of([post(10.0, 8.0), post(14.0, 8.0)], low)
+    assert two[200] == pytest.approx(one[200], abs=0.02)
+
+
+def test_a_shadow_falls_farther_on_lower_ground():
+    sun = Weather(sun_altitude_deg=20.0, sun_azimuth_deg=180.0)
+    level, low = (shadows_of([post(10.0, 3.0)], sun, z) for z in (0.0, -0.5))
+    ends = [20.0 + (200 - np.flatnonzero(left < 0.99).min()) / 5.0 for left in (level, low)]
+    farther = 0.5 / np.tan(np.radians(20.0))
+    assert ends[1] - ends[0] == pytest.approx(farther, abs=0.5)

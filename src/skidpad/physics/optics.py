@@ -145,6 +145,22 @@ def daylight(weather: Weather) -> float:
     return float(lux ** (1.0 - dusk) * NIGHT_LUX**dusk)
 
 
+def sunlight(weather: Weather) -> tuple[float, float]:
+    """Returns the illuminance in lux of the sun on a surface that faces it, and of the sky on a level one.
+
+    Source: as `daylight`, but with the air mass of Kasten and Young (1989), which is finite at the horizon.
+    (0, 0) with the sun below it.
+    """
+    h = weather.sun_altitude_deg
+    if h <= 0.0:
+        return 0.0, 0.0
+    rise, cloud = sin(radians(h)), weather.cloudiness / 100.0
+    mass = 1.0 / (rise + 0.50572 * (h + 6.07995) ** -1.6364)
+    sun = 133_100.0 * exp(-0.21 * mass)
+    sky = (1.0 - cloud) * (800.0 + 15_500.0 * sqrt(rise)) + cloud * (300.0 + 21_000.0 * rise)
+    return (1.0 - cloud) * sun, sky
+
+
 def _reach(beta: float, start: float, budget: float) -> float:
     """Returns the distance in m at which beta * (r - start) has used up `budget` nepers; inf for beta 0."""
     return start + budget / beta if beta > 0.0 else inf

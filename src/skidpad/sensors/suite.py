@@ -128,7 +128,7 @@ class PixelSuite:
             light = expose(light, weather)
         extras = settings.drawn_extras
         if Extra.LAMPS in extras:
-            light = light_fog(light, weather)._replace(onset=BEAM_ONSET)
+            light = light_fog(light, weather)._replace(onset=BEAM_ONSET, glow=0.0)
         snowed = Extra.SNOW in extras
         self.shading = shade_scene(self.scene.static, self._table, light, settings.quality, snowed)
         if extras:

@@ -9,7 +9,9 @@ class Extra(str, Enum):
     """One addition; none of them touches depth or classes."""
 
     SHADOWS = "shadows"  # of vehicles and of what stands beside the road, and where they touch it
-    LAMPS = "lamps"  # bloom of all lamps, their light in fog, and a beam without an edge
+    LAMPS = (
+        "lamps"  # bloom of all lamps and of the sun, their light in fog, and a beam without an edge
+    )
     REFLECTIONS = "reflections"  # of those lamps on a wet road
     RETRO = "retro"  # markings, signs and plates send the headlights back
     CLOUDS = "clouds"  # and stars, where there are few of them at night; fog before both

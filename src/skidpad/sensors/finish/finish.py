@@ -21,14 +21,15 @@ from skidpad.sensors.finish.lamps import Lamps
 from skidpad.sensors.finish.retro import gains, send_back
 from skidpad.sensors.finish.shadows import (
     GROUND_MASK,
-    REACH,
     Bodies,
     bodies_of,
     cast_shadows,
+    join_bodies,
     shade_of,
     standing,
 )
 from skidpad.sensors.finish.stars import STARS, draw_stars, starlight_of
+from skidpad.sensors.finish.sun import draw_sun, sun_of
 from skidpad.sensors.finish.tone import curve_of, set_tone
 from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.pictures.shading import ROADLIKE
@@ -59,11 +60,12 @@ class Finish:
     def look_out(self, weather: Weather, light: Lighting) -> None:
         """Sets what the pictures take from the weather and its light."""
         self._light = light
-        self._shade = shade_of(light)
+        self._shade = shade_of(weather, light)
         self._gains = gains(light)
         self._curve = curve_of(light)
         self._layer = layer_of(weather, light)
         self._stars = starlight_of(weather)
+        self._sun = sun_of(weather, light)
         self._fog = fog_of(weather, light)
         self._wet = light.wet * (1.0 - light.snow) if light.wet > LEAST_WET else 0.0
         self._drift = DRIFT * self._dt * (0.2 + 0.8 * weather.wind_intensity / 100.0)
@@ -99,12 +101,14 @@ class Finish:
             veil_sky(view, self._fog, inverse, out)
         if Extra.SHADOWS in extras:
             cars = self._bodies if own else self._others
-            for bodies, reach in ((self._near, STANDING_REACH), (cars, REACH)):
-                cast_shadows(view, bodies, self._shade, reach, GROUND_MASK, inverse, key, out)
+            every = join_bodies(self._near, cars)
+            cast_shadows(view, every, self._shade, GROUND_MASK, inverse, key, out)
         if Extra.RETRO in extras and light.headlights > 0.0 and light.lamps > 0.0:
             send_back(view, self._ego, light, self._gains, inverse, key, out)
         if Extra.EDGES in extras:
             soften_edges(view, key, out)
+        if Extra.LAMPS in extras and self._sun.colour[0] > 0.0:
+            draw_sun(view, self._sun, inverse, out)
         bloom, wet = Extra.LAMPS in extras, self._wet if Extra.REFLECTIONS in extras else 0.0
         if bloom or wet > 0.0:
             shine(view, self._sources, bloom, wet, light.air, WETTABLE, inverse, key, out)

@@ -13,15 +13,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.arrays import Floats
+from skidpad.core.arrays import Floats, Floats32
 from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind
+from skidpad.core.weather import Weather
 from skidpad.physics.camera import share_left
-from skidpad.physics.optics import Air, air_depth
+from skidpad.physics.optics import Air, sunlight
 from skidpad.roads.roadside import Box, Shape
 from skidpad.sensors.finish.outline import MOST, spans
-from skidpad.sensors.pictures.lighting import Lighting
+from skidpad.sensors.pictures.blocks import BLOCK, ONE, ZERO
+from skidpad.sensors.pictures.lighting import Colour, Lighting
 from skidpad.sensors.pictures.packing import pack, unpack
 from skidpad.sensors.raster.view import View
 from skidpad.sensors.scene.materials import ASPHALTS, FIELDS, MATERIALS, Material
@@ -38,15 +40,24 @@ GROUND = (
 )
 REACH = 90.0  # m; farther shadows are a pixel or two
 CONTACT, CONTACT_DARK = 0.5, 0.62  # m around the outline, share of light lost below the body
-EDGE = 0.25  # m, how soft the sun's shadow ends
-LONGEST = 8.0  # m of the sun's shadow beyond the body
-FARTHEST = 25.0  # m from a hanging body, beyond which its shadow is not drawn
+EDGE = 0.25  # m, how soft the sun's shadow ends beside the body
+SUN_WIDE = 0.0093  # rad, the sun's angular diameter: m by which an edge widens per m of its way
+LONGEST = 45.0  # m from a body at which the sun's shadow has faded
+FADING = 0.5  # share of LONGEST over which it fades
 ROUNDED = 0.85  # of half the width of a crown: the radius of its shadow
-SUN_DARK = 0.85  # share of the sun's light that a body keeps away
+SUN_DARK = 0.9  # share of the sun's light that a body keeps away
+ROUGH = 0.25  # added to the sine of the sun's altitude: blades and grains look towards a low sun; by eye
 NO_SUN = 0.02  # share of the light below which the sun casts no shadow that is seen
 LEVEL = 1.2  # m above or below, beyond which the ground is another road's
 SLACK, SLOPE = 0.15, 0.05  # m and m per m by which the ground may lie off the body's own height
+FAR_SLOPE = 0.015  # the same along a shadow
+MOST_SHIFT = 8.0  # m by which ground that lies higher or lower moves the end of a shadow
 NARROWER = 0.94  # of its box is the outline of a body that casts a shadow: edges are rounded
+LANES = 6  # of a block: m from the camera, m along the ray, share left beside bodies, share of the sun hidden
+X, Y, Z, WAY, TOUCHED, HIDDEN = (np.intp(n * BLOCK) for n in range(LANES))
+FAR_OFF = np.float32(1e6)  # m of height of what is no ground
+LEAST_INVERSE = np.float32(1e-5)
+DENSE = {Shape.CROWN: 0.85, Shape.CONE: 0.95, Shape.FENCE: 0.4, Shape.SHELTER: 0.6}  # others: 1
 
 
 class Bodies(NamedTuple):
@@ -62,6 +73,7 @@ class Bodies(NamedTuple):
     present: NDArray[np.bool_]
     lift: Floats  # m of the lower side above the ground
     round: NDArray[np.bool_]  # the crown of a tree: a disc throws its shadow
+    dense: Floats  # share of the sun's light that does not pass through
 
 
 class Shade(NamedTuple):
@@ -69,7 +81,7 @@ class Shade(NamedTuple):
 
     sun_x: float  # m of shadow per m of height, away from the sun
     sun_y: float
-    sun: float  # share of the light that comes from the sun's direction
+    sun: Colour  # (3,) share of the light that comes from the sun's direction, by colour
     air: Air  # between a shadow and the eye
     curved: float  # as in `Lighting`
 
@@ -79,8 +91,13 @@ def bodies_of(table: ActorTable, states: ActorStates) -> Bodies:
     present = states.present & (table.kind != ActorKind.PROP)
     return Bodies(
         states.x, states.y, states.z, states.yaw, table.length, table.width, table.height, present,
-        np.zeros(len(table)), np.zeros(len(table), dtype=np.bool_),
+        np.zeros(len(table)), np.zeros(len(table), dtype=np.bool_), np.ones(len(table)),
     )  # fmt: skip
+
+
+def join_bodies(*parts: Bodies) -> Bodies:
+    """Returns the bodies of all parts as one table."""
+    return Bodies(*(np.concatenate(field) for field in zip(*parts, strict=True)))
 
 
 def standing(boxes: Sequence[Box]) -> Bodies:
@@ -101,16 +118,23 @@ def standing(boxes: Sequence[Box]) -> Bodies:
         each("x"), each("y"), each("z"), each("yaw"), each("length"), each("width"),
         each("height"), np.ones(len(boxes), dtype=np.bool_), np.array(lift, dtype=np.float64),
         np.array([b.shape in (Shape.CROWN, Shape.CONE) for b in boxes], dtype=np.bool_),
+        np.array([DENSE.get(b.shape, 1.0) for b in boxes], dtype=np.float64),
     )  # fmt: skip
 
 
-def shade_of(light: Lighting) -> Shade:
-    """Returns where shadows fall, and how dark they are."""
-    direction, sun, sky = light.sun_direction, float(light.sun.mean()), float(light.sky.mean())
+def shade_of(weather: Weather, light: Lighting) -> Shade:
+    """Returns where shadows fall, and how dark they are: as much as the sun adds to the light of the sky.
+
+    Shadows are as blue as the sky is bluer than the sun.
+    """
+    direction = light.sun_direction
     up = max(float(direction[2]), 0.05)
-    share = sun * max(float(direction[2]), 0.0) / max(sun * up + sky, 1e-6)
+    beam, sky = sunlight(weather)
+    sun = beam * (max(float(direction[2]), 0.0) + ROUGH)
+    of_sun, of_sky = (c / max(float(c.mean()), 1e-6) for c in (light.sun, light.sky))
+    share = sun * of_sun / np.maximum(sun * of_sun + sky * of_sky, 1e-6)
     x, y = -float(direction[0]) / up, -float(direction[1]) / up
-    return Shade(x, y, share, light.air, light.curved)
+    return Shade(x, y, share.astype(np.float32), light.air, light.curved)
 
 
 GROUND_MASK = np.zeros(MATERIALS, dtype=np.bool_)  # by material: shadows are seen on it
@@ -128,8 +152,12 @@ class _Cast(NamedTuple):
     begin_y: float
     end_x: float
     end_y: float
+    way_x: float  # unit, away from the sun
+    way_y: float
+    per_m: float  # m of shadow per m of height
+    half_across: float  # of the strip that the shadow covers
     round: bool
-    sun: float  # share of light that the sun's shadow takes away; 0: there is none
+    sun: float  # share of the sun that the body hides; 0: it casts no shadow
 
 
 @inner_kernel
@@ -137,15 +165,18 @@ def _cast_of(bodies: Bodies, i: int, shade: Shade) -> _Cast:
     """Returns the shadow of body i: its rectangle, the throw along its axes in m and its darkness."""
     c, s = np.cos(bodies.yaw[i]), np.sin(bodies.yaw[i])
     throw = np.hypot(shade.sun_x, shade.sun_y)
-    tall = bodies.height[i] * min(1.0, LONGEST / max(bodies.height[i] * throw, 1e-6))
-    tx, ty = tall * shade.sun_x, tall * shade.sun_y
     lift = bodies.lift[i]
-    dark = SUN_DARK * shade.sun if shade.sun > NO_SUN and lift * throw < FARTHEST else 0.0
-    bx, by = lift * shade.sun_x, lift * shade.sun_y
+    tall = min(bodies.height[i], LONGEST / max(throw, 1e-6))
+    unit = 1.0 / max(throw, 1e-6)
+    way_x = unit * (c * shade.sun_x + s * shade.sun_y)
+    way_y = unit * (c * shade.sun_y - s * shade.sun_x)
+    seen = shade.sun[0] + shade.sun[1] + shade.sun[2] > 3.0 * NO_SUN
+    dark = SUN_DARK * bodies.dense[i] if seen and lift * throw < LONGEST else 0.0
     half_l, half_w = 0.5 * bodies.length[i], 0.5 * bodies.width[i]
     return _Cast(
-        c, s, half_l, half_w, c * bx + s * by, -s * bx + c * by,
-        c * tx + s * ty, -s * tx + c * ty, bodies.round[i], dark,
+        c, s, half_l, half_w, lift * throw * way_x, lift * throw * way_y,
+        tall * throw * way_x, tall * throw * way_y, way_x, way_y, throw,
+        half_l * abs(way_y) + half_w * abs(way_x), bodies.round[i], dark,
     )  # fmt: skip
 
 
@@ -153,19 +184,22 @@ def _cast_of(bodies: Bodies, i: int, shade: Shade) -> _Cast:
 def _corners(bodies: Bodies, i: int, cast: _Cast, out: Floats) -> None:
     """Writes (16, 3) corners of what a shadow can darken: the body's footprint and the shadow's end."""
     size = cast.half_l + cast.half_w
-    if cast.sun > 0.0:
-        size += np.hypot(cast.end_x, cast.end_y)
-    slack = min(SLACK + SLOPE * size, LEVEL)
+    length = np.hypot(cast.end_x, cast.end_y) if cast.sun > 0.0 else 0.0
+    hangs = bodies.lift[i] > CONTACT
     k = 0
     for end in range(2):
         far = float(end) if cast.sun > 0.0 else 0.0
+        begin = 1.0 if hangs else far
+        slack = min(SLACK + SLOPE * size + FAR_SLOPE * far * length, LEVEL)
+        shift = far * min(slack * cast.per_m, MOST_SHIFT)
         for a in (-1.0, 1.0):
             for b in (-1.0, 1.0):
-                lx = a * (cast.half_l + CONTACT) + cast.begin_x + far * cast.end_x
-                ly = b * (cast.half_w + CONTACT) + cast.begin_y + far * cast.end_y
+                lx = a * (cast.half_l + CONTACT) + begin * cast.begin_x + far * cast.end_x
+                ly = b * (cast.half_w + CONTACT) + begin * cast.begin_y + far * cast.end_y
                 for side in (-1.0, 1.0):
-                    out[k, 0] = bodies.x[i] + cast.c * lx - cast.s * ly
-                    out[k, 1] = bodies.y[i] + cast.s * lx + cast.c * ly
+                    x, y = lx - side * shift * cast.way_x, ly - side * shift * cast.way_y
+                    out[k, 0] = bodies.x[i] + cast.c * x - cast.s * y
+                    out[k, 1] = bodies.y[i] + cast.s * x + cast.c * y
                     out[k, 2] = bodies.z[i] - bodies.lift[i] + side * slack
                     k += 1
 
@@ -212,79 +246,117 @@ def _beyond_disc(cast: _Cast, px: float, py: float) -> float:
 
 
 @inner_kernel
-def _light_at(cast: _Cast, lx: float, ly: float, hangs: bool) -> float:
-    """Returns the share of the light that reaches the ground at (lx, ly) in the body's axes.
-
-    hangs: the body does not touch the ground.
-    """
-    light = 1.0
-    near = (
-        0.0 if hangs else (CONTACT - _outside(lx, ly, cast.half_l, cast.half_w)) / (1.6 * CONTACT)
-    )
-    if near > 0.0:
-        near = min(near, 1.0)
-        light = 1.0 - CONTACT_DARK * near * near
-    if cast.sun > 0.0:
-        dark = min((0.5 * EDGE - _beyond_shadow(cast, lx, ly)) / EDGE, 1.0)
-        light *= 1.0 - cast.sun * max(dark, 0.0)
-    return float(light)
+def _contact_at(cast: _Cast, lx: float, ly: float) -> float:
+    """Returns the share of the light that reaches the ground beside a body, at (lx, ly) in its axes."""
+    near = (CONTACT - _outside(lx, ly, cast.half_l, cast.half_w)) / (1.6 * CONTACT)
+    near = min(max(near, 0.0), 1.0)
+    return float(1.0 - CONTACT_DARK * near * near)
 
 
 @inner_kernel
-def _dim_pixel(p: np.uint32, light: float) -> np.uint32:
-    """Returns the packed pixel dimmed to the share `light` of its light.
+def _hidden_at(cast: _Cast, lx: float, ly: float, h: float) -> float:
+    """Returns the share of the sun that the body hides from a place `h` m above its foot.
 
-    Its bytes are square roots of light, so they are multiplied by the root of `light`.
+    The place is moved along the light down to the height of the foot, where the shadow is known.
     """
-    gain = np.float32(np.sqrt(light))  # the picture's bytes are square roots of light
-    red, green, blue = unpack(p)
-    return pack(red * gain, green * gain, blue * gain)
+    along = max(lx * cast.way_x + ly * cast.way_y, 0.0)
+    left = (LONGEST - along) / (FADING * LONGEST)
+    edge = EDGE + SUN_WIDE * along
+    across = abs(lx * cast.way_y - ly * cast.way_x) - cast.half_across
+    if left <= 0.0 or across > 0.5 * edge:
+        return 0.0
+    shift = h * cast.per_m
+    beyond = _beyond_shadow(cast, lx + shift * cast.way_x, ly + shift * cast.way_y)
+    dark = min((0.5 * edge - beyond) / edge, 1.0)
+    return float(cast.sun * max(dark, 0.0) * min(left, 1.0))
+
+
+@inner_kernel
+def _place_block(
+    view: View,
+    row: int,
+    begin: int,
+    count: int,
+    ground: NDArray[np.bool_],
+    inverse: NDArray[np.float32],
+    key: NDArray[np.int32],
+    lanes: Floats32,
+) -> None:
+    """Writes where the ground of a block of a row lies, in m from the camera, to `lanes`, as yet bright."""
+    r, per = view.rotation, np.float32(1.0 / view.focal)
+    v = np.float32(row + 0.5 - view.cy) * per
+    x_u, x_1 = np.float32(r[0, 0]), np.float32(r[1, 0]) * v + np.float32(r[2, 0])
+    y_u, y_1 = np.float32(r[0, 1]), np.float32(r[1, 1]) * v + np.float32(r[2, 1])
+    z_u, z_1 = np.float32(r[0, 2]), np.float32(r[1, 2]) * v + np.float32(r[2, 2])
+    middle = np.float32(begin + 0.5 - view.cx)
+    depths, keys = inverse[row, begin : begin + count], key[row, begin : begin + count]
+    for x in range(count):
+        u = (np.float32(x) + middle) * per
+        w = depths[x]
+        z = ONE / (w if w > LEAST_INVERSE else LEAST_INVERSE)
+        lanes[X + x], lanes[Y + x], lanes[Z + x] = (
+            z * (x_u * u + x_1),
+            z * (y_u * u + y_1),
+            z * (z_u * u + z_1),
+        )
+        lanes[WAY + x] = z * np.sqrt(u * u + v * v + ONE)
+        lanes[TOUCHED + x], lanes[HIDDEN + x] = ONE, ZERO
+    for x in range(count):
+        k = keys[x]
+        if (k >> 16) != 0 or not ground[k & 255]:
+            lanes[Z + x] = FAR_OFF
 
 
 @inner_kernel
 def _darken(
-    view: View,
-    bodies: Bodies,
-    i: int,
-    cast: _Cast,
-    shade: Shade,
-    rows: tuple[int, int],
-    columns: NDArray[np.int64],
-    ground: NDArray[np.bool_],
-    inverse: NDArray[np.float32],
-    key: NDArray[np.int32],
-    out: NDArray[np.uint32],
-) -> None:
-    """Draws one body's shadow into `out`, in the spans that it can reach, as much as the air lets through."""
-    air, curved = shade.air, np.float32(shade.curved)
-    r, per = view.rotation, 1.0 / view.focal
+    view: View, bodies: Bodies, i: int, cast: _Cast, first: int, end: int, lanes: Floats32
+) -> bool:
+    """Lowers TOUCHED and raises HIDDEN of a block's pixels first to end - 1 by one body; whether it did."""
     ox, oy = view.centre[0] - bodies.x[i], view.centre[1] - bodies.y[i]
-    oz = view.centre[2] - bodies.z[i] + bodies.lift[i]
-    hangs = bodies.lift[i] > CONTACT
-    x0, y0 = cast.c * ox + cast.s * oy, -cast.s * ox + cast.c * oy
-    x_u = (cast.c * r[0, 0] + cast.s * r[0, 1]) * per
-    y_u = (-cast.s * r[0, 0] + cast.c * r[0, 1]) * per
-    z_u = r[0, 2] * per
-    for row in range(rows[0], rows[1]):
-        v = (row + 0.5 - view.cy) * per
-        dx, dy, dz = r[1, 0] * v + r[2, 0], r[1, 1] * v + r[2, 1], r[1, 2] * v + r[2, 2]
-        x_v, y_v = cast.c * dx + cast.s * dy, -cast.s * dx + cast.c * dy
-        for column in range(columns[row, 0], columns[row, 1]):
-            k = key[row, column]
-            if (k >> 16) != 0 or not ground[k & 255]:
-                continue
-            w = inverse[row, column]
-            if w <= 0.0:
-                continue
-            u, z = column + 0.5 - view.cx, 1.0 / w
-            if abs(z * (dz + z_u * u) + oz) > LEVEL:
-                continue
-            lx, ly = z * (x_v + x_u * u) + x0, z * (y_v + y_u * u) + y0
-            light = _light_at(cast, lx, ly, hangs)
-            if light < 0.995:
-                way = z * np.sqrt(1.0 + v * v + per * per * u * u)
-                light = 1.0 - (1.0 - light) * share_left(np.float32(air_depth(air, way)), curved)
-                out[row, column] = _dim_pixel(out[row, column], light)
+    oz = np.float32(view.centre[2] - bodies.z[i] + bodies.lift[i])
+    x0, y0 = np.float32(cast.c * ox + cast.s * oy), np.float32(cast.c * oy - cast.s * ox)
+    c, s, level = np.float32(cast.c), np.float32(cast.s), np.float32(LEVEL)
+    touches, most, did = bodies.lift[i] <= CONTACT, np.float32(cast.sun), False
+    near_l, near_w = np.float32(cast.half_l + CONTACT), np.float32(cast.half_w + CONTACT)
+    way_x, way_y, longest = np.float32(cast.way_x), np.float32(cast.way_y), np.float32(LONGEST)
+    half = np.float32(cast.half_across + 0.5 * (EDGE + SUN_WIDE * LONGEST))
+    size = np.float32(cast.half_l + cast.half_w + MOST_SHIFT)
+    for x in range(first, end):
+        h = lanes[Z + x] + oz
+        if abs(h) > level:
+            continue
+        lx, ly = c * lanes[X + x] + s * lanes[Y + x] + x0, c * lanes[Y + x] - s * lanes[X + x] + y0
+        if touches and abs(lx) < near_l and abs(ly) < near_w:
+            lanes[TOUCHED + x] *= np.float32(_contact_at(cast, lx, ly))
+            did = True
+        along, across = lx * way_x + ly * way_y, abs(lx * way_y - ly * way_x)
+        if across < half and -size < along < longest and lanes[HIDDEN + x] < most:
+            dark = np.float32(_hidden_at(cast, lx, ly, h))
+            if dark > lanes[HIDDEN + x]:
+                lanes[HIDDEN + x] = dark
+                did = True
+    return did
+
+
+@inner_kernel
+def _dim_block(shade: Shade, count: int, lanes: Floats32, pixels: NDArray[np.uint32]) -> None:
+    """Takes the light from a block's pixels that does not reach them, as much as the air lets through.
+
+    Their bytes are square roots of light.
+    """
+    fog, start = np.float32(shade.air.fog), np.float32(shade.air.fog_start)
+    rain, curved = np.float32(shade.air.rain), np.float32(shade.curved)
+    red, green, blue = shade.sun[0], shade.sun[1], shade.sun[2]
+    for x in range(count):
+        way = lanes[WAY + x]
+        foggy = way - start
+        left = share_left((foggy if foggy > ZERO else ZERO) * fog + way * rain, curved)
+        touched, dark = lanes[TOUCHED + x], lanes[HIDDEN + x]
+        r, g, b = unpack(pixels[x])
+        r *= np.sqrt(ONE - left * (ONE - touched * (ONE - dark * red)))
+        g *= np.sqrt(ONE - left * (ONE - touched * (ONE - dark * green)))
+        b *= np.sqrt(ONE - left * (ONE - touched * (ONE - dark * blue)))
+        pixels[x] = pack(r, g, b)
 
 
 @kernel
@@ -292,21 +364,40 @@ def cast_shadows(
     view: View,
     bodies: Bodies,
     shade: Shade,
-    reach: float,
     ground: NDArray[np.bool_],
     inverse: NDArray[np.float32],
     key: NDArray[np.int32],
     out: NDArray[np.uint32],
 ) -> None:
-    """Darkens the ground in the rows of a view's picture `out`, packed as by `shade`; reach in m."""
+    """Darkens the ground in the rows of a view's picture `out`, packed as by `shade`, row by row.
+
+    Where several bodies hide the sun, the one that hides most of it counts.
+    """
+    n, height, width = bodies.x.size, out.shape[0], out.shape[1]
     corners, points = np.empty((16, 3)), np.empty((MOST, 2))
     ring = np.empty(2 * MOST, dtype=np.int64)
-    columns = np.empty((out.shape[0], 2), dtype=np.int64)
-    for i in range(bodies.x.size):
-        far = np.hypot(bodies.x[i] - view.centre[0], bodies.y[i] - view.centre[1]) > reach
-        if far or not bodies.present[i]:
-            continue
-        cast = _cast_of(bodies, i, shade)
-        _corners(bodies, i, cast, corners)
-        rows = spans(view, corners, points, ring, columns)
-        _darken(view, bodies, i, cast, shade, rows, columns, ground, inverse, key, out)
+    columns = np.empty((n, height, 2), dtype=np.int64)
+    rows = np.zeros((n, 2), dtype=np.int64)
+    lanes = np.empty(LANES * BLOCK, dtype=np.float32)
+    casts = [_cast_of(bodies, i, shade) for i in range(n)]
+    for i in range(n):
+        far = np.hypot(bodies.x[i] - view.centre[0], bodies.y[i] - view.centre[1]) > REACH
+        if not far and bodies.present[i]:
+            _corners(bodies, i, casts[i], corners)
+            rows[i, 0], rows[i, 1] = spans(view, corners, points, ring, columns[i])
+    for row in range(view.top, view.height):
+        for begin in range(0, width, BLOCK):
+            count, place, dim = min(BLOCK, width - begin), True, False
+            for i in range(n):
+                if not rows[i, 0] <= row < rows[i, 1]:
+                    continue
+                a = max(columns[i, row, 0] - begin, 0)
+                b = min(columns[i, row, 1] - begin, count)
+                if a >= b:
+                    continue
+                if place:
+                    _place_block(view, row, begin, count, ground, inverse, key, lanes)
+                    place = False
+                dim |= _darken(view, bodies, i, casts[i], a, b, lanes)
+            if dim:
+                _dim_block(shade, count, lanes, out[row, begin : begin + count])

@@ -30,6 +30,7 @@ from skidpad.sensors.pictures.blocks import (
     G,
     H,
     L,
+    P,
     R,
     S,
     T,
@@ -43,7 +44,7 @@ from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.pictures.roughness import MORE_LANES, NO_TILES, make_tiles, roughen, vary_sky
 from skidpad.sensors.pictures.settled_snow import NOTHING_SETTLES, SHARE, STEEP, settle_snow
 from skidpad.sensors.pictures.sky import disc, sky
-from skidpad.sensors.pictures.street_lamps import add_street_light
+from skidpad.sensors.pictures.street_lamps import lay_street_light
 from skidpad.sensors.raster.view import View
 from skidpad.sensors.scene.grain import NO_GRAIN, TINTS
 from skidpad.sensors.scene.materials import (
@@ -284,6 +285,8 @@ _HIGH_RANGE = np.float32(1.0 / 3000.0)  # 1/m^2: a high beam lights some 110 m o
 _HIGH_SLOPE = np.float32(6.0)  # and falls to half 10 deg above the lamp: no cut-off, by eye
 _LAMP_X, _LAMP_Z = np.float32(HEADLAMP_X), np.float32(HEADLAMP_Z)
 _BEAM_BLUE = np.float32(0.82)
+_STREET_GREEN, _STREET_BLUE = np.float32(0.84), np.float32(0.58)
+_ON_WALLS = np.float32(0.4)  # share of a street lamp's light that falls on what stands upright
 _BEAM_POWER = np.float32(2.6)
 _DARK = np.float32(1.0 - WET_DARKENING)
 _FILM_SHARE = np.float32(0.8)
@@ -401,6 +404,7 @@ def _surfaces(
         facing = w * size / ray
         tilt = _HALF + _HALF * n_up
         lit = work[H + x] * (_RETRO + (ONE - _RETRO) * facing)
+        street = work[P + x] * (_ON_WALLS + (ONE - _ON_WALLS) * (n_up if n_up > ZERO else ZERO))
 
         grazing = ONE - (facing if facing < ONE else ONE)
         square = grazing * grazing
@@ -414,9 +418,11 @@ def _surfaces(
         through = share_left((foggy if foggy > ZERO else ZERO) * fog + way * rain, curved)
         veil = mirror * shown * through + (ONE - through)
 
-        r = glow + dull * (low_r + tilt * span_r + sun_r * n_sun + lit)
-        g = glow + dull * (low_g + tilt * span_g + sun_g * n_sun + lit)
-        b = glow + dull * (low_b + tilt * span_b + sun_b * n_sun + lit * _BEAM_BLUE)
+        r = glow + dull * (low_r + tilt * span_r + sun_r * n_sun + lit + street)
+        g = glow + dull * (low_g + tilt * span_g + sun_g * n_sun + lit + street * _STREET_GREEN)
+        b = glow + dull * (
+            low_b + tilt * span_b + sun_b * n_sun + lit * _BEAM_BLUE + street * _STREET_BLUE
+        )
         work[R + x] = work[R + x] * r * through + veil * hor_r
         work[G + x] = work[G + x] * g * through + veil * hor_g
         work[B + x] = work[B + x] * b * through + veil * hor_b
@@ -478,14 +484,12 @@ def shade(
                     else:
                         _headlights(v, count, light, to_body, offset, work)
                 if lamps.light.size > 0 and light.lamps > 0.0:
-                    if light.headlights <= 0.0:
-                        work[H : H + BLOCK] = ZERO
-                    add_street_light(view, v, count, np.float32(light.lamps), lamps, work)
+                    lay_street_light(view, v, count, np.float32(light.lamps), lamps, work)
                 _surfaces(v, count, light, sun, up, work)
             if empty:
                 sky(v, count, light, up, work)
                 if grain.shape[0] > 0:
                     vary_sky(view, v, count, light, sun, tiles, work)
-                if light.disc > 0.0:
+                if light.disc * light.glow > 0.0:
                     disc(v, count, light, sun, work)
             develop(count, exposure, work, out[y, first : first + count])

@@ -6,7 +6,7 @@ import numpy as np
 
 from skidpad.core.arrays import Floats32
 from skidpad.core.kernels.jit import inner_kernel
-from skidpad.sensors.pictures.blocks import ONE, ZERO, H, U, W
+from skidpad.sensors.pictures.blocks import ONE, ZERO, P, U, W
 from skidpad.sensors.pictures.roughness import A, C, F
 from skidpad.sensors.raster.view import View
 from skidpad.sensors.scene.street_light import StreetLight
@@ -16,10 +16,10 @@ _NOWHERE, _NEXT = np.float32(-1.0), np.uint64(1)
 
 
 @inner_kernel
-def add_street_light(
+def lay_street_light(
     view: View, v: np.float32, count: int, share: np.float32, lamps: StreetLight, work: Floats32
 ) -> None:
-    """Adds the light of street lamps, `share` of it, to the beams that fall on a block (lane H of `work`)."""
+    """Writes the light of street lamps on level ground, `share` of it, into lane P of a block's `work`."""
     r = view.rotation
     x_u, x_1 = np.float32(r[0, 0]), np.float32(r[1, 0]) * v + np.float32(r[2, 0])
     y_u, y_1 = np.float32(r[0, 1]), np.float32(r[1, 1]) * v + np.float32(r[2, 1])
@@ -39,9 +39,10 @@ def add_street_light(
         work[C + x], work[F + x] = a - i, b - j
     beyond = np.uint64(lamps.columns)
     for x in range(count):
+        work[P + x] = ZERO
         if work[A + x] >= ZERO:  # between four nodes, or the grid would be seen
             at, a, b = np.uint64(work[A + x]), work[C + x], work[F + x]
             low = lamps.light[at] + b * (lamps.light[at + _NEXT] - lamps.light[at])
             at += beyond
             high = lamps.light[at] + b * (lamps.light[at + _NEXT] - lamps.light[at])
-            work[H + x] += share * (low + a * (high - low))
+            work[P + x] = share * (low + a * (high - low))

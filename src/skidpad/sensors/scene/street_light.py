@@ -12,7 +12,8 @@ from skidpad.roads.roadside import Box, Shape
 
 REACH = 30.0  # m beyond which a lamp lights nothing
 HEIGHT = 7.0  # m of a lamp above the ground that it lights
-BRIGHT = 0.85  # below a lamp, where a white surface at clear noon has 1; by eye
+BRIGHT = 3.0  # below a lamp, where a white surface at clear noon has 1; by eye
+FALL = 2.5  # 1.5 for a point of light, more for one that sends most of it down; by eye
 MOST_CELLS = 4_000_000
 
 
@@ -33,7 +34,7 @@ NO_STREET_LIGHT = StreetLight(0.0, 0.0, 1.0, 0, 0, np.zeros(0, dtype=np.float32)
 def street_light_of(boxes: Sequence[Box]) -> StreetLight:
     """Returns the light on the ground of all lamps among the boxes; NO_STREET_LIGHT without any.
 
-    Each falls off as below a point of light, to 0 at REACH.
+    Each falls off as below a lantern that sends most of its light down, to 0 at REACH.
     """
     lamps = np.array([(b.x, b.y) for b in boxes if b.shape is Shape.LAMP]).reshape(-1, 2)
     if not len(lamps):
@@ -52,5 +53,5 @@ def street_light_of(boxes: Sequence[Box]) -> StreetLight:
         v = (np.arange(b.start, b.start + part.shape[1])[None, :] - y) * cell
         far = (u**2 + v**2) / HEIGHT**2
         edge = np.clip(1.0 - (u**2 + v**2) / REACH**2, 0.0, 1.0)
-        part += (BRIGHT * edge / (1.0 + far) ** 1.5).astype(np.float32)
+        part += (BRIGHT * edge / (1.0 + far) ** FALL).astype(np.float32)
     return StreetLight(float(low[0]), float(low[1]), 1.0 / cell, columns, rows, light.ravel())

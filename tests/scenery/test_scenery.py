@@ -31,7 +31,7 @@ from skidpad.scenery.dressing import (
     things_of,
 )
 from skidpad.scenery.free_ground import outlines_of, sight_triangles
-from skidpad.scenery.sides import RoadKind, sides_of
+from skidpad.scenery.sides import RoadKind, kind_of, sides_of
 from skidpad.simulation.carla_server.maps.maps import spawn_points
 from skidpad.simulation.world.actors import PAINT_SHARES, PALETTE, Role, draw_paint
 
@@ -222,3 +222,21 @@ def test_signs_of_the_file_have_plates_on_posts_unless_they_would_stand_on_a_lan
     assert set(boxes) <= set(dressed.roadside.boxes)
     own = replace(road.roadside, boxes=tuple(boxes))
     assert not list(signs_of(road.samples, road.lanes, road.signals, own))
+
+
+def test_a_road_without_sidewalks_is_a_street_up_to_50_km_h_only(towns) -> None:
+    """Town07 lies among fields: many roads of 35 mph have no sidewalks. All of figure8 is a motorway loop."""
+    for road_map, limit, kind in (
+        (load_map(towns / "Town07.xodr"), 35 * 1.609344, RoadKind.RURAL),
+        (load_map("figure8"), 60.0, RoadKind.MOTORWAY),
+    ):
+        samples, lanes = road_map.samples, road_map.lanes
+        kinds = set()
+        for road in np.unique(lanes.road[lanes.junction < 0]).tolist():
+            own = np.flatnonzero(lanes.road == road)
+            limits = samples.limit[np.isin(samples.lane, own)]
+            bare = not (lanes.kind[own] == LaneKind.SIDEWALK).any()
+            wide = (lanes.kind[own] == LaneKind.DRIVING).sum() > 1
+            if bare and wide and abs(3.6 * np.nanmax(limits) - limit) < 0.5:
+                kinds.add(kind_of(samples, lanes, road))
+        assert kinds == {kind}, road_map.name

@@ -36,7 +36,7 @@ CORNERS: dict[SignalKind, tuple[int, tuple[int, int, int]]] = {
     SignalKind.YIELD: (3, WHITE),
     SignalKind.SPEED_LIMIT: (16, WHITE),
 }
-EDITION = 1  # of what is generated; raise it when the same map gets other things
+EDITION = 2  # of what is generated; raise it when the same map gets other things
 LEAST_FRONT = 4.0  # m of the shorter side of a building that has windows
 SUNK = 0.3  # m that things reach into the ground, whose triangles are coarse
 

@@ -95,9 +95,13 @@ def _houses(side: Side, rng: Rng, setback: float, is_suburb: bool) -> Iterator[T
 
 
 def _rural(side: Side, rng: Rng) -> Iterator[Thing]:
-    """Yields what stands beside a rural road: marker posts, farms, hedges and trees."""
+    """Yields what stands beside a rural road: marker posts, wooden poles, farms, hedges and trees."""
     for s in _walk(side, rng, 49.0, 51.0):
         yield things.make_marker_post(_place(side, s, 1.3))
+    if rng.random() < 0.6:
+        offset = float(rng.uniform(5.0, 9.0))
+        for s in _walk(side, rng, 38.0, 44.0):
+            yield things.make_wooden_pole(_place(side, s, offset))
     for s in _walk(side, rng, 160.0, 420.0):
         at = _place(side, s, float(rng.uniform(18.0, 34.0)))
         yield things.make_building(at, 13.0, 9.0, int(rng.integers(1, 3)), True, rng)

@@ -12,7 +12,10 @@ from skidpad.core.arrays import Floats
 from skidpad.core.geometry import mps_from_kmh
 from skidpad.roads.lanes import LaneKind, LaneSamples, LaneTable
 
-TOWN_LIMIT, MOTORWAY_LIMIT = mps_from_kmh(61.0), mps_from_kmh(99.0)
+TOWN_LIMIT, MOTORWAY_LIMIT = (
+    mps_from_kmh(51.0),
+    mps_from_kmh(99.0),
+)  # the former of a road without sidewalks
 DRIVEN = (LaneKind.DRIVING, LaneKind.RAMP)
 SHORTEST = 8.0  # m of a border beside which anything stands
 
@@ -74,7 +77,8 @@ def sides_of(samples: LaneSamples, lanes: LaneTable) -> list[Side]:
 def kind_of(samples: LaneSamples, lanes: LaneTable, road: int) -> RoadKind:
     """Returns the kind of a road: TOWN with a sidewalk or a limit of TOWN_LIMIT at most.
 
-    Else MOTORWAY from MOTORWAY_LIMIT on, or with four lanes in a section and a limit; else RURAL.
+    Else MOTORWAY from MOTORWAY_LIMIT on, or with four lanes in a section and a limit; else RURAL. The type
+    that an OpenDRIVE file gives a road is not asked: town editors write "town" for motorways, too.
     """
     own = np.flatnonzero(lanes.road == road)
     if (lanes.kind[own] == LaneKind.SIDEWALK).any():

@@ -166,6 +166,13 @@ def make_marker_post(at: Place) -> Thing:
     return _thing("marker post", at, 0.12, 0.12, box, tall=False)
 
 
+def make_wooden_pole(at: Place) -> Thing:
+    """Returns a pole of a telephone line along a road."""
+    pole = _part(at, SemanticClass.POLE, (0.24, 0.24, 7.5), WOODEN, Shape.POST)
+    bar = _part(at, SemanticClass.POLE, (0.1, 1.6, 0.12), WOODEN, Shape.BOX, 6.9, False)
+    return _thing("wooden pole", at, 0.24, 1.6, pole, bar, tall=False)
+
+
 def make_noise_wall(at: Place, length: float) -> Thing:
     """Returns a piece of a noise wall, `length` m along the road and 3.2 m high."""
     box = _part(at, SemanticClass.WALL, (length, 0.3, 3.2), (138, 132, 118), Shape.BOX)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.kernels.jit import kernel
 from skidpad.core.specs import CameraSpec
-from skidpad.sensors.raster.rasteriser import BACKGROUND
+from skidpad.sensors.raster.canvas import BACKGROUND
 from skidpad.sensors.raster.view import View
 
 

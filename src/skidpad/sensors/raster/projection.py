@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats
 from skidpad.core.kernels.jit import inner_kernel
+from skidpad.sensors.raster.canvas import Canvas, make_canvas
 from skidpad.sensors.raster.view import NEAR, View
 
 LEFT, RIGHT, UP, DOWN, BEHIND = 1, 2, 4, 8, 16  # planes of the frustum, as bits
@@ -23,7 +24,7 @@ class Scratch(NamedTuple):
     camera: Floats  # (m, 3) camera axes, m
     screen: Floats  # (m, 3) column, row, inverse depth
     code: NDArray[np.uint8]  # (m,) which planes of the frustum the vertex lies beyond
-    ramp: NDArray[np.float32]  # (width,) 0, 1, 2, ...
+    canvas: Canvas
 
 
 def make_scratch(largest_block: int, width: int) -> Scratch:
@@ -32,7 +33,7 @@ def make_scratch(largest_block: int, width: int) -> Scratch:
         np.empty((largest_block, 3)),
         np.empty((largest_block, 3)),
         np.empty(largest_block, dtype=np.uint8),
-        np.arange(width, dtype=np.float32),
+        make_canvas(width),
     )
 
 

@@ -1,14 +1,12 @@
 """From triangles to one int32 key and one float32 inverse depth per pixel.
 
-key = instance << 16 | class << 8 | material; semantic and instance images are views of it. Spans
-are half open at pixel centres and every edge is evaluated from its upper to its lower end, so two
-triangles that share an edge neither leave a gap nor fight for a pixel. Edge set-up in float64,
-spans in float32, no fast-math: the same bytes on every processor.
+key = instance << 16 | class << 8 | material; semantic and instance images are views of it. Near chunks
+are drawn first and what they hide is skipped; of equally near triangles the first of the map is seen, so
+the order changes no picture.
 """
 
 from __future__ import annotations
 
-from math import ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +14,8 @@ from numpy.typing import NDArray
 
 from skidpad.core.arrays import Floats, Ints32
 from skidpad.core.kernels.jit import inner_kernel, kernel
-from skidpad.core.vocabulary import SemanticClass
+from skidpad.sensors.raster.canvas import KEY, clear, fill, rows_at_once, settle
+from skidpad.sensors.raster.occlusion import Tiles, is_block_hidden, is_sphere_hidden, make_tiles
 from skidpad.sensors.raster.projection import (
     BEHIND,
     Scratch,
@@ -28,13 +27,12 @@ from skidpad.sensors.raster.projection import (
     sphere_visible,
 )
 from skidpad.sensors.raster.view import View
-from skidpad.sensors.scene.materials import Material
 from skidpad.sensors.scene.static import Chunks
 
 LEVEL_DISTANCE = (60.0, 150.0, 400.0)  # m from the camera to the chunk's sphere
 AUTO_LEVEL = -1
-BACKGROUND = int(SemanticClass.SKY) << 8 | int(Material.SKY)
-SLIVER = 1e-7  # px^2, twice the area below which a triangle has no usable slope of depth
+BAND, BANDS = 16.0, 32  # m of distance that are drawn in the map's order; the last band is endless
+MOST_RANKS = 0x7FFF
 
 
 class Actors(NamedTuple):
@@ -54,98 +52,32 @@ class Actors(NamedTuple):
 
 
 @inner_kernel
-def _fill(
-    x0: float,
-    y0: float,
-    w0: float,
-    x1: float,
-    y1: float,
-    w1: float,
-    x2: float,
-    y2: float,
-    w2: float,
-    value: np.int32,
-    first_row: int,
-    end_row: int,
-    ramp: NDArray[np.float32],
-    inverse: NDArray[np.float32],
-    key: Ints32,
-) -> None:
-    """Draws a projected triangle where it is nearest: columns x, rows y, inverse depths w at its corners."""
-    width = inverse.shape[1]
-    top = max(first_row, ceil(min(y0, y1, y2) - 0.5))
-    bottom = min(end_row, ceil(max(y0, y1, y2) - 0.5))
-    if top >= bottom:
-        return
-    if max(x0, x1, x2) <= 0.5 or min(x0, x1, x2) > width - 0.5:
-        return
-    det = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
-    if abs(det) > SLIVER:
-        slope_x = ((w1 - w0) * (y2 - y0) - (w2 - w0) * (y1 - y0)) / det
-        slope_y = ((x1 - x0) * (w2 - w0) - (x2 - x0) * (w1 - w0)) / det
-        anchor = w0 - slope_x * x0 - slope_y * y0
-    else:
-        slope_x = 0.0
-        slope_y = 0.0
-        anchor = (w0 + w1 + w2) / 3.0
-    if y1 < y0:
-        x0, y0, x1, y1 = x1, y1, x0, y0
-    if y2 < y0:
-        x0, y0, x2, y2 = x2, y2, x0, y0
-    if y2 < y1:
-        x1, y1, x2, y2 = x2, y2, x1, y1
-    long_edge = (x2 - x0) / (y2 - y0)
-    upper_edge = (x1 - x0) / (y1 - y0) if y1 > y0 else 0.0
-    lower_edge = (x2 - x1) / (y2 - y1) if y2 > y1 else 0.0
-    step = np.float32(slope_x)
-    for row in range(top, bottom):
-        yc = row + 0.5
-        xa = x0 + (yc - y0) * long_edge
-        if yc < y1:
-            xb = x0 + (yc - y0) * upper_edge
-        else:
-            xb = x1 + (yc - y1) * lower_edge
-        first = ceil(max(min(xa, xb), 0.0) - 0.5)
-        last = ceil(min(max(xa, xb), float(width)) - 0.5)
-        if first >= last:
-            continue
-        start = np.float32(anchor + slope_x * (first + 0.5) + slope_y * yc)
-        depths = inverse[row, first:last]
-        keys = key[row, first:last]
-        for i in range(depths.size):
-            w = start + step * ramp[i]
-            nearer = w > depths[i]
-            depths[i] = w if nearer else depths[i]
-            keys[i] = value if nearer else keys[i]
-
-
-@inner_kernel
 def _draw_block(
     triangles: Ints32,
     keys: Ints32,
     first: int,
     count: int,
     instance: int,
+    rank: int,
     view: View,
     scratch: Scratch,
     clipped: Floats,
-    inverse: NDArray[np.float32],
-    key: Ints32,
 ) -> None:
-    """Draws triangles whose vertices `project_block` has prepared into `inverse` and `key`.
+    """Draws triangles whose vertices `project_block` has prepared into the canvas of `scratch`.
 
     instance: row of the actor + 1, shifted left by 16; 0: the map.
     """
-    screen, code, ramp = scratch.screen, scratch.code, scratch.ramp
+    screen, code, canvas = scratch.screen, scratch.code, scratch.canvas
     for t in range(first, first + count):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         if code[a] & code[b] & code[c]:
             continue
-        value = np.int32(keys[t] | instance)
+        value = np.int32(~(keys[t] | instance) if instance > 0 else rank | keys[t])
+        limit = np.int32(0x7FFFFFFF if instance > 0 else value | KEY)
         if (code[a] | code[b] | code[c]) & BEHIND:
             k = clip_near(a, b, c, view, scratch, clipped)
             for i in range(1, k - 1):
-                _fill(
+                fill(
                     clipped[0, 0],
                     clipped[0, 1],
                     clipped[0, 2],
@@ -156,14 +88,12 @@ def _draw_block(
                     clipped[i + 1, 1],
                     clipped[i + 1, 2],
                     value,
-                    view.top,
-                    view.height,
-                    ramp,
-                    inverse,
-                    key,
+                    limit,
+                    view,
+                    canvas,
                 )
         else:
-            _fill(
+            fill(
                 screen[a, 0],
                 screen[a, 1],
                 screen[a, 2],
@@ -174,11 +104,9 @@ def _draw_block(
                 screen[c, 1],
                 screen[c, 2],
                 value,
-                view.top,
-                view.height,
-                ramp,
-                inverse,
-                key,
+                limit,
+                view,
+                canvas,
             )
 
 
@@ -217,19 +145,53 @@ def raster(
     static_key: `chunks.key` with the lamps as they shine now. hidden: index of the actor that is
     not drawn, or -1. level: a level of detail for all chunks, or AUTO_LEVEL.
     """
-    inverse[view.top : view.height] = np.float32(0.0)
-    key[view.top : view.height] = BACKGROUND
-    sides = frustum_sides(view)
-    clipped = np.empty((4, 3))
     shift = -rotated(view.rotation, view.centre)
+    order, rank, band = sort_chunks(chunks, view, frustum_sides(view), shift)
+    rows = rows_at_once(view.width)
+    for top in range(view.top, view.height, rows):
+        part = View(
+            view.width, min(top + rows, view.height), view.focal, view.cx, view.cy, view.rotation,
+            view.centre, top,
+        )  # fmt: skip
+        sides = frustum_sides(part)
+        clear(part, scratch.canvas)
+        tiles = make_tiles(part, scratch.canvas.inverse)
+        _draw_map(chunks, static_key, order, rank, band, part, level, sides, shift, scratch, tiles)
+        _draw_actors(actors, hidden, part, sides, shift, scratch, tiles)
+        settle(part, scratch.canvas, inverse, key)
+
+
+@inner_kernel
+def _draw_map(
+    chunks: Chunks,
+    static_key: Ints32,
+    order: Ints32,
+    rank: Ints32,
+    band: Ints32,
+    view: View,
+    level: int,
+    sides: Floats,
+    shift: Floats,
+    scratch: Scratch,
+    tiles: Tiles,
+) -> None:
+    """Draws chunks in an order, with their bands of distance, into the canvas of `scratch`."""
+    clipped = np.empty((4, 3))
     clusters = chunks.clusters
-    for c in range(chunks.radius.size):
+    for at in range(order.size):
+        c = order[at]
         if not sphere_visible(chunks.centre[c], chunks.radius[c], view, sides, shift):
+            continue
+        if is_sphere_hidden(chunks.centre[c], chunks.radius[c], band[at], view, shift, tiles):
             continue
         k = chunk_level(chunks.centre[c], chunks.radius[c], view, level)
         first = chunks.cluster_start[c, k]
         for j in range(first, first + chunks.cluster_count[c, k]):
             if not sphere_visible(clusters.centre[j], clusters.radius[j], view, sides, shift):
+                continue
+            if is_sphere_hidden(
+                clusters.centre[j], clusters.radius[j], band[at], view, shift, tiles
+            ):
                 continue
             project_block(
                 clusters.vertices,
@@ -240,18 +202,33 @@ def raster(
                 view,
                 scratch,
             )
+            if is_block_hidden(clusters.vertex_count[j], band[at], view, scratch, tiles):
+                continue
             _draw_block(
                 clusters.triangles,
                 static_key,
                 clusters.triangle_start[j],
                 clusters.triangle_count[j],
                 0,
+                rank[at] << 16,
                 view,
                 scratch,
                 clipped,
-                inverse,
-                key,
             )
+
+
+@inner_kernel
+def _draw_actors(
+    actors: Actors,
+    hidden: int,
+    view: View,
+    sides: Floats,
+    shift: Floats,
+    scratch: Scratch,
+    tiles: Tiles,
+) -> None:
+    """Draws the actors but `hidden` into the canvas of `scratch`, on which the map is drawn."""
+    clipped = np.empty((4, 3))
     for n in range(actors.radius.size):
         if n == hidden or not actors.present[n]:
             continue
@@ -268,15 +245,49 @@ def raster(
             view,
             scratch,
         )
+        if is_block_hidden(actors.vertex_count[n], BANDS + 1, view, scratch, tiles):
+            continue
         _draw_block(
             actors.triangles,
             actors.key,
             actors.triangle_start[n],
             actors.triangle_count[n],
             (n + 1) << 16,
+            0,
             view,
             scratch,
             clipped,
-            inverse,
-            key,
         )
+
+
+@inner_kernel
+def sort_chunks(
+    chunks: Chunks, view: View, sides: Floats, shift: Floats
+) -> tuple[Ints32, Ints32, Ints32]:
+    """Returns the chunks in sight, near ones first, their ranks in the map's order, and their bands.
+
+    A band of distance is 1 or more. So many chunks that ranks have no room are in the map's order.
+    """
+    start = np.zeros(BANDS + 2, dtype=np.int32)
+    found, away = np.empty(chunks.radius.size, np.int32), np.empty(chunks.radius.size, np.int32)
+    n = 0
+    for c in range(chunks.radius.size):
+        if not sphere_visible(chunks.centre[c], chunks.radius[c], view, sides, shift):
+            continue
+        dx = chunks.centre[c, 0] - view.centre[0]
+        dy = chunks.centre[c, 1] - view.centre[1]
+        dz = chunks.centre[c, 2] - view.centre[2]
+        distance = np.sqrt(dx * dx + dy * dy + dz * dz) - chunks.radius[c]
+        found[n], away[n] = c, 1 + int(min(max(distance / BAND, 0.0), BANDS - 1.0))
+        start[away[n] + 1] += 1
+        n += 1
+    if n > MOST_RANKS:
+        return found[:n], np.zeros(n, np.int32), np.ones(n, np.int32)
+    for b in range(1, BANDS + 1):
+        start[b + 1] += start[b]
+    order, rank, band = np.empty(n, np.int32), np.empty(n, np.int32), np.empty(n, np.int32)
+    for m in range(n):
+        at = start[away[m]]
+        order[at], rank[at], band[at] = found[m], m, away[m]
+        start[away[m]] += 1
+    return order, rank, band

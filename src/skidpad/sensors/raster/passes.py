@@ -74,7 +74,7 @@ def hide_beyond(
         v = np.float32((y + 0.5 - view.cy) / view.focal)
         depths, keys = inverse[y], key[y]
         for x in range(width):
-            u = start + np.float32(x) * step
+            u = start + np.float32(np.int32(x)) * step
             square = u * u + v * v + one
             w = depths[x]
             near = w * depth_sight

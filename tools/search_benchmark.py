@@ -3,8 +3,8 @@
     python tools/search_benchmark.py drive --out out/benchmark --seeds 30 [--verifai VENV/bin/python]
     python tools/search_benchmark.py table --out out/benchmark
 
-`drive` goes seed by seed through all cells, stacks and methods, in one process, and goes on where it was
-left. VerifAI runs in an environment of its own (`pip install verifai`), told margins over a pipe. Cost
+`drive` goes seed by seed through all cells, stacks and methods, a race at a time in each of --workers
+processes, and goes on where it was left. VerifAI runs in an environment of its own (`pip install verifai`), told margins over a pipe. Cost
 is simulated seconds in units of the longest run, replays with the reference driver included. The share
 of failures is that of the random runs of all seeds. Distinct failures differ in kind, or lie in another
 tenth of a variable's range.
@@ -17,6 +17,7 @@ import json
 import subprocess
 import time
 from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -171,6 +172,8 @@ def race(
     if is_over(known, cell) or (first and any(t.is_avoidable for t in known)):
         return True
     spent = 0.0
+    if time.time() > until:
+        return False
     for trial in search(found, folder, run_here, known):
         spent += cost_of(trial, cell)
         if spent >= RUNS or (first and trial.is_avoidable):
@@ -284,22 +287,32 @@ def _row(out: Path, cell: str, stack: str, method: str) -> str | None:
     return f"{len(firsts)} | {median_text(firsts)} | {distinct}"
 
 
+def with_verifai(python: str) -> None:
+    """Makes VerifAI's samplers methods of the search in this process."""
+    own = {m: partial(Sampler, python, m.partition("-")[2]) for m in VERIFAI}
+    methods.METHODS = {**methods.METHODS, **own}
+
+
 def drive(asked: argparse.Namespace) -> None:
-    """Drive all races that fit, seed by seed."""
-    names: list[str] = [m for m in OWN if m in asked.methods]
-    if asked.verifai:
-        own = {m: partial(Sampler, asked.verifai, m.partition("-")[2]) for m in VERIFAI}
-        methods.METHODS = {**methods.METHODS, **own}
-        names += [m for m in VERIFAI if m in asked.methods]
-    for seed in range(1, asked.seeds + 1):
-        for cell in asked.cells:
-            for stack in asked.stacks:
+    """Drive all races that fit, seed by seed, each in one of the worker processes."""
+    names = [m for m in (*OWN, *(VERIFAI if asked.verifai else ())) if m in asked.methods]
+    pairs = [(cell, stack) for cell in asked.cells for stack in asked.stacks]
+    for cell, stack in pairs:
+        template_of(asked.out, cell, stack)
+    start = with_verifai if asked.verifai else None
+    with ProcessPoolExecutor(
+        asked.workers, initializer=start, initargs=(asked.verifai,) if start else ()
+    ) as pool:
+        going = {}
+        for seed in range(1, asked.seeds + 1):
+            for cell, stack in pairs:
                 for method in names:
-                    if not race(
-                        asked.out, cell, stack, method, seed, asked.until, first=asked.first
-                    ):
-                        return
-                    print(cell, stack, method, seed, flush=True)
+                    one = pool.submit(
+                        race, asked.out, cell, stack, method, seed, asked.until, first=asked.first
+                    )
+                    going[one] = f"{cell} {stack} {method} {seed}"
+        for one in as_completed(going):
+            print(going[one] if one.result() else f"no time for {going[one]}", flush=True)
 
 
 def main() -> None:
@@ -314,6 +327,7 @@ def main() -> None:
     parser.add_argument("--verifai", default="", help="python of an environment with VerifAI")
     parser.add_argument("--first", action="store_true", help="end at the first avoidable failure")
     parser.add_argument("--hours", type=float, default=24.0, help="after which no run begins")
+    parser.add_argument("--workers", type=int, default=1)
     asked = parser.parse_args()
     asked.until = time.time() + 3600.0 * asked.hours
     if asked.what == "drive":

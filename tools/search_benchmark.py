@@ -4,10 +4,10 @@
     python tools/search_benchmark.py table --out out/benchmark
 
 `drive` goes seed by seed through all cells, stacks and methods, a race at a time in each of --workers
-processes, and goes on where it was left. VerifAI runs in an environment of its own (`pip install verifai`), told margins over a pipe. Cost
-is simulated seconds in units of the longest run, replays with the reference driver included. The share
-of failures is that of the random runs of all seeds. Distinct failures differ in kind, or lie in another
-tenth of a variable's range.
+processes, and goes on where it was left. VerifAI runs in an environment of its own (`pip install
+verifai`), told margins over a pipe. Cost is simulated seconds in units of the longest run, replays with
+the reference driver included. The share of failures is that of the random runs of all seeds. Distinct
+failures differ in kind, or lie in another tenth of a variable's range.
 """
 
 from __future__ import annotations

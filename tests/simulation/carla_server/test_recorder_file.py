@@ -10,6 +10,7 @@ import pytest
 
 from skidpad.simulation.carla_server.actors.walkers import WalkerControl
 from skidpad.simulation.carla_server.episode import Wanted
+from skidpad.simulation.carla_server.methods.actors import get_actor_definitions
 from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.protocol import wire
 from skidpad.simulation.carla_server.protocol.rpc import CallError
@@ -45,15 +46,15 @@ HEAD = (
     + struct.pack("<q", 1_764_237_600)
     + text("Town06")
 )
-CAR = struct.pack("<IB3f3fI", 7, 1, 100.0, -200.0, 50.0, 0.0, 1.5, 90.0, 7) + text(
+CAR = struct.pack("<IB3f3fI", 7, 1, 100.0, -200.0, 50.0, 0.0, 1.5, 90.0, 26) + text(
     "vehicle.seat.leon"
 )
 CAR += struct.pack("<H", 2)
 CAR += struct.pack("<B", 2) + text("number_of_wheels") + text("4")
 CAR += struct.pack("<B", 4) + text("role_name") + text("hero")
-WALKER = struct.pack("<IB3f3fI", 8, 2, 300.0, 0.0, 0.0, 0.0, 0.0, 0.0, 8)
+WALKER = struct.pack("<IB3f3fI", 8, 2, 300.0, 0.0, 0.0, 0.0, 0.0, 0.0, 31)
 WALKER += text("walker.pedestrian.0001") + struct.pack("<H", 0)
-LIGHT = struct.pack("<IB3f3fI", 3, 3, 10.0, 20.0, 0.0, 0.0, 0.0, 0.0, 3)
+LIGHT = struct.pack("<IB3f3fI", 3, 3, 10.0, 20.0, 0.0, 0.0, 0.0, 0.0, 0)
 LIGHT += text("traffic.traffic_light") + struct.pack("<H", 0)
 RAIN = [60.0, 80.0, 50.0, 10.0, 0.0, 45.0, 20.0, 0.75, 0.1, 90.0, 1.0, 0.03, 0.0331, 0.0]
 
@@ -145,7 +146,7 @@ def test_a_file_made_by_hand_is_told_in_carlas_words(recorder: Recorder) -> None
 def test_what_is_written_are_the_bytes_of_the_documentation() -> None:
     car = Added(
         7, 1, (100.0, -200.0, 50.0), (0.0, 1.5, 90.0), "vehicle.seat.leon",
-        ((2, "number_of_wheels", "4"), (4, "role_name", "hero")),
+        ((2, "number_of_wheels", "4"), (4, "role_name", "hero")), 26,
     )  # fmt: skip
     assert packets.pack_head("Town06", 1_764_237_600) == HEAD
     assert packets.pack_added([car]) == counted(2, CAR)
@@ -229,6 +230,9 @@ def test_our_own_recording_comes_back_as_it_was(tmp_path: Path) -> None:
     born = {a.id: a for a in frames[0].added}
     assert born.keys() == {a.id for a in episode.actors} | {walker.id}
     assert born[car.id].attribute_values() == car.attributes
+    numbers = {id: number for number, id, *_ in get_actor_definitions(served)}
+    assert born[car.id].number == numbers["vehicle.tesla.model3"] > 0
+    assert {a.number for a in frames[0].added if a.blueprint.startswith("traffic.")} == {0}
     for frame, (place, (pitch, yaw, roll)) in zip(frames, poses, strict=True):
         (row,) = [r for r in frame.rows(Packet.POSITION) if r[0] == car.id]
         assert np.array(row[1]) / 100.0 == pytest.approx(place, abs=1e-4)

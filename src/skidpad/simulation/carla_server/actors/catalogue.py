@@ -71,11 +71,12 @@ class Blueprint:
     size: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m: length, width, height
     kind: ActorKind = ActorKind.PROP
     label: SemanticClass = SemanticClass.NONE
+    number: int = 0  # of its definition, from 1; 0: of the map, clients cannot spawn it
 
-    def pack(self, uid: int) -> list[Any]:
-        """Returns the blueprint as `ActorDefinition` with this number."""
+    def pack(self) -> list[Any]:
+        """Returns the blueprint as `ActorDefinition`."""
         tags = ",".join(self.id.split("."))
-        return [uid, self.id, tags, [a.pack() for a in self.attributes.values()]]
+        return [self.number, self.id, tags, [a.pack() for a in self.attributes.values()]]
 
 
 _TYPES = {
@@ -240,7 +241,8 @@ def load_catalogue() -> dict[str, Blueprint]:
     for group in ("props", "estimated"):
         made += [_prop(id, size, actor) for id, size in data[group].items()]
     made.append(_grip(actor))
-    return {b.id: b for b in sorted(made, key=lambda b: b.id)}
+    ordered = sorted(made, key=lambda b: b.id)
+    return {b.id: replace(b, number=k) for k, b in enumerate(ordered, start=1)}
 
 
 def make_catalogue(grip: GripModel, mu_ref: float) -> dict[str, Blueprint]:

@@ -33,7 +33,7 @@ def parse_description(value: Any) -> Wanted:
 @TABLE.method("get_actor_definitions")
 def get_actor_definitions(served: Served) -> list[Any]:
     """Returns the definitions of all blueprints."""
-    return [b.pack(uid) for uid, b in enumerate(served.stock.catalogue.values(), start=1)]
+    return [b.pack() for b in served.stock.catalogue.values()]
 
 
 @TABLE.method("get_spectator")

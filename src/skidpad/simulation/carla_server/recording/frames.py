@@ -106,7 +106,9 @@ def _describe(actor: Actor, pose: Pose) -> Added:
     """Returns what a recording says of an actor that enters at the pose."""
     _, blueprint, attributes = actor.description()
     given = tuple((type, name, value) for name, type, value in attributes)
-    return Added(actor.id, kind_of(actor), *_place(pose), blueprint, given)
+    place, turn = _place(pose)
+    number = actor.blueprint.number
+    return Added(actor.id, kind_of(actor), place, turn, blueprint, given, number)
 
 
 def _place(pose: Pose) -> tuple[Vector, Vector]:

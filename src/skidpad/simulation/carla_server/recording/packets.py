@@ -105,6 +105,7 @@ class Added:
     turn: Vector  # deg: roll, pitch, yaw
     blueprint: str
     attributes: tuple[Attribute, ...] = ()
+    number: int = 0  # of its blueprint's definition; 0: an actor of the map
 
     def attribute_values(self) -> dict[str, str]:
         """Returns the attributes' values by name."""
@@ -166,7 +167,7 @@ def pack_added(actors: Sequence[Added]) -> bytes:
     """Returns the packet of actors that enter."""
     parts = [_U16.pack(len(actors))]
     for a in actors:
-        parts += [_ACTOR.pack(a.id, a.kind, *a.place, *a.turn, a.id), _text(a.blueprint)]
+        parts += [_ACTOR.pack(a.id, a.kind, *a.place, *a.turn, a.number), _text(a.blueprint)]
         parts.append(_U16.pack(len(a.attributes)))
         for type, name, value in a.attributes:
             parts += [_ATTRIBUTE.pack(type), _text(name), _text(value)]
@@ -246,8 +247,9 @@ def _read_added(body: _Source) -> list[Added]:
         id, kind, *numbers = body.take(_ACTOR)
         blueprint, (attributes,) = body.text(), body.take(_U16)
         given = [(*body.take(_ATTRIBUTE), body.text(), body.text()) for _ in range(attributes)]
-        x, y, z, roll, pitch, yaw, _ = numbers
-        found.append(Added(id, kind, (x, y, z), (roll, pitch, yaw), blueprint, tuple(given)))
+        x, y, z, roll, pitch, yaw, number = numbers
+        place, turn = (x, y, z), (roll, pitch, yaw)
+        found.append(Added(id, kind, place, turn, blueprint, tuple(given), number))
     return found
 
 

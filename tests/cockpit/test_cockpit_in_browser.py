@@ -71,7 +71,7 @@ WRITTEN = """() => { window.written = {}; const on = CanvasRenderingContext2D.pr
             y - m.actualBoundingBoxAscent, x + m.actualBoundingBoxRight, y + m.actualBoundingBoxDescent]);
         return fillText.call(this, text, x, y); }; }"""
 LEFT, RIGHT, ROW, PLOT, HEAD = 34, 12, 58, 36, 34  # px of the plots, as cockpit.js lays them out
-GAP_INK, LIMIT_INK = (0x4F, 0xCE, 0x7F), (0xFF, 0x85, 0x52)
+GAP_INK, LIMIT_INK, BESIDE_INK = (0x4F, 0xCE, 0x7F), (0xFF, 0x85, 0x52), (0xC9, 0xD1, 0xD9)
 ENVELOPE = RecordedSensor("envelope", "envelope", "Speed envelope", "m/s; binding: 0 none, 1 sight")
 PAUSED = "() => document.querySelector('.cockpit').dataset.paused === 'true'"
 FACT = """name => [...document.querySelectorAll('.cockpit dt')]
@@ -286,6 +286,33 @@ def stored(tmp_path_factory):
     ]
     write_readings(folder, tabulate_readings({ENVELOPE.id: ENVELOPE}, rows))
     return folder
+
+
+def test_the_run_beside_has_its_curves_in_each_plot(browser, stored, tmp_path):
+    wanted = adas_run(3, "clear-noon", duration=4.0, seed=4, vehicles=6)
+    braked = Recorded([Timed(20, Wheel(True)), Timed(20, Pedals(brake=1.0))])
+    drive_at_desk(wanted, Desk(braked, wanted), tmp_path / "braked")
+    errors = []
+    words = ["replay", stored, "--beside", tmp_path / "braked", "--no-browser"]
+    with running(*words, cwd=tmp_path) as command:
+        context, page = opened(browser, command.address(), errors)
+        page.keyboard.press("p")
+        until(page, PAUSED)
+        page.evaluate(WRITTEN)
+        for width in (390, 1280):
+            page.set_viewport_size({"width": width, "height": 900})
+            until(page, "() => window.written.line?.length")
+            assert sum(text.startswith("beside ") for text in labels_of(page, "line")) == 4
+            page.evaluate("window.written = {}")
+            photograph(page, f"beside-{width}")
+        there = inked(page, 0, BESIDE_INK)
+        assert len(there) > 100
+        assert max(there) < column_of(page, 4.2 / 6.0), "it ends with its run"
+        page.get_by_role("button", name="end").click()
+        status, said = command.ended()
+        context.close()
+    assert status == 0, said
+    assert errors == []
 
 
 @pytest.mark.req("A-271", "A-275")

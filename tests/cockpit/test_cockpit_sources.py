@@ -1,5 +1,6 @@
 """Recordings of channels and hazards as moments; two runs in step; the crash camera."""
 
+import json
 import shutil
 from dataclasses import replace
 
@@ -272,6 +273,12 @@ def test_two_runs_are_shown_side_by_side_in_step(two, tmp_path):
     packet = feed.take()
     assert packet.views["beside"].shape == packet.views["driver"].shape
     assert b'"beside":{"t":1.25' in packet.told
+    beside, curves = json.loads(packet.told)["beside"], other.curves()
+    drawn = beside["curves"]
+    assert drawn["stride"] == 1
+    assert (drawn["speed"], drawn["gap"]) == (curves.speed, curves.gap)
+    assert (drawn["ttc"], drawn["grip"]) == (curves.ttc, curves.grip)
+    assert drawn["speed"][-1] < source.curves().speed[-1] - 5.0  # the other one brakes
     feed.close()
     film = tmp_path / "f.mp4"
     words = ["replay", str(two[0]), "--beside", str(two[1]), "--to", "0.2", "--film", str(film)]

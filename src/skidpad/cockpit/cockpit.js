@@ -13,7 +13,7 @@ const HEARTBEAT = 100;  // ms between two words of the pedals while they are pre
 const STRIP_SECONDS = 30;
 const EDGE = { left: 34, right: 12 };  // px beside plots, where the numbers of their axes stand
 const ROW = 58, PLOT = 36, HEAD = 34;  // px: of a plot with its name, of its axes, of what stands above the plots of a time line
-const INKS = { speed: "#4d9dff", limit: "#ff8552", gap: "#4fce7f", ttc: "#ff7ab8", grip: "#f2b441", dim: "#9aa5b1",
+const INKS = { speed: "#4d9dff", limit: "#ff8552", gap: "#4fce7f", ttc: "#ff7ab8", grip: "#f2b441", dim: "#9aa5b1", beside: "#c9d1d9",
   crash: "#ff5b52", "put back": "#f2b441", marking: "#b58cff", notice: "#9aa5b1", hazard: "#ff4fa3" };
 const PLACES = ["left", "rear", "right", "top", "depth", "semantic", "radar"];  // of the small views, as a page begins
 const LAYOUT = "skidpad-layout";  // what this browser keeps of it
@@ -215,14 +215,16 @@ export default {
     },
     round(values, step) { return +(Math.max(1, Math.ceil(Math.max(...values) / step - 1e-9)) * step).toFixed(1); },  // up: the upper end of an axis
     plots(g, w, top, rows) {  // one below the other: name, value now, numbers at the ends of the axis, curve
-      rows.forEach(([name, ink, most, points, now, limit, note, none], i) => {
+      rows.forEach(([name, ink, most, points, now, limit, note, none, other, then], i) => {
         const low = top + (i + 1) * ROW - 4, high = low - PLOT, end = w - EDGE.right, y = (v) => low - PLOT * Math.max(0, Math.min(v / most, 1));
         g.strokeStyle = "#303944"; g.strokeRect(EDGE.left - 0.5, high - 0.5, end - EDGE.left + 1, PLOT + 1);
         g.textAlign = "right"; g.fillStyle = INKS.dim; g.fillText(most, EDGE.left - 5, high + 8); g.fillText("0", EDGE.left - 5, low);
         g.fillStyle = ink; g.fillText(now ?? "-", end, high - 5); g.textAlign = "left"; g.fillText(name, EDGE.left, high - 5);
+        if (other) { g.fillStyle = INKS.beside; g.textAlign = "right"; g.fillText(`beside ${then ?? "-"}`, end - 40, high - 5); g.textAlign = "left"; }
         if (note) { g.fillStyle = INKS.limit; g.fillText(note, EDGE.left + g.measureText(name).width + 12, high - 5); }
-        if (points.every((one) => one[1] === null)) { g.fillStyle = INKS.dim; g.textAlign = "center"; g.fillText(none || "no value", (EDGE.left + end) / 2, (low + high) / 2 + 4); g.textAlign = "left"; }
+        if ([...points, ...(other || [])].every((one) => one[1] === null)) { g.fillStyle = INKS.dim; g.textAlign = "center"; g.fillText(none || "no value", (EDGE.left + end) / 2, (low + high) / 2 + 4); g.textAlign = "left"; }
         if (limit) this.curve(g, limit, y, INKS.limit, 1.2);
+        if (other) { g.setLineDash([5, 3]); this.curve(g, other, y, INKS.beside, 1.4); g.setLineDash([]); }
         this.curve(g, points, y, ink, 1.8);
       });
     },
@@ -258,10 +260,11 @@ export default {
       for (const kind of new Set([...T.events.map((one) => one[1]), ...(T.hazards.length ? ["hazard"] : [])])) { g.fillStyle = INKS[kind]; g.fillText(kind, right, 10); right -= g.measureText(kind).width + 10; }
       g.textAlign = "left"; const low = HEAD + 4 * ROW - 4;
       for (const [tick, kind] of T.events) { bar(x(tick) - 1.5, x(tick) + 1.5, 16, 15, INKS[kind]); if (kind === "crash") rule(x(tick), INKS[kind]); }
-      const points = (values) => values.map((v, k) => [at(k), v]);
-      this.plots(g, w, HEAD, [["speed, km/h", INKS.speed, this.round([...T.speed, ...T.limit], 20), points(T.speed), T.speed[i], points(T.limit), T.limit.length ? "speed envelope" : ""],
-        ["gap to what is ahead, m", INKS.gap, T.far, points(T.gap), T.gap[i], null, "", `nothing within ${T.far} m`], ["time to collision, s", INKS.ttc, T.near, points(T.ttc), T.ttc[i], null, "", `none below ${T.near} s`],
-        ["grip of the tyres", INKS.grip, this.round([1, ...T.grip], 0.1), points(T.grip), T.grip[i], null, "", "not recorded"]]);
+      const points = (values) => values.map((v, k) => [at(k), v]), B = h.beside ? h.beside.curves : null, j = B ? Math.floor((h.tick - T.first) / B.stride) : 0;
+      const beside = (name) => B ? [B[name].slice(0, Math.floor(n / B.stride) + 1).map((v, k) => [x(T.first + k * B.stride), v]), B[name][j]] : [], most = (name) => [...T[name], ...(B ? B[name] : [])];
+      this.plots(g, w, HEAD, [["speed, km/h", INKS.speed, this.round([...most("speed"), ...T.limit], 20), points(T.speed), T.speed[i], points(T.limit), T.limit.length ? "speed envelope" : "", "", ...beside("speed")],
+        ["gap to what is ahead, m", INKS.gap, T.far, points(T.gap), T.gap[i], null, "", `nothing within ${T.far} m`, ...beside("gap")], ["time to collision, s", INKS.ttc, T.near, points(T.ttc), T.ttc[i], null, "", `none below ${T.near} s`, ...beside("ttc")],
+        ["grip of the tyres", INKS.grip, this.round([1, ...most("grip")], 0.1), points(T.grip), T.grip[i], null, "", "not recorded", ...beside("grip")]]);
       this.times(g, w, low + 16, T.first * T.dt, T.last * T.dt);
       rule(x(h.tick), "#fff"); g.fillRect(x(h.tick) - 1, 14, 2, 15);
     },

@@ -1,4 +1,4 @@
-"""Another run beside the one that is shown, in step with it: its picture and a line of words."""
+"""Another run beside the one that is shown, in step with it: its picture, a line of words, its curves."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from skidpad.campaign.driving.loop import Moment
 from skidpad.cockpit import hud
-from skidpad.cockpit.source import Source, index_at
+from skidpad.cockpit.source import Source, curves_beside, index_at
 from skidpad.cockpit.studio import FOR_PEOPLE, Looks, Studio, View, plane
 from skidpad.cockpit.turn_signals import TurnSignals
 from skidpad.core.setup import DT
@@ -23,6 +23,7 @@ class Companion:
     def __init__(self, source: Source, first: int, looks: Looks = FOR_PEOPLE) -> None:
         """first: the tick with which the other run begins; looks: of the world in its pictures."""
         self.source, self.first = source, first
+        self._curves = curves_beside(source)
         self._signals = TurnSignals(source)
         outside = source.seat(0).outside
         self.studio = Studio(source.map, source.table, outside, source.seed, looks=looks)
@@ -43,5 +44,6 @@ class Companion:
             "mode": mine.driver.mode,
             "weather": source.seat(k).outside.weather.name,
             "collisions": source.collisions(k),
+            "curves": self._curves,
         }
         return np.array(plane(images[view.value])), said

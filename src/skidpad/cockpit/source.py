@@ -155,3 +155,15 @@ def timeline(source: Source) -> dict[str, Any]:
         **source.curves()._asdict(),
         "events": source.marks,
     }
+
+
+def curves_beside(source: Source) -> dict[str, Any]:
+    """Returns what the page draws along the time of a run beside another one, from its begin on."""
+    curves = source.curves()
+    return {
+        "stride": every(source.ticks).step * source.step,  # ticks between two values
+        "speed": curves.speed,
+        "gap": curves.gap,
+        "ttc": curves.ttc,
+        "grip": curves.grip,
+    }

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from skidpad.core.vocabulary import Bodywork, Scenery
 from skidpad.core.weather import Weather
 from skidpad.roads.bundled import load_map
+from skidpad.scenery.dressing import dress_map
 from skidpad.sensors.bench import convoy
 from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.sensors.raster.rasteriser import AUTO_LEVEL
@@ -35,11 +37,12 @@ def figure8():
     return load_map("figure8")
 
 
-def eyes(map, place, level, move=None):
+def eyes(map, place, level, move=None, bodywork=Bodywork.PLAIN):
     table, states = convoy(map, place)
     if move:
         move(states)
-    suite = PixelSuite(map, table, twelve_sensors(), Weather(), PixelSettings(seed=7, level=level))
+    settings = PixelSettings(seed=7, level=level, bodywork=bodywork)
+    suite = PixelSuite(map, table, twelve_sensors(), Weather(), settings)
     return suite, suite.observe(0, states, {}), states
 
 
@@ -60,6 +63,16 @@ def test_levels_of_detail_stay_within_the_gate(figure8, place):
         same, error = compare(suite, id)
         assert same >= 0.9998, id
         assert error <= 1e-3, id
+
+
+@pytest.mark.parametrize("name", ["town", "figure8"])
+def test_scenery_and_shaped_bodies_equal_the_ray_tracer(name):
+    dressed = dress_map(load_map(name), Scenery.FULL)
+    suite, _, _ = eyes(dressed, 100.0, FULL, bodywork=Bodywork.SHAPED)
+    for id in CAMERAS:
+        same, error = compare(suite, id)
+        assert same >= 0.9999, id
+        assert error <= 1e-5, id
 
 
 def test_a_camera_inside_another_vehicle_sees_its_inside(figure8):

@@ -3,14 +3,15 @@
     PYTHONPATH=src python tools/carla_traffic.py --maps FOLDER --map Town10HD --seeds 1 2 3
 
 60 vehicles of all blueprints are driven for 6000 ticks of 0.05 s per seed. Printed: each pair that touched,
-each vehicle that vanished, each that moved less than a metre in the last minute, and their sums.
+each thing of the map that a vehicle touched, each vehicle that vanished, each that moved less than a metre
+in the last minute, and their sums. Of each it says how far its middle is from its lane's and how it steers.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
-from math import hypot, inf
+from math import cos, hypot, inf, radians, sin
 from typing import Any
 
 import carla
@@ -25,14 +26,19 @@ class Watch:
 
     def __init__(self, world: Any, cars: list[Any]) -> None:
         self.roads, self.k = world.get_map(), 0
+        self.cars = {car.id: car for car in cars}
         self.names = {car.id: car.type_id.removeprefix("vehicle.") for car in cars}
         self.touched, self.told = set[frozenset[int]](), set[frozenset[int]]()
+        self.struck, self.struck_told = set[tuple[int, str]](), set[tuple[int, str]]()
         self.vanished, self.now = set[int](), dict[int, Any]()
         self.moved: dict[int, tuple[int, float, float]] = {}
 
     def note_contact(self, event: Any) -> None:
-        """Notes the pair of a collision event."""
-        self.touched.add(frozenset((event.actor.id, event.other_actor.id)))
+        """Notes the pair of a collision event, or the thing of the map that a vehicle touched."""
+        if event.other_actor.id in self.names:
+            self.touched.add(frozenset((event.actor.id, event.other_actor.id)))
+        else:
+            self.struck.add((event.actor.id, event.other_actor.type_id))
 
     def note_tick(self, snapshot: Any) -> None:
         """Notes where each vehicle is, and prints new contacts and losses."""
@@ -40,6 +46,9 @@ class Watch:
         for pair in set(self.touched) - self.told:
             self.told.add(pair)
             self.tell("touched", pair)
+        for id, thing in set(self.struck) - self.struck_told:
+            self.struck_told.add((id, thing))
+            self.tell(f"touched {thing}", {id})
         for id in self.names.keys() - self.vanished:
             if (state := snapshot.find(id)) is None:
                 self.vanished.add(id)
@@ -61,10 +70,20 @@ class Watch:
         for id in ids & self.now.keys():
             place, speed = self.now[id].get_transform(), self.now[id].get_velocity().length()
             lane, at = self.roads.get_waypoint(place.location), place.location
+            middle, along = lane.transform.location, radians(lane.transform.rotation.yaw)
+            aside = (at.y - middle.y) * cos(along) - (at.x - middle.x) * sin(along)
+            astray = (place.rotation.yaw - lane.transform.rotation.yaw + 180.0) % 360.0 - 180.0
+            steered = None if id in self.vanished else self.cars[id].get_control()
             words.append(
                 f"{self.names[id]} ({at.x:.1f}, {at.y:.1f}) {place.rotation.yaw:.0f} deg {speed:.1f} m/s, "
                 f"still for {(self.k - self.moved[id][0]) * DT:.0f} s, road {lane.road_id} lane "
-                f"{lane.lane_id}{' in a junction' * lane.is_junction}"
+                f"{lane.lane_id}{' in a junction' * lane.is_junction}, {aside:+.1f} m and {astray:+.0f} deg "
+                f"off the lane's middle"
+                + (
+                    ""
+                    if steered is None
+                    else f", steers {steered.steer:+.2f}, throttle {steered.throttle:.2f}"
+                )
             )
         print("; ".join(words), flush=True)
 
@@ -87,7 +106,7 @@ def drive(client: Any, args: argparse.Namespace) -> None:
             watch.note_tick(world.get_snapshot())
         for id in (standing := watch.standing()):
             watch.tell("stands", {id})
-        struck = {id for pair in watch.touched for id in pair} & watch.names.keys()
+        struck = {id for pair in watch.touched for id in pair}
         print(
             f"seed {seed}: {len(cars)} vehicles, {args.ticks} ticks: {len(watch.vanished)} vanished, "
             f"{len(struck)} touched in {len(watch.touched)} pairs, {len(standing)} stand",

@@ -4,7 +4,8 @@
 
 60 vehicles of all blueprints are driven for 6000 ticks of 0.05 s per seed. Printed: each pair that touched,
 each thing of the map that a vehicle touched, each vehicle that vanished, each that moved less than a metre
-in the last minute, and their sums. Of each it says how far its middle is from its lane's and how it steers.
+for a minute with those near it, and their sums. Of each it says how it steers and how far its middle is from
+its lane's.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ import carla
 from carla_world import DT, PATIENCE_S, hear_collisions, loaded, spread
 from skidpad.simulation.carla_server.process import ServerProcess
 from soak_server import free_port
+
+NEAR = 20.0  # m
 
 
 class Watch:
@@ -58,6 +61,20 @@ class Watch:
             _, x, y = self.moved.get(id, (0, inf, inf))
             if hypot(at.x - x, at.y - y) > 1.0:
                 self.moved[id] = (self.k, at.x, at.y)
+            if self.k - self.moved[id][0] == round(60.0 / DT):
+                car = self.cars[id]
+                light = (
+                    f" at a light, {car.get_traffic_light_state()}"
+                    if car.is_at_traffic_light()
+                    else ""
+                )
+                self.tell(f"stands{light}, and within {NEAR:.0f} m", {id, *self.near(id)})
+
+    def near(self, id: int) -> list[int]:
+        """Returns the vehicles within NEAR m of one."""
+        here = self.now[id].get_transform().location
+        there = self.now.keys() - self.vanished
+        return [i for i in there if self.now[i].get_transform().location.distance(here) < NEAR]
 
     def standing(self) -> list[int]:
         """Returns the vehicles that are there and moved less than a metre in the last minute."""

@@ -47,7 +47,7 @@ def test_it_adds_brake_and_takes_throttle_and_never_the_reverse(served):
     for most, least, throttle, brake in ((0.3, 0.0, 0.8, 0.1), (1.0, 0.5, 0.2, 0.7)):
         vehicle.most_throttle, vehicle.least_brake = most, least
         vehicle.control = Control(throttle=throttle, brake=brake, steer=0.4)
-        got = vehicle.command(slow=False, dt=0.05)
+        got = vehicle.command(speed=10.0, mu=1.0, dt=0.05)
         assert got[0] == min(throttle, most)
         assert got[1] == max(brake, least)
         assert got[2] == 0.4

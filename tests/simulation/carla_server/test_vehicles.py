@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from skidpad.core.geometry import Pose
-from skidpad.core.vocabulary import GripModel
+from skidpad.core.maths.constants import G
+from skidpad.core.vocabulary import ActorKind, GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.grip import grip_params
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.carla_server.actors.catalogue import load_catalogue
-from skidpad.simulation.carla_server.vehicles.vehicles import STICKY_SPEED, Vehicles
+from skidpad.simulation.carla_server.vehicles.control import Control
+from skidpad.simulation.carla_server.vehicles.vehicles import LEAN_SHARE, STICKY_SPEED, Vehicles
 from skidpad.simulation.world.lights import Lights
 from skidpad.simulation.world.world import Conditions, World
 
@@ -102,3 +104,37 @@ def test_whatever_drives_steers_as_fast_as_clients_controllers_expect(name):
     """Lorries that steered at 35 deg/s left their lane by up to 33 m under the Traffic Manager."""
     assert turned_wheels(name, 5) > 25.0  # after 0.25 s
     assert turned_wheels(name, 30) == pytest.approx(70.0, abs=1.0)
+
+
+RIDDEN = [
+    id for id, b in load_catalogue().items() if b.kind in (ActorKind.MOTORCYCLE, ActorKind.BICYCLE)
+]
+
+
+@pytest.mark.parametrize("mu", [0.9, 1.5])
+@pytest.mark.parametrize("speed", [8.0, 15.0])
+@pytest.mark.parametrize("id", RIDDEN)
+def test_a_two_wheeler_leans_into_a_bend_and_does_not_spin(
+    id: str, speed: float, mu: float
+) -> None:
+    """Full steering, as a Traffic Manager asks for it, needs most of the tyres' grip and no more."""
+    map = load_map("figure8")
+    grip = grip_params(Weather(), GripModel.NONE, mu)
+    made = Vehicles(World(map, Lights(map), Conditions(grip=grip, dt=DT, road_noise=0.0)))
+    made.add(CAR, load_catalogue()[id], Pose(0.0, 0.0))
+    made.set_velocity(CAR, (speed, 0.0, 0.0))
+    made.of(CAR).control = Control(throttle=0.2, steer=1.0)
+    states, across, slips = made.moving.states, [], []
+    for _ in range(60):
+        made.command(DT)
+        made.moving.feel_grip()
+        made.moving.fleet.step(
+            made.moving.commands, made.moving.on_wheels.road_mu, np.zeros(1), np.zeros(1)
+        )
+        v = np.hypot(states.vx[0], states.vy[0])
+        across.append(v * states.yaw_rate[0])
+        course = np.arctan2(states.vy[0], states.vx[0])
+        slips.append(abs((course - states.yaw[0] + np.pi) % (2.0 * np.pi) - np.pi))
+    assert np.degrees(max(slips)) < 25.0
+    most = LEAN_SHARE * float(made.moving.mu[0].mean()) * G
+    assert 0.5 * most < max(across) < 1.35 * most

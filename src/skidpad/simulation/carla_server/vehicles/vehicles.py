@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from math import atan2, radians
 
 import msgspec
 import numpy as np
 
 from skidpad.core.geometry import Pose
+from skidpad.core.maths.constants import G
 from skidpad.core.vocabulary import ActorKind
 from skidpad.physics.types import VehicleType, vehicle_type
+from skidpad.physics.vehicle import steer_share
 from skidpad.simulation.carla_server.actors.catalogue import Blueprint
 from skidpad.simulation.carla_server.protocol.wire import Vector
 from skidpad.simulation.carla_server.vehicles.ackermann import AckermannDriver, AckermannSettings
@@ -34,6 +37,8 @@ MODELS = {  # physics type that stands for a blueprint of this kind; sizes are t
     ActorKind.BICYCLE: "mini_cooper_s",
 }
 """Two-wheelers are narrow cars to the physics: they do not lean (listed as a difference)."""
+TWO_WHEELERS = (ActorKind.MOTORCYCLE, ActorKind.BICYCLE)
+LEAN_SHARE = 0.8  # of the grip across that a rider uses; more makes a rider fall (assumption)
 
 # Steering as clients' controllers expect it, the Traffic Manager's among them: under it, lorries that
 # steer as slowly as real ones leave their lane in every junction.
@@ -63,18 +68,26 @@ class Vehicle:
     most_throttle: float = 1.0  # with which it drives, whatever its client asks for
     least_brake: float = 0.0
     speed_limit: float = 30.0 / 3.6  # m/s; CARLA's default until the first sign
+    is_ridden: bool = False  # two wheels
 
-    def command(self, slow: bool, dt: float) -> tuple[float, float, float, bool, bool]:
+    def command(self, speed: float, mu: float, dt: float) -> tuple[float, float, float, bool, bool]:
         """Returns throttle, brake, steer, handbrake, reverse of the coming tick of dt s.
 
-        Call it once per tick.
-        slow: below STICKY_SPEED, where it is held without throttle unless it was pushed.
+        Call it once per tick. Below a speed of STICKY_SPEED in m/s it is held without throttle unless it was
+        pushed; a rider steers no further than the grip mu of the tyres allows to lean.
         """
         c = self.control
         throttle = 0.0 if c.manual and c.gear == 0 else min(c.throttle, self.most_throttle)
         brake = max(c.brake, self.least_brake)
-        brake = 1.0 if throttle == 0.0 and self._sticks(slow, dt) else brake
-        return throttle, brake, c.steer, c.hand_brake, c.reverse or (c.manual and c.gear < 0)
+        brake = 1.0 if throttle == 0.0 and self._sticks(speed < STICKY_SPEED, dt) else brake
+        steer = self._ride(c.steer, speed, mu) if self.is_ridden else c.steer
+        return throttle, brake, steer, c.hand_brake, c.reverse or (c.manual and c.gear < 0)
+
+    def _ride(self, steer: float, speed: float, mu: float) -> float:
+        """Returns the part of a steer that needs LEAN_SHARE of the grip mu at this speed in m/s."""
+        full = radians(self.type.steer_max_deg) * steer_share(speed)
+        most = atan2(self.type.wheelbase * LEAN_SHARE * mu * G, speed * speed) / full
+        return min(max(steer, -most), most)
 
     def gear(self, speed: float) -> int:
         """Returns the gear that is in at this speed in m/s, -1 in reverse."""
@@ -146,7 +159,8 @@ class Vehicles:
         """Adds a vehicle at rest at the pose, with a body in the moving world, and returns it."""
         model = model_of(blueprint)
         body = self.moving.add(Newcomer(model, type=blueprint.id), pose)
-        vehicle = Vehicle(actor, body, model, PhysicsControl.of(model))
+        is_ridden = blueprint.kind in TWO_WHEELERS
+        vehicle = Vehicle(actor, body, model, PhysicsControl.of(model), is_ridden=is_ridden)
         vehicle.shifts = shift_speeds(vehicle.physics.engine, model.wheel_radius)
         self._by_actor[actor] = vehicle
         return vehicle
@@ -189,12 +203,13 @@ class Vehicles:
         if not self._by_actor:
             return
         fleet = self.moving.fleet
-        slow = (np.hypot(fleet.states.vx, fleet.states.vy) < STICKY_SPEED).tolist()
+        speed = np.hypot(fleet.states.vx, fleet.states.vy).tolist()
+        mu = self.moving.mu[: len(speed)].mean(axis=1).tolist()
         commands = []
         for i, vehicle in enumerate(self):
             if vehicle.driver is not None:
                 vehicle.driver.drive(vehicle.control, fleet, i, dt)
-            commands.append(vehicle.command(slow[i], dt))
+            commands.append(vehicle.command(speed[i], mu[i], dt))
         self.moving.commands[: len(commands)] = commands
 
     def let_go(self) -> None:

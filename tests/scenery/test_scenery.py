@@ -69,20 +69,19 @@ def test_nothing_generated_stands_on_or_within_a_metre_of_lanes_crossings_or_way
     assert not tree.query([*crossings, *spawns], predicate="dwithin", distance=1.0).size
 
 
-@pytest.mark.parametrize("name", ["town", "figure8"])
-def test_no_way_of_pedestrians_leads_through_anything(name: str) -> None:
-    road_map = load_map(name)
+def test_no_way_of_pedestrians_leads_through_anything(road_map) -> None:
     mesh = walk_mesh(road_map)
-    assert mesh is not None
+    if mesh is None:  # it has no pavements
+        return
     ways = [shapely.Polygon(mesh.vertices[list(ring), :2]) for ring in mesh.polygons]
     added = outlines_of(things_of(road_map))
     assert not shapely.STRtree(added).query(ways, predicate="dwithin", distance=1.0).size
 
 
-def test_sight_triangles_of_junctions_are_free_of_what_is_tall() -> None:
-    road_map = load_map("town")
+def test_sight_triangles_of_junctions_are_free_of_what_is_tall(road_map) -> None:
     triangles = sight_triangles(road_map.samples, road_map.lanes)
-    assert len(triangles) > 20
+    if not triangles:  # it has no junctions
+        return
     tall = outlines_of([t for t in things_of(road_map) if t.is_tall])
     assert not shapely.STRtree(tall).query(triangles, predicate="intersects").size
 

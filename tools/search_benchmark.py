@@ -288,7 +288,9 @@ def _row(out: Path, cell: str, stack: str, method: str) -> str | None:
 
 
 def with_verifai(python: str) -> None:
-    """Makes VerifAI's samplers methods of the search in this process."""
+    """Makes VerifAI's samplers methods of the search in this process; "": does nothing."""
+    if not python:
+        return
     own = {m: partial(Sampler, python, m.partition("-")[2]) for m in VERIFAI}
     methods.METHODS = {**methods.METHODS, **own}
 
@@ -299,9 +301,8 @@ def drive(asked: argparse.Namespace) -> None:
     pairs = [(cell, stack) for cell in asked.cells for stack in asked.stacks]
     for cell, stack in pairs:
         template_of(asked.out, cell, stack)
-    start = with_verifai if asked.verifai else None
     with ProcessPoolExecutor(
-        asked.workers, initializer=start, initargs=(asked.verifai,) if start else ()
+        asked.workers, initializer=with_verifai, initargs=(asked.verifai,)
     ) as pool:
         going = {}
         for seed in range(1, asked.seeds + 1):

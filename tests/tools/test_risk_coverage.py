@@ -57,7 +57,9 @@ def test_table_says_how_often_an_interval_holds_the_counted_share(tmp_path):
 
 def test_a_block_of_real_runs_depends_on_its_number_alone(tmp_path, monkeypatch):
     monkeypatch.setattr(coverage, "BLOCK", 3)
-    course = Scenario(file=str(scenario_file("lead_slowdown")), parameters={"TriggerDistance": "80"})
+    course = Scenario(
+        file=str(scenario_file("lead_slowdown")), parameters={"TriggerDistance": "80"}
+    )
     driver = AdasDriver(label="4", functions=functions_of(4))
     run = RunSpec(driver=driver, course=course, duration=2.0)
     space = Space((Variable("LeadS", Normal(128.0, 4.0, 110.0, 160.0)),))

@@ -94,9 +94,8 @@ def slopes(
         b = w - above[x]
         work[W + x] = w
         work[GY + x] = (a if (abs(a) < abs(b) or top) and not bottom else b) * focal
-        work[U + x] = (
-            start + np.float32(np.int32(x)) * per_pixel
-        )  # of 64 bits it takes four times as long
+        column = np.float32(np.int32(x))  # of 64 bits it takes four times as long
+        work[U + x] = start + column * per_pixel
         solid = np.int32(solid + np.int32(w > ZERO))
     for x in range(1, count - 1):
         a = here[x + 1] - here[x]

@@ -53,21 +53,70 @@ def look_around(scene: LiveScene, pose: Pose, fan: Fan, reach: float, hidden: in
     quarter = sectors_of(fan.azimuth)
     turn = fan.azimuth - quarter * 2.0 * pi / SECTORS
     aside, ahead, up = -np.tan(turn), np.cos(turn), -np.tan(fan.elevation)
-    sector, n = quarter[fan.column], len(fan.column)
-    distance, hits = np.full(n, np.inf), make_hits(n)
+    start, ray, u, v = _sort_rays(fan, quarter, aside, ahead, up)
+    distance, hits = np.full(len(ray), np.inf), make_hits(len(ray))
     for k in range(SECTORS):
-        mine = np.flatnonzero(sector == k)
-        if not len(mine):
+        some = slice(start[k], start[k + 1])
+        if some.start == some.stop:
             continue
         facing = pose @ Pose(0.0, 0.0, yaw=k * 2.0 * pi / SECTORS)
-        column = fan.column[mine]
-        u, v = aside[column], up[fan.channel[mine]] / ahead[column]
-        part = _cast_sector(scene, facing, u, v, reach, hidden)
-        _settle(part, u, v, mine, hits, distance)
-    ray = np.flatnonzero(distance <= reach)
-    key = hits.key[ray].astype(np.int64)
-    direction = directions(fan, ray)
-    return RayHits(ray, distance[ray], direction, hits.cosine[ray], key >> 8 & 0xFF, key >> 16)
+        part = _cast_sector(scene, facing, u[some], v[some], reach, hidden)
+        _settle(part, u[some], v[some], ray[some], hits, distance)
+    flat, rise = np.cos(fan.elevation), np.sin(fan.elevation)
+    return _gather(fan, np.cos(fan.azimuth), np.sin(fan.azimuth), flat, rise, hits, distance, reach)
+
+
+@kernel
+def _sort_rays(
+    fan: Fan, quarter: Ints, aside: Floats, ahead: Floats, up: Floats
+) -> tuple[Ints, Ints, Floats, Floats]:
+    """Returns the rays sector by sector: where each sector starts, which rays, m right and down per m ahead.
+
+    quarter, aside, ahead: by column; up: by channel.
+    """
+    n = fan.column.size
+    start = np.zeros(SECTORS + 1, dtype=np.int64)
+    ray, u, v = np.empty(n, dtype=np.int64), np.empty(n), np.empty(n)
+    for i in range(n):
+        start[quarter[fan.column[i]] + 1] += 1
+    for k in range(SECTORS):
+        start[k + 1] += start[k]
+    free = start.copy()
+    for i in range(n):
+        column = fan.column[i]
+        at = free[quarter[column]]
+        free[quarter[column]] += 1
+        ray[at], u[at], v[at] = i, aside[column], up[fan.channel[i]] / ahead[column]
+    return start, ray, u, v
+
+
+@kernel
+def _gather(
+    fan: Fan, c: Floats, s: Floats, flat: Floats, rise: Floats, hits: Hits, distance: Floats,
+    reach: float,
+) -> RayHits:  # fmt: skip
+    """Returns what rays met within `reach` m.
+
+    c, s: cosines and sines of azimuth; flat, rise: of elevation.
+    """
+    m = 0
+    for i in range(distance.size):
+        m += distance[i] <= reach
+    out = RayHits(
+        np.empty(m, dtype=np.int64), np.empty(m), np.empty((m, 3)), np.empty(m),
+        np.empty(m, dtype=np.int64), np.empty(m, dtype=np.int64),
+    )  # fmt: skip
+    m = 0
+    for i in range(distance.size):
+        if distance[i] <= reach:
+            column, channel = fan.column[i], fan.channel[i]
+            out.ray[m], out.distance[m], out.cosine[m] = i, distance[i], hits.cosine[i]
+            out.direction[m, 0] = c[column] * flat[channel]
+            out.direction[m, 1] = s[column] * flat[channel]
+            out.direction[m, 2] = rise[channel]
+            out.label[m], out.instance[m] = hits.key[i] >> 8 & 0xFF, hits.key[i] >> 16
+            m += 1
+    return out
 
 
 def directions(fan: Fan, ray: Ints) -> Floats:

@@ -38,6 +38,8 @@ class Rays(NamedTuple):
     row: Floats  # (n,)
     start: Ints32  # (width * height + 1,) rays of cell i are order[start[i]:start[i + 1]]
     order: Ints32  # (n,)
+    x: Floats  # (n,) columns in this order: what is read together lies together
+    y: Floats  # (n,) rows in this order
 
 
 class Hits(NamedTuple):
@@ -55,6 +57,8 @@ def make_rays(n: int, width: int, height: int) -> Rays:
         np.zeros(n),
         np.zeros(width * height + 1, dtype=np.int32),
         np.zeros(n, dtype=np.int32),
+        np.zeros(n),
+        np.zeros(n),
     )
 
 
@@ -65,7 +69,7 @@ def make_hits(n: int) -> Hits:
 
 @inner_kernel
 def sort_into_cells(view: View, rays: Rays) -> None:
-    """Fills `start` and `order` from the rays' columns and rows (a counting sort)."""
+    """Fills `start`, `order`, `x` and `y` from the rays' columns and rows (a counting sort)."""
     rays.start[:] = 0
     for i in range(rays.column.size):
         x = min(max(floor(rays.column[i]), 0), view.width - 1)
@@ -78,7 +82,8 @@ def sort_into_cells(view: View, rays: Rays) -> None:
         y = min(max(floor(rays.row[i]), 0), view.height - 1)
         cell = y * view.width + x + 1
         rays.start[cell] -= 1
-        rays.order[rays.start[cell]] = i
+        at = rays.start[cell]
+        rays.order[at], rays.x[at], rays.y[at] = i, rays.column[i], rays.row[i]
     for cell in range(rays.start.size - 1):
         rays.start[cell] = rays.start[cell + 1]
     rays.start[rays.start.size - 1] = rays.order.size
@@ -117,11 +122,11 @@ def _is_touched(
     nearest = 1.0 / near
     for row in range(floor(max(top, 0.0)), floor(min(bottom, view.height - 1.0)) + 1):
         base = row * view.width
-        for k in range(rays.start[base + first], rays.start[base + last + 1]):
-            i = rays.order[k]
-            if nearest <= hits.inverse[i]:
+        begin, end = np.uint64(rays.start[base + first]), np.uint64(rays.start[base + last + 1])
+        for k in range(begin, end):
+            if nearest <= hits.inverse[np.uint64(rays.order[k])]:
                 continue
-            u, v = (rays.column[i] - view.cx) / view.focal, (rays.row[i] - view.cy) / view.focal
+            u, v = (rays.x[k] - view.cx) / view.focal, (rays.y[k] - view.cy) / view.focal
             cross_x, cross_y, cross_z = y - z * v, z * u - x, x * v - y * u
             apart = cross_x * cross_x + cross_y * cross_y + cross_z * cross_z
             if apart <= reach * reach * (u * u + v * v + 1.0):
@@ -130,11 +135,14 @@ def _is_touched(
 
 
 @inner_kernel
-def _meet(corners: Floats, value: int, view: View, rays: Rays, hits: Hits) -> None:
-    """Writes one projected triangle (3, 3) into `hits` of those rays that meet it nearer than before."""
-    x0, y0, w0 = corners[0, 0], corners[0, 1], corners[0, 2]
-    x1, y1, w1 = corners[1, 0], corners[1, 1], corners[1, 2]
-    x2, y2, w2 = corners[2, 0], corners[2, 1], corners[2, 2]
+def _meet(
+    x0: float, y0: float, w0: float, x1: float, y1: float, w1: float, x2: float, y2: float, w2: float,
+    value: int, view: View, rays: Rays, hits: Hits,
+) -> None:  # fmt: skip
+    """Writes one projected triangle into `hits` of those rays that meet it nearer than before.
+
+    x, y, w: column, row and inverse depth of its corners.
+    """
     det = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
     if det == 0.0:
         return
@@ -148,9 +156,9 @@ def _meet(corners: Floats, value: int, view: View, rays: Rays, hits: Hits) -> No
     b = ((x1 - x0) * (w2 - w0) - (x2 - x0) * (w1 - w0)) / det
     for y in range(top, bottom + 1):
         base = y * view.width
-        for k in range(rays.start[base + left], rays.start[base + right + 1]):
-            i = rays.order[k]
-            px, py = rays.column[i], rays.row[i]
+        first, end = np.uint64(rays.start[base + left]), np.uint64(rays.start[base + right + 1])
+        for k in range(first, end):
+            px, py = rays.x[k], rays.y[k]
             e0 = (x1 - x0) * (py - y0) - (y1 - y0) * (px - x0)
             e1 = (x2 - x1) * (py - y1) - (y2 - y1) * (px - x1)
             e2 = (x0 - x2) * (py - y2) - (y0 - y2) * (px - x2)
@@ -159,6 +167,7 @@ def _meet(corners: Floats, value: int, view: View, rays: Rays, hits: Hits) -> No
             )
             if not inside:
                 continue
+            i = np.uint64(rays.order[k])
             w = w0 + a * (px - x0) + b * (py - y0)
             if w > hits.inverse[i]:
                 hits.inverse[i] = w
@@ -193,7 +202,6 @@ def _meet_block(
 ) -> None:
     """Intersects the rays with `count` triangles of a block, clipped at the near plane, and updates hits."""
     screen, code = scratch.screen, scratch.code
-    corners = np.empty((3, 3))
     for t in range(first, first + count):
         a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
         if code[a] & code[b] & code[c]:
@@ -202,15 +210,15 @@ def _meet_block(
         if (code[a] | code[b] | code[c]) & BEHIND:
             k = clip_near(a, b, c, view, scratch, work)
             for i in range(1, k - 1):
-                corners[0] = work[0]
-                corners[1] = work[i]
-                corners[2] = work[i + 1]
-                _meet(corners, value, view, rays, hits)
+                _meet(
+                    work[0, 0], work[0, 1], work[0, 2], work[i, 0], work[i, 1], work[i, 2],
+                    work[i + 1, 0], work[i + 1, 1], work[i + 1, 2], value, view, rays, hits,
+                )  # fmt: skip
         else:
-            corners[0] = screen[a]
-            corners[1] = screen[b]
-            corners[2] = screen[c]
-            _meet(corners, value, view, rays, hits)
+            _meet(
+                screen[a, 0], screen[a, 1], screen[a, 2], screen[b, 0], screen[b, 1], screen[b, 2],
+                screen[c, 0], screen[c, 1], screen[c, 2], value, view, rays, hits,
+            )  # fmt: skip
 
 
 @kernel

@@ -3,8 +3,8 @@
 A synchronous client of the `carla` wheel, on the same machine, ticks a map with standing cars by
 0.05 s and takes every reading of every tick: on figure8 with 20 cars no sensor, each of three, and all of
 them; with --maps on Town10HD with 50 cars the three, and six cameras of 1600 x 900 around the first car.
-Printed: wall time of a tick, median and mean, how many times real time the mean is, and processor time
-of server and client per simulated second.
+With --quality full,draft both are measured, one after the other. Printed: wall time of a tick, median
+and mean, how many times real time the mean is, and processor time of server and client per simulated second.
 """
 
 from __future__ import annotations
@@ -59,13 +59,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--maps", help="a folder with Town10HD.xodr: that town alone is measured")
     parser.add_argument("--ticks", type=int, default=200)
+    parser.add_argument("--quality", default="full", help="of pictures: full, draft or full,draft")
     parser.add_argument("server", nargs="*", help="options of the server, after --")
     args = parser.parse_args()
-    if args.maps is None:
-        measure("figure8", 20, ALONE | THREE, args.ticks, args.server)
-    else:
-        options = ["--maps", args.maps, *args.server]
-        measure("Town10HD", 50, ALONE | THREE | SIX, args.ticks, options)
+    for quality in args.quality.split(","):
+        options = ["--quality", quality, *args.server]
+        print(f"quality {quality}")
+        if args.maps is None:
+            measure("figure8", 20, ALONE | THREE, args.ticks, options)
+        else:
+            options = ["--maps", args.maps, *options]
+            measure("Town10HD", 50, ALONE | THREE | SIX, args.ticks, options)
     sys.stdout.flush()
     os._exit(0)  # the wheel may abort while it ends
 

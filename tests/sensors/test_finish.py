@@ -118,9 +118,10 @@ def test_dense_fog_hides_the_sky_as_it_hides_the_ground():
         return (light.std(axis=0) / light.mean(axis=0)).max()
 
     clear = Weather(cloudiness=60.0)
-    _, foggy, changed = both(replace(clear, fog_density=90.0), Extra.CLOUDS)
+    plain, foggy, _ = both(replace(clear, fog_density=90.0), Extra.FOG)
     sky = foggy.labels == SemanticClass.SKY
-    assert not changed[~sky].any()
+    ground = np.abs((plain.rgb / 255.0) ** 2 - (foggy.rgb / 255.0) ** 2)[~sky]
+    assert ground.max() < 0.03, "by two laws of contrast"
     assert spread(foggy) < 0.02
     assert spread(Seen(clear, {Extra.CLOUDS})) > 0.08
     haze = 255.0 * np.sqrt(foggy.suite.shading.light.horizon)
@@ -312,15 +313,16 @@ def test_tone_makes_corners_darker_at_noon_and_contrast_by_day_only():
 
 @pytest.mark.parametrize("curve", [0.0, CURVE])
 def test_the_curve_of_tone_keeps_the_order_of_all_greys(curve):
-    camera = CameraSpec("a", Modality.RGB, 256, 1, 1.0, DRIVER)  # so narrow that no light is lost
-    grey = np.arange(256, dtype=np.uint32)
-    out = (grey | grey << 8 | grey << 16 | np.uint32(0xFF000000))[None].astype(np.uint32)
+    camera = CameraSpec("a", Modality.RGB, 64, 256, 1.0, DRIVER)  # so narrow that no light is lost
+    grey = np.arange(256, dtype=np.uint32)[:, None]
+    out = np.repeat(grey | grey << 8 | grey << 16 | np.uint32(0xFF000000), 64, axis=1)
     set_tone(camera_view(camera, Pose(0.0, 0.0)), curve, out)
-    found = out.view(np.uint8).reshape(256, 4).astype(int)
-    assert (np.diff(found[:, 0]) >= 0).all()
-    assert (found[:, :3] == found[:, :1]).all()
-    assert found[[0, 255], 0].tolist() == [0, 255]
-    steepest = np.diff(found[:, 0])[80:120].mean()
+    found = out.view(np.uint8).reshape(256, 64, 4).astype(int)
+    assert (found[..., :3] == found[..., :1]).all()
+    found = found[..., 0].mean(axis=1)  # noise hides the steps between bytes
+    assert (np.diff(found) >= -0.05).all()
+    assert found[[0, 255]].tolist() == [0.0, 255.0]
+    steepest = np.diff(found)[80:120].mean()
     assert (steepest > 1.2) == (curve > 0.0)
 
 

@@ -46,6 +46,7 @@ EXTRAS = {
     Extra.REFLECTIONS: "lamps on a wet road",
     Extra.RETRO: "reflective signs, lines",
     Extra.CLOUDS: "clouds, stars",
+    Extra.FOG: "fog, haze",
     Extra.EDGES: "soft edges",
     Extra.SNOW: "snow, ice on the road",
     Extra.TONE: "contrast, dim corners",

@@ -44,7 +44,7 @@ class Weather:
         fog_density: percent.
         fog_distance: m, where fog begins.
         wetness: percent.
-        fog_falloff: How fast fog thins with height, as in CARLA.
+        fog_falloff: How fast fog thins with height, as in CARLA: it is halved every 10 m / fog_falloff.
         scattering_intensity: Of the sky, as in CARLA.
         mie_scattering_scale: Of the sky, as in CARLA.
         rayleigh_scattering_scale: Of the sky, as in CARLA.

@@ -29,6 +29,7 @@ GLARE = 10.0  # degrees squared per sr: of the eye, an assumption for a lens
 GLARE_FROM, GLARE_TO = 1.0, 30.0  # deg
 SPREAD = 2.0 ** (1.0 / 3.0)  # diameter of a half sphere over that of a sphere of its volume
 ONE, HALF, SIXTH, SIXTEENTH = (np.float32(x) for x in (1.0, 1.0 / 2.0, 1.0 / 6.0, 1.0 / 16.0))
+NO_LIGHT = np.float32(60.0)  # nepers, of which no step of a byte is left
 LENS_HEIGHT = 0.03  # m, of the glass before a lens: an assumption
 
 
@@ -71,9 +72,10 @@ def share_left(depth: np.float32, curved: np.float32) -> np.float32:
     """Returns the share of light left behind an optical depth, for pictures: no call, so loops vectorise.
 
     curved: 1 for exp(-depth), to 1e-4; 0 for the law of the published pictures, (1 + depth / 16)^-16,
-    which lets up to 0.017 more through.
+    which lets up to 0.017 more through. Beyond NO_LIGHT nothing counts: numbers would get too small for
+    a processor to be quick with them.
     """
-    part = depth * SIXTEENTH
+    part = (depth if depth < NO_LIGHT else NO_LIGHT) * SIXTEENTH
     more = curved * part * (HALF + SIXTH * part)
     left: np.float32 = ONE / (ONE + part * (ONE + more))
     left *= left

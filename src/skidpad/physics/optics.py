@@ -25,6 +25,10 @@ CONTRAST_SEEN = 0.05  # least contrast of the meteorological optical range, WMO-
 CONTRAST_CAR = 0.5  # of a car against the road at no distance; our assumption
 V_CLEAR = 20_000.0  # m, sight at fog density 0; "clear" in the international visibility code
 V_FOG = 50.0  # m, at fog density 100; density 50 then gives 1 km, where fog begins (WMO-No. 8)
+FALLOFF = 0.1 * log(
+    2.0
+)  # 1/m at a fog_falloff of 1: halved each 10 m, Unreal's exponential height fog
+LEVEL = 0.01  # m of climb, below which a way counts as level
 RAIN_SIGHT_KM, RAIN_SIGHT_EXPONENT = (
     11.6,
     -0.63,
@@ -48,6 +52,9 @@ def fog_extinction(weather: Weather) -> float:
     share = weather.fog_density / 100.0
     sight = V_CLEAR * (V_FOG / V_CLEAR) ** share
     return float(-log(CONTRAST_SEEN) / sight)
+
+
+CLEAR = fog_extinction(Weather())  # 1/m, of air without fog
 
 
 def rain_extinction(rain_mm_h: float) -> float:
@@ -76,21 +83,60 @@ def visibility(weather: Weather) -> float:
 class Air(NamedTuple):
     """What visible light meets on its way."""
 
-    fog: float  # 1/m, extinction of fog and clear air
+    fog: float  # 1/m, extinction of fog and clear air, where the fog lies
     fog_start: float  # m, where they begin
     rain: float  # 1/m, extinction from the lens on
+    thinning: float = (
+        0.0  # 1/m of height by which the fog falls by a factor of e; 0: alike everywhere
+    )
+    ground: float = 0.0  # m, height up to which the fog is as dense as it is
 
 
-def air_of(weather: Weather) -> Air:
-    """Returns what this weather puts in the way of visible light."""
-    rain = rain_extinction(rain_rate(weather))
-    return Air(fog_extinction(weather), float(weather.fog_distance), rain)
+def air_of(weather: Weather, ground: float | None = None) -> Air:
+    """Returns what this weather puts in the way of visible light.
+
+    ground: m, height above which the fog thins as fog_falloff says; None: it is alike at all heights, as
+    is a fog that takes less light than clear air does.
+    """
+    rain, fog = rain_extinction(rain_rate(weather)), fog_extinction(weather)
+    air = Air(fog, float(weather.fog_distance), rain)
+    if ground is None or weather.fog_falloff <= 0.0 or fog < 2.0 * CLEAR:
+        return air
+    return air._replace(thinning=weather.fog_falloff * FALLOFF, ground=ground)
 
 
 @kernel
-def air_depth(air: Air, distance: float) -> float:
-    """Returns the optical depth of `distance` m of air, in nepers."""
-    return air.fog * max(distance - air.fog_start, 0.0) + air.rain * distance
+def fog_share(air: Air, height: float, climb: float) -> float:
+    """Returns the mean density of the fog on a level or sloping way, as a share of that at the ground.
+
+    The density falls with exp(-thinning (z - ground)) above the ground. height: m, where the way begins;
+    climb: m from there to its end.
+    """
+    if air.thinning <= 0.0:
+        return 1.0
+    begin = height - air.ground
+    if abs(climb) < LEVEL:
+        return exp(-air.thinning * max(begin, 0.0))
+    return (_fog_below(air, begin + climb) - _fog_below(air, begin)) / climb
+
+
+@kernel
+def _fog_below(air: Air, z: float) -> float:
+    """Returns the fog between the ground and a height z m above it, in m of the fog at the ground."""
+    return (1.0 - exp(-air.thinning * z)) / air.thinning if z > 0.0 else z
+
+
+@kernel
+def air_depth(air: Air, distance: float, height: float = 0.0, climb: float = 0.0) -> float:
+    """Returns the optical depth of `distance` m of air, in nepers.
+
+    height: m, of the eye; climb: m, from there to what it sees.
+    """
+    foggy = max(distance - air.fog_start, 0.0)
+    if air.thinning > 0.0 and foggy > 0.0:
+        before = climb * air.fog_start / distance
+        foggy *= fog_share(air, height + before, climb - before)
+    return air.fog * foggy + air.rain * distance
 
 
 def transmission(weather: Weather, distance: float) -> float:

@@ -123,10 +123,16 @@ class PixelSuite:
         limited = range_model is RangeModel.PHYSICAL
         labels = label_range(weather, Beam.LOW if beam is None else beam)
         sight = Sight(depth_range(weather), labels) if limited else UNLIMITED
-        light = lighting(weather, beam, haze=settings.optics.haze)
+        extras = settings.drawn_extras
+        foggy = Extra.FOG in extras
+        light = lighting(
+            weather,
+            beam,
+            haze=settings.optics.haze or foggy,
+            ground=self.scene.ground if foggy else None,
+        )
         if settings.optics.exposure:
             light = expose(light, weather)
-        extras = settings.drawn_extras
         if Extra.LAMPS in extras:
             light = light_fog(light, weather)._replace(onset=BEAM_ONSET, glow=0.0)
         snowed = Extra.SNOW in extras

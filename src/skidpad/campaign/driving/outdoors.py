@@ -266,7 +266,7 @@ def _air(e: Environment) -> dict[str, float]:
     if e.visual_range is not None:
         sight = min(max(e.visual_range, 1.0), V_CLEAR)
         found["fog_density"] = 100.0 * log(V_CLEAR / sight) / log(V_CLEAR / V_FOG)
-        found["fog_distance"] = 0.0
+        found["fog_distance"] = found["fog_falloff"] = 0.0  # from the eye on, at all heights
     if e.temperature_c is not None:  # of the road too; assumption
         found["air_temperature_c"] = found["road_temperature_c"] = e.temperature_c
     return found

@@ -14,7 +14,8 @@ class Extra(str, Enum):
     )
     REFLECTIONS = "reflections"  # of those lamps on a wet road
     RETRO = "retro"  # markings, signs and plates send the headlights back
-    CLOUDS = "clouds"  # and stars, where there are few of them at night; fog before both
+    CLOUDS = "clouds"  # and stars, where there are few of them at night
+    FOG = "fog"  # thins with height, takes contrast by Koschmieder's law and lies before the sky; rain too
     EDGES = "edges"  # softened where one surface meets another
     SNOW = "snow"  # on the road, not only beside it; ice, and frost beside the road
     TONE = "tone"  # the contrast of a camera by day, and less light towards the corners

@@ -97,7 +97,7 @@ class Finish:
             draw_clouds(view, self._layer, shift, inverse, out)
         if Extra.CLOUDS in extras and self._stars > 0.0:
             draw_stars(view, STARS, self._stars, inverse, out)
-        if Extra.CLOUDS in extras and self._fog.per_m > 0.0:
+        if Extra.FOG in extras and self._fog.depth > 0.0:
             veil_sky(view, self._fog, inverse, out)
         if Extra.SHADOWS in extras:
             cars = self._bodies if own else self._others

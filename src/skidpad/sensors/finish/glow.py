@@ -131,7 +131,7 @@ def shine(
         facing = (dx * sources.face_x[i] + dy * sources.face_y[i]) / far
         if facing <= 0.02:
             continue
-        power = facing * np.exp(-air_depth(air, far))
+        power = facing * np.exp(-air_depth(air, far, view.centre[2], -up))
         c = sources.colour[i]
         inside = 0.0 <= u < view.width and view.top <= v < view.height
         if inside:

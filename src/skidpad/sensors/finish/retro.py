@@ -117,6 +117,9 @@ def _send_back(
                 if cone < LEAST:
                     continue
                 lit = back * beam_at(px, py, pz, beam, slope, reach) + np.float32(SPILL) * cone
-                lit *= np.float32(np.exp(-air_depth(light.air, z)))
+                climb = z * (
+                    view.rotation[0, 2] * u + view.rotation[1, 2] * v + view.rotation[2, 2]
+                )
+                lit *= np.float32(np.exp(-air_depth(light.air, z, view.centre[2], climb)))
                 if lit > LEAST:
                     out[row, column] = add_light(out[row, column], lit, lit, lit * 0.85)

@@ -23,6 +23,7 @@ from skidpad.physics.optics import Air, sunlight
 from skidpad.roads.roadside import Box, Shape
 from skidpad.sensors.finish.outline import MOST, spans
 from skidpad.sensors.pictures.blocks import BLOCK, ONE, ZERO
+from skidpad.sensors.pictures.height_fog import thinned_fog
 from skidpad.sensors.pictures.lighting import Colour, Lighting
 from skidpad.sensors.pictures.packing import pack, unpack
 from skidpad.sensors.raster.view import View
@@ -339,18 +340,22 @@ def _darken(
 
 
 @inner_kernel
-def _dim_block(shade: Shade, count: int, lanes: Floats32, pixels: NDArray[np.uint32]) -> None:
+def _dim_block(
+    shade: Shade, height: float, count: int, lanes: Floats32, pixels: NDArray[np.uint32]
+) -> None:
     """Takes the light from a block's pixels that does not reach them, as much as the air lets through.
 
-    Their bytes are square roots of light.
+    Their bytes are square roots of light. height: m, of the camera.
     """
+    eye, fall = np.float32(height - shade.air.ground), np.float32(shade.air.thinning)
     fog, start = np.float32(shade.air.fog), np.float32(shade.air.fog_start)
     rain, curved = np.float32(shade.air.rain), np.float32(shade.curved)
     red, green, blue = shade.sun[0], shade.sun[1], shade.sun[2]
     for x in range(count):
         way = lanes[WAY + x]
-        foggy = way - start
-        left = share_left((foggy if foggy > ZERO else ZERO) * fog + way * rain, curved)
+        foggy = (way - start if way > start else ZERO) * fog
+        foggy *= thinned_fog(eye, lanes[Z + x], start / way, fall) if fall > ZERO else ONE
+        left = share_left(foggy + way * rain, curved)
         touched, dark = lanes[TOUCHED + x], lanes[HIDDEN + x]
         r, g, b = unpack(pixels[x])
         r *= np.sqrt(ONE - left * (ONE - touched * (ONE - dark * red)))
@@ -400,4 +405,4 @@ def cast_shadows(
                     place = False
                 dim |= _darken(view, bodies, i, casts[i], a, b, lanes)
             if dim:
-                _dim_block(shade, count, lanes, out[row, begin : begin + count])
+                _dim_block(shade, view.centre[2], count, lanes, out[row, begin : begin + count])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.kernels.jit import kernel
 from skidpad.sensors.pictures.lighting import Lighting
-from skidpad.sensors.pictures.packing import pack, unpack
+from skidpad.sensors.pictures.packing import grid_noise, pack, unpack
 from skidpad.sensors.raster.view import View
 
 CURVE = 1.4  # beyond 1.73 it would not rise everywhere
@@ -30,14 +30,15 @@ def curve_of(light: Lighting) -> float:
 def set_tone(view: View, curve: float, out: NDArray[np.uint32]) -> None:
     """Applies lens and curve to the rows of a view's picture `out`, packed."""
     per, middle = np.float32(1.0 / view.focal), np.float32(0.5 - view.cx)
-    one, white = np.float32(1.0), np.float32(255.0)
+    one, white = np.float32(1.0), np.float32(254.999)
     gain = np.float32(np.sqrt(GAIN) / 255.0)
-    half, k = np.float32(0.5), np.float32(curve)
+    k = np.float32(curve)
     for row in range(view.top, view.height):
         v = np.float32(row + 0.5 - view.cy) * per
-        pixels, beyond = out[row], one + v * v
+        pixels, beyond, line = out[row], one + v * v, np.float32(row)
         for x in range(pixels.size):
-            u = (np.float32(np.int32(x)) + middle) * per  # of 64 bits it takes three times as long
+            column = np.float32(np.int32(x))  # of 64 bits it takes three times as long
+            u = (column + middle) * per
             size = one / (beyond + u * u)
             left = gain * np.sqrt(one - FALL * (one - size * size))
             a, b, c = unpack(pixels[x])
@@ -46,4 +47,5 @@ def set_tone(view: View, curve: float, out: NDArray[np.uint32]) -> None:
             a += k * a * (one - a) * (a - MIDDLE)
             b += k * b * (one - b) * (b - MIDDLE)
             c += k * c * (one - c) * (c - MIDDLE)
-            pixels[x] = pack(a * white + half, b * white + half, c * white + half)
+            step = grid_noise(column, line)
+            pixels[x] = pack(a * white + step, b * white + step, c * white + step)

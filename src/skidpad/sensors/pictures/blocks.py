@@ -20,8 +20,8 @@ RED, GREEN, BLUE, GLOW, WETTABLE, GLOSS = range(6)
 COLUMNS = 6
 BLOCK = 256
 STRIDE = 32  # keys that are compared at once
-LANES = 12
-(R, G, B, L, T, S, U, W, GX, GY, H, P) = (np.intp(n * BLOCK) for n in range(LANES))
+LANES = 13
+(R, G, B, L, T, S, U, W, GX, GY, H, P, M) = (np.intp(n * BLOCK) for n in range(LANES))
 ZERO, ONE = np.float32(0.0), np.float32(1.0)
 _WHITE = np.float32(255.0)
 

@@ -47,14 +47,21 @@ class Lighting(NamedTuple):
     exposure: float = 1.0  # what all light of a picture is multiplied by
 
 
-def lighting(weather: Weather, beam: Beam | None = None, *, haze: bool = False) -> Lighting:
+def lighting(
+    weather: Weather,
+    beam: Beam | None = None,
+    *,
+    haze: bool = False,
+    ground: float | None = None,
+) -> Lighting:
     """Returns the light of a weather.
 
     Args:
         weather: what sun, sky and air are like.
         beam: of the ego; None: low beam by night, else none (A-218).
-        haze: contrast falls with distance as `physics.camera` says; else as in the published pictures,
-            where rain, too, begins where the fog does.
+        haze: contrast falls with distance as `physics.camera` says; else as in the published pictures.
+        ground: m, height above which fog thins as fog_falloff says; None: not at all. With neither,
+            rain begins where the fog does, as in the published pictures.
     """
     if beam is None:
         beam = Beam.LOW if weather.is_night else Beam.OFF
@@ -85,7 +92,7 @@ def lighting(weather: Weather, beam: Beam | None = None, *, haze: bool = False) 
         (zenith + night * NIGHT_ZENITH).astype(np.float32),
         (horizon + night * NIGHT_HORIZON).astype(np.float32),
         float(day * clear * (0.35 if cloud > 0.5 else 1.0)),
-        air_of(weather) if haze else _published_air(weather),
+        _published_air(weather) if ground is None and not haze else air_of(weather, ground),
         float(haze),
         max(weather.wetness, weather.precipitation_deposits) / 100.0,
         _smooth(weather.snow_depth_mm / 20.0),

@@ -13,6 +13,8 @@ _BYTE, _G, _B = np.uint32(255), np.uint32(8), np.uint32(16)
 _OPAQUE = np.uint32(0xFF000000)
 _LOW, _HIGH, _HALF = np.float32(0.0), np.float32(255.0), np.float32(0.5)
 
+_ACROSS, _DOWN, _TURNS = (np.float32(c) for c in (0.06711056, 0.00583715, 52.9829189))
+
 
 @kernel
 def pack(r: np.float32, g: np.float32, b: np.float32) -> np.uint32:
@@ -38,3 +40,15 @@ def rounded(value: np.float32) -> np.float32:
     v: np.float32 = value + _HALF
     v = v if v > _LOW else _LOW
     return v if v < _HIGH else _HIGH
+
+
+@kernel
+def grid_noise(x: np.float32, row: np.float32) -> np.float32:
+    """Returns noise in [0, 1) by pixel, which hides the steps between bytes when it is added before `pack`.
+
+    Source: Jimenez (2014), Next generation post processing in Call of Duty: interleaved gradient noise.
+    """
+    a = _ACROSS * x + _DOWN * row
+    b = _TURNS * (a - np.floor(a))
+    noise: np.float32 = b - np.floor(b)
+    return noise

@@ -30,6 +30,7 @@ from skidpad.sensors.pictures.blocks import (
     G,
     H,
     L,
+    M,
     P,
     R,
     S,
@@ -40,6 +41,7 @@ from skidpad.sensors.pictures.blocks import (
     gather,
     slopes,
 )
+from skidpad.sensors.pictures.height_fog import thin_fog
 from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.pictures.roughness import MORE_LANES, NO_TILES, make_tiles, roughen, vary_sky
 from skidpad.sensors.pictures.settled_snow import NOTHING_SETTLES, SHARE, STEEP, settle_snow
@@ -415,7 +417,9 @@ def _surfaces(
         dull = shown * (ONE - film * _DARK) * (ONE - mirror)
         way = ray / (w if w > _FARTHEST else _FARTHEST)
         foggy = way - begins
-        through = share_left((foggy if foggy > ZERO else ZERO) * fog + way * rain, curved)
+        through = share_left(
+            (foggy if foggy > ZERO else ZERO) * (fog * work[M + x]) + way * rain, curved
+        )
         veil = mirror * shown * through + (ONE - through)
 
         r = glow + dull * (low_r + tilt * span_r + sun_r * n_sun + lit + street)
@@ -452,6 +456,7 @@ def shade(
     """
     width = inverse.shape[1]
     work[H : H + BLOCK] = ZERO
+    work[M : M + BLOCK] = ONE
     clear, exposure = np.float32(light.disc), np.float32(light.exposure)
     uneven = ONE if grain.shape[0] > 0 else ZERO
     mirrored = sun - np.float32(2.0) * (sun[0] * up[0] + sun[1] * up[1] + sun[2] * up[2]) * up
@@ -485,6 +490,8 @@ def shade(
                         _headlights(v, count, light, to_body, offset, work)
                 if lamps.light.size > 0 and light.lamps > 0.0:
                     lay_street_light(view, v, count, np.float32(light.lamps), lamps, work)
+                if light.air.thinning > 0.0:
+                    thin_fog(v, count, light.air, up, view.centre[2], work)
                 _surfaces(v, count, light, sun, up, work)
             if empty:
                 sky(v, count, light, up, work)

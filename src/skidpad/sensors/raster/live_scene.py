@@ -63,6 +63,7 @@ class LiveScene:
     ) -> None:
         """widest: columns in px of the widest image."""
         self.static = scene_of(map)
+        self.ground = float(map.samples.z.min())  # m, of the lowest road: fog lies on it
         self.key = self.static.chunks.key.copy()  # of the map's triangles, lamps as they shine
         self._shaped = ShapedActors(table) if bodywork is Bodywork.SHAPED else None
         self.actors = make_actors(table) if self._shaped is None else self._shaped.near

@@ -57,24 +57,24 @@ class CameraEffects:
         self._dt, self._reading = 0.0, 0
         self.sight = UNLIMITED
 
-    def move(self, weather: Weather, speed: float, dt: float) -> None:
-        """Begins a reading `dt` s after the last one. speed: of the camera in m/s."""
+    def move(self, weather: Weather, ground: float, speed: float, dt: float) -> None:
+        """Begins a reading `dt` s after the last one. ground: m, of the fog; speed: m/s, of the camera."""
         self._reading += 1
         self._exposure.move(weather, dt)
         if self._wets and (self._drops is None or self._dt != dt):
             self._drops, self._dt = LensDrops(self._spec, self._seed, rain_rate(weather), dt), dt
         if self._weather is not weather:
             self._weather = weather
-            self._look_out(weather)
+            self._look_out(weather, ground)
         if self._drops is not None:
             self._drops.move(self._reading, speed)
 
-    def _look_out(self, weather: Weather) -> None:
+    def _look_out(self, weather: Weather, ground: float) -> None:
         """Sets what a weather changes; labels reach as far as a low beam by night, as pictures are lit."""
         if self._sight:
             self.sight = Sight(depth_range(weather), label_range(weather, Beam.LOW))
         if self._haze or self._exposes:
-            light = lighting(weather, haze=self._haze)
+            light = lighting(weather, haze=self._haze, ground=ground)
             self._light = expose(light, weather) if self._exposes else light
         if self._sprays:
             self._film = road_surface(weather).film_mm / 1000.0

@@ -66,7 +66,7 @@ class Camera:
         if self.frame != clock.frame:
             self.frame = clock.frame
             speed = around.speed_of_carrier(actor)
-            self.effects.move(around.weather, speed, sensor.share(clock))
+            self.effects.move(around.weather, scene.live.ground, speed, sensor.share(clock))
             hidden = around.hidden_for(actor)
             seen = (self.spec.view, pose, hidden, self.effects.sight)
             if seen not in around.drawn:

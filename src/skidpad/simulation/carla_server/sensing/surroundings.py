@@ -63,7 +63,10 @@ class Pictured:
         if self.weather is not weather:
             self.weather = weather
             self.shading = shade_scene(
-                self.live.static, self.bodies, lighting(weather), self._quality
+                self.live.static,
+                self.bodies,
+                lighting(weather, ground=self.live.ground),
+                self._quality,
             )
 
 

@@ -44,6 +44,8 @@ BUDGET = {
     "reflections": 0.5,
     "retro": 0.7,
     "clouds": 1.0,
+    "fog": 1.7,
+    "falling": 1.2,
     "edges": 1.0,
     "tone": 1.5,
     "camera effect": 1.0,

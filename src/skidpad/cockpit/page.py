@@ -47,6 +47,8 @@ EXTRAS = {
     Extra.RETRO: "reflective signs, lines",
     Extra.CLOUDS: "clouds, stars",
     Extra.FOG: "fog, haze",
+    Extra.FALLING: "rain and snow with depth",
+    Extra.SPRAY: "spray",
     Extra.EDGES: "soft edges",
     Extra.SNOW: "snow, ice on the road",
     Extra.TONE: "contrast, dim corners",

@@ -20,6 +20,7 @@ from skidpad.core.vocabulary import Bodywork, LightState, Quality, RangeModel
 from skidpad.core.weather import Weather
 from skidpad.physics.grip import rain_rate, road_surface
 from skidpad.physics.optics import depth_range, label_range, radar_range
+from skidpad.sensors.finish.clouds import FLATTEST
 from skidpad.sensors.finish.extras import COSTLY, NO_EXTRAS, Extra
 from skidpad.sensors.finish.finish import Finish
 from skidpad.sensors.finish.fog import light_fog
@@ -106,7 +107,7 @@ class PixelSuite:
             for c in self.cameras.values()
             if c.modality is Modality.RGB
         }
-        self._finish = Finish(table, map.roadside, settings.dt, settings.bodywork)
+        self._finish = Finish(table, map.roadside, settings.dt, settings.bodywork, settings.seed)
         self._look_out(weather, settings.range_model, None)
         self._ego = Pose(0.0, 0.0)
         self.tick = -1
@@ -133,6 +134,8 @@ class PixelSuite:
         )
         if settings.optics.exposure:
             light = expose(light, weather)
+        if Extra.CLOUDS in extras:
+            light = light._replace(dome=FLATTEST)
         if Extra.LAMPS in extras:
             light = light_fog(light, weather)._replace(onset=BEAM_ONSET, glow=0.0)
         snowed = Extra.SNOW in extras
@@ -148,6 +151,8 @@ class PixelSuite:
         effect = degradation(weather, exclusive=settings.exclusive_stages)
         share = CALM if Extra.CALM in extras else 1.0
         effect = replace(effect, glass=settings.in_cockpit, share=share)
+        if Extra.FALLING in extras:
+            effect = replace(effect, streaks=0.0)
         self._degraded = (
             {id: CameraNoise(id, seed, effect) for id in self._rgb}
             if settings.camera_effect
@@ -158,7 +163,7 @@ class PixelSuite:
             rain = rain_rate(weather)
             self._drops = {id: LensDrops(self.cameras[id], seed, rain, dt) for id in self._rgb}
         self._spray: SprayClouds | None = None
-        if settings.optics.spray:
+        if settings.optics.spray or Extra.SPRAY in extras:
             self._spray = SprayClouds(self._table, road_surface(weather).film_mm / 1000.0)
         self._clouds = np.empty((0, 8))
         self.radars = [

@@ -1,7 +1,8 @@
 """Clouds in the sky of a picture for people: a flat layer with a texture made by code.
 
-A ray of the sky meets the layer where its slope says; so clouds grow smaller towards the horizon.
-They drift with the simulated time. Shapes and strengths are by eye.
+A ray of the sky meets the layer where its slope says; so clouds grow smaller towards the horizon, but the
+layer bends down there, no flatter than FLATTEST: clouds are about as high as they are wide. They drift with
+the simulated time. Shapes and strengths are by eye.
 """
 
 from __future__ import annotations
@@ -25,6 +26,9 @@ OCTAVES = ((96.0, 1.0), (40.0, 0.55), (16.0, 0.34), (6.0, 0.17))  # texels of bl
 PER_HEIGHT = 150.0  # texels per layer's height
 DRIFT = 0.9  # texels/s in a full wind
 STEP = 8  # px between two looks at the texture along a row
+FLATTEST = (
+    0.38  # of a cloud's length along the line of sight at the horizon, as a share of its width
+)
 LOWEST = 0.025  # of a ray's climb: below it the layer is lost in haze
 FADE = 0.16  # climb at which it is seen in full
 LIT, SHADED = 0.9, 0.55  # of a cloud's thin and thick parts, in the sky's own light
@@ -97,8 +101,8 @@ def draw_clouds(
             if climb <= LOWEST:
                 continue
             any_sky = True
-            at_x = PER_HEIGHT * dx / (dz + 0.04) + shift
-            at_y = PER_HEIGHT * dy / (dz + 0.04)
+            ray = PER_HEIGHT * climb / (dz * (climb + FLATTEST))
+            at_x, at_y = ray * dx + shift, ray * dy
             i, j = int(np.floor(at_x)), int(np.floor(at_y))
             a, b = np.float32(at_x - i), np.float32(at_y - j)
             upper = texture[i & last, j & last] * (1 - b) + texture[i & last, (j + 1) & last] * b

@@ -16,6 +16,8 @@ class Extra(str, Enum):
     RETRO = "retro"  # markings, signs and plates send the headlights back
     CLOUDS = "clouds"  # and stars, where there are few of them at night
     FOG = "fog"  # thins with height, takes contrast by Koschmieder's law and lies before the sky; rain too
+    FALLING = "falling"  # rain and snow in the air, with depth, instead of the published strokes
+    SPRAY = "spray"  # behind fast vehicles on a wet road
     EDGES = "edges"  # softened where one surface meets another
     SNOW = "snow"  # on the road, not only beside it; ice, and frost beside the road
     TONE = "tone"  # the contrast of a camera by day, and less light towards the corners
@@ -23,6 +25,8 @@ class Extra(str, Enum):
 
 
 # what a draft leaves out: each reads or writes pixels of the whole picture
-COSTLY = frozenset((Extra.SHADOWS, Extra.REFLECTIONS, Extra.CLOUDS, Extra.EDGES, Extra.TONE))
+COSTLY = frozenset(
+    (Extra.SHADOWS, Extra.REFLECTIONS, Extra.CLOUDS, Extra.SPRAY, Extra.EDGES, Extra.TONE)
+)
 NO_EXTRAS: frozenset[Extra] = frozenset()
 ALL_EXTRAS = frozenset(Extra)

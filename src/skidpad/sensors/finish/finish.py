@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.geometry import Pose
+from skidpad.core.maths.randomness import stream
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import Bodywork, LightState
 from skidpad.core.weather import Weather
@@ -15,6 +16,7 @@ from skidpad.roads.roadside import Roadside
 from skidpad.sensors.finish.clouds import DRIFT, SIZE, draw_clouds, layer_of
 from skidpad.sensors.finish.edges import soften_edges
 from skidpad.sensors.finish.extras import Extra
+from skidpad.sensors.finish.falling import BOXES, DROPS, draw_falling, falling_in
 from skidpad.sensors.finish.fog import fog_of, veil_sky
 from skidpad.sensors.finish.glow import shine
 from skidpad.sensors.finish.lamps import Lamps
@@ -52,7 +54,10 @@ class Finish:
         roadside: Roadside,
         dt: float,
         bodywork: Bodywork = Bodywork.PLAIN,
+        seed: int = 0,
     ) -> None:
+        """seed: of where drops and flakes are."""
+        self._places = stream(seed, "falling").random((DROPS, 3))
         self._table, self._dt = table, dt
         self._furniture = standing(roadside.boxes)
         self._lamps = Lamps(table, roadside.heads, bodywork, roadside.boxes)
@@ -67,6 +72,7 @@ class Finish:
         self._stars = starlight_of(weather)
         self._sun = sun_of(weather, light)
         self._fog = fog_of(weather, light)
+        self._falling = falling_in(weather, light)
         self._wet = light.wet * (1.0 - light.snow) if light.wet > LEAST_WET else 0.0
         self._drift = DRIFT * self._dt * (0.2 + 0.8 * weather.wind_intensity / 100.0)
 
@@ -80,6 +86,7 @@ class Finish:
     ) -> None:
         """Takes in where all actors are now, and what shines. indicating: (n, 2), left and right."""
         self._tick, self._ego = tick, states.pose(0)
+        self._velocity = np.array([states.vx[0], states.vy[0], 0.0])
         self._bodies = bodies_of(self._table, states)
         present = self._bodies.present.copy()
         present[0] = False
@@ -112,6 +119,11 @@ class Finish:
         bloom, wet = Extra.LAMPS in extras, self._wet if Extra.REFLECTIONS in extras else 0.0
         if bloom or wet > 0.0:
             shine(view, self._sources, bloom, wet, light.air, WETTABLE, inverse, key, out)
+        if Extra.FALLING in extras and self._falling.share > 0.0:
+            time = self._tick * self._dt
+            ego = np.array([self._ego.x, self._ego.y, self._ego.z, self._ego.yaw])
+            moved = self._velocity
+            draw_falling(view, self._falling, BOXES, self._places, time, moved, ego, inverse, out)
         if Extra.TONE in extras:
             set_tone(view, self._curve, out)
 

@@ -43,6 +43,7 @@ class Lighting(NamedTuple):
     high: bool  # it is the high beam
     lamps: float  # strength of other vehicles' lamps, 0 by day
     glow: float = 1.0  # share of the sun's disc and glow that the sky has; 0: drawn by `finish`
+    dome: float = 0.0  # how far veils of the sky bend down at the horizon; 0: not, as published
     onset: float = 0.0  # m over which the beam rises before the lamps; 0: at once, as published
     exposure: float = 1.0  # what all light of a picture is multiplied by
 

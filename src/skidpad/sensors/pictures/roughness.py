@@ -259,11 +259,11 @@ def vary_sky(
     y_u, y_1 = np.float32(r[0, 1]), np.float32(r[1, 1]) * v + np.float32(r[2, 1])
     z_u, z_1 = np.float32(r[0, 2]), np.float32(r[1, 2]) * v + np.float32(r[2, 2])
     sun0, sun1, sun2 = sun[0], sun[1], sun[2]
-    clear = np.float32(min(1.0, light.disc * 1.2))
+    clear, dome = np.float32(min(1.0, light.disc * 1.2)), np.float32(light.dome)
     for x in range(count):
         u = work[U + x]
         up = z_u * u + z_1
-        up = (up if up > _LOW else _LOW) * _VEIL
+        up = ((up if up > _LOW else _LOW) + dome * np.sqrt(u * u + v * v + ONE)) * _VEIL
         work[A + x] = _texel((x_u * u + x_1) / up, (y_u * u + y_1) / up, _COARSE_SIZE)
     for x in range(count):
         at = _PATCHES + _STEP * np.uint64(work[A + x])

@@ -58,7 +58,7 @@ def falling_in(weather: Weather, light: Lighting) -> Falling:
     sky = 0.5 * (light.zenith + light.horizon)
     dull = 0.8 * 0.5 * (light.sky + light.bounce) + 0.3 * light.sun
     colour = dull if snow else 1.3 * sky + 0.15 * light.sun
-    beam, slope, reach = beam_of.py_func(light)
+    beam, slope, reach = beam_of.py_func(light)  # type: ignore[attr-defined]
     return Falling(
         (weather.precipitation / 100.0) ** 0.7,
         np.array([-wind, 0.0, -fall]),

@@ -33,7 +33,18 @@ def strokes(falling, velocity=(0.0, 0.0, 0.0), nearest=0.0, time=1.0, rows=None)
         view = view._replace(top=rows.start, height=rows.stop)
     out = np.full((EYE.height, EYE.width), GREY)
     inverse = np.full(out.shape, nearest, dtype=np.float32)
-    draw_falling(view, falling, ONE, PLACES, time, np.array(velocity), np.zeros(4), inverse, out)
+    draw_falling(
+        view,
+        falling,
+        lighting(RAIN),
+        ONE,
+        PLACES,
+        time,
+        np.array(velocity),
+        np.zeros(4),
+        inverse,
+        out,
+    )
     return out != GREY, out
 
 

@@ -45,7 +45,6 @@ class Falling(NamedTuple):
     width: float  # m
     seen: float
     colour: Colour  # (3,) linear
-    beam: tuple[np.float32, np.float32, np.float32]  # of the ego, as by `beam_of`
 
 
 def falling_in(weather: Weather, light: Lighting) -> Falling:
@@ -58,14 +57,12 @@ def falling_in(weather: Weather, light: Lighting) -> Falling:
     sky = 0.5 * (light.zenith + light.horizon)
     dull = 0.8 * 0.5 * (light.sky + light.bounce) + 0.3 * light.sun
     colour = dull if snow else 1.3 * sky + 0.15 * light.sun
-    beam, slope, reach = beam_of.py_func(light)  # type: ignore[attr-defined]
     return Falling(
         (weather.precipitation / 100.0) ** 0.7,
         np.array([-wind, 0.0, -fall]),
         width,
         seen,
         np.minimum(colour, 1.0).astype(np.float32),
-        (np.float32(LAMPLIT * light.lamps * beam), slope, reach),
     )
 
 
@@ -73,6 +70,7 @@ def falling_in(weather: Weather, light: Lighting) -> Falling:
 def draw_falling(
     view: View,
     falling: Falling,
+    light: Lighting,
     boxes: Floats,
     places: Floats,
     time: float,
@@ -88,7 +86,8 @@ def draw_falling(
     """
     r, c = view.rotation, view.centre
     cos_ego, sin_ego = np.cos(ego[3]), np.sin(ego[3])
-    strength, slope, reach = falling.beam
+    strength, slope, reach = beam_of(light)
+    strength *= np.float32(LAMPLIT * light.lamps)
     moved = (falling.velocity - velocity) * EXPOSED
     nearing = r[2, 0] * moved[0] + r[2, 1] * moved[1] + r[2, 2] * moved[2]
     wide_u, wide_v = 0.5 * view.width / view.focal, (view.height + view.cy) / view.focal

@@ -123,7 +123,9 @@ class Finish:
             time = self._tick * self._dt
             ego = np.array([self._ego.x, self._ego.y, self._ego.z, self._ego.yaw])
             moved = self._velocity
-            draw_falling(view, self._falling, BOXES, self._places, time, moved, ego, inverse, out)
+            draw_falling(
+                view, self._falling, light, BOXES, self._places, time, moved, ego, inverse, out
+            )
         if Extra.TONE in extras:
             set_tone(view, self._curve, out)
 

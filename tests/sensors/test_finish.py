@@ -17,7 +17,7 @@ from skidpad.physics.presets import preset
 from skidpad.roads.roadside import Box, Shape, SignalHead
 from skidpad.sensors.finish.extras import ALL_EXTRAS, NO_EXTRAS, Extra
 from skidpad.sensors.finish.outline import MOST, spans
-from skidpad.sensors.finish.stars import starlight_of
+from skidpad.sensors.finish.stars import light_night, starlight_of
 from skidpad.sensors.finish.sun import sun_of
 from skidpad.sensors.finish.tone import CURVE, curve_of, set_tone
 from skidpad.sensors.pictures.lighting import lighting
@@ -101,6 +101,16 @@ def test_stars_shine_in_a_clear_night_sky_only():
     assert not both(preset("rain-night"), Extra.CLOUDS)[2].any()
 
 
+def test_the_night_sky_is_brighter_and_redder_towards_the_horizon_and_the_day_as_it_was():
+    night, noon = (Seen(preset(f"clear-{sun}"), {Extra.LAMPS}) for sun in ("night", "noon"))
+    sky = night.labels == SemanticClass.SKY
+    rows = [night.rgb[row][sky[row]].mean(axis=0) for row in (5, 140)]
+    assert (rows[1] > rows[0] + 10.0).all()
+    assert rows[1][0] > rows[1][2]
+    day = lighting(preset("clear-noon"))
+    assert np.array_equal(noon.suite.shading.light.horizon, day.horizon)
+
+
 def test_stars_come_after_dusk_and_no_rain_falls_from_them():
     night = preset("clear-night")
     share = [
@@ -165,7 +175,8 @@ def test_in_fog_at_night_lamps_and_walls_fade_into_one_dim_light():
     assert wall.min() > 0.6 * haze
     assert haze > 3.0 * lighting(fog).horizon[0]
     clear = replace(fog, fog_density=0.0)
-    assert Seen(clear, {Extra.LAMPS}).suite.shading.light.horizon[0] == lighting(clear).horizon[0]
+    plain = light_night(lighting(clear))
+    assert Seen(clear, {Extra.LAMPS}).suite.shading.light.horizon[0] == plain.horizon[0]
 
 
 def test_edges_are_softened_where_two_surfaces_meet_and_nowhere_else():
@@ -253,7 +264,7 @@ def test_markings_signs_and_plates_send_the_headlights_back():
 
 
 def test_lamps_bloom_where_they_are_seen():
-    plain, added, changed = both(preset("clear-night"), Extra.LAMPS)
+    plain, added, _ = both(preset("clear-night"), Extra.LAMPS)
     far = plain.depth < 1.0 / 6.0  # nearer, the beam rises
     assert (added.rgb >= plain.rgb)[far].all()
     red = added.rgb[..., 0] - plain.rgb[..., 0]
@@ -262,7 +273,8 @@ def test_lamps_bloom_where_they_are_seen():
         assert len(rows), material
         near = red[rows.min() - 6 : rows.max() + 7, columns.min() - 6 : columns.max() + 7]
         assert near.max() > 20, material
-    assert changed[far].mean() < 0.2
+    ground = far & (plain.labels != SemanticClass.SKY)
+    assert (red[ground] > 6).mean() < 0.2
     # a lamp behind another vehicle, and one that looks away, shine on nothing
     hidden = [MOMENT[0], (106.0, -8.75, 0.0, 0.0), (114.0, -8.75, 0.0, np.pi)]
     behind = [MOMENT[0], (80.0, -8.75, 0.0, 0.0), (60.0, -8.75, 0.0, 0.0)]

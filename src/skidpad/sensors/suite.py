@@ -24,6 +24,7 @@ from skidpad.sensors.finish.clouds import FLATTEST
 from skidpad.sensors.finish.extras import COSTLY, NO_EXTRAS, Extra
 from skidpad.sensors.finish.finish import Finish
 from skidpad.sensors.finish.fog import light_fog
+from skidpad.sensors.finish.stars import light_night
 from skidpad.sensors.pictures.degradation import CameraNoise, degradation
 from skidpad.sensors.pictures.exposure import expose
 from skidpad.sensors.pictures.lens import LensDrops
@@ -137,7 +138,7 @@ class PixelSuite:
         if Extra.CLOUDS in extras:
             light = light._replace(dome=FLATTEST)
         if Extra.LAMPS in extras:
-            light = light_fog(light, weather)._replace(onset=BEAM_ONSET, glow=0.0)
+            light = light_fog(light_night(light), weather)._replace(onset=BEAM_ONSET, glow=0.0)
         snowed = Extra.SNOW in extras
         self.shading = shade_scene(self.scene.static, self._table, light, settings.quality, snowed)
         if extras:

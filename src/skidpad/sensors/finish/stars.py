@@ -10,6 +10,7 @@ from skidpad.core.kernels.jit import kernel
 from skidpad.core.maths.randomness import stream
 from skidpad.core.weather import Weather
 from skidpad.sensors.finish.glow import add_light
+from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.raster.view import View
 
 COUNT = 1400  # above the horizon; some 2000 are bright enough for the eye in a dark place
@@ -18,6 +19,9 @@ BRIGHTEST = 1.0  # light of the brightest, by eye
 LEAST = 0.02  # of starlight, below which none is drawn
 DUSK = -6.0  # deg of sun at the end of civil twilight, when the first stars are seen
 DARK = -12.0  # and of nautical twilight
+# light of the lamps of towns in the night sky, by eye; 1 is a white surface at noon
+GLOW_AT_HORIZON = np.array([0.042, 0.033, 0.027], dtype=np.float32)
+GLOW_OVERHEAD = np.array([0.003, 0.003, 0.005], dtype=np.float32)
 
 
 def _scatter() -> Floats:
@@ -32,6 +36,14 @@ def _scatter() -> Floats:
 
 
 STARS = _scatter()
+
+
+def light_night(light: Lighting) -> Lighting:
+    """Returns the light of a weather with the glow of towns in its night sky, brightest at the horizon."""
+    return light._replace(
+        horizon=light.horizon + np.float32(light.lamps) * GLOW_AT_HORIZON,
+        zenith=light.zenith + np.float32(light.lamps) * GLOW_OVERHEAD,
+    )
 
 
 def starlight_of(weather: Weather) -> float:

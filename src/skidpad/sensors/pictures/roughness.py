@@ -25,6 +25,7 @@ from skidpad.sensors.pictures.blocks import (
     B,
     G,
     R,
+    T,
     U,
     W,
     end_of_run,
@@ -124,6 +125,11 @@ _HALF, _TWO, _FOUR, _EIGHT = np.float32(0.5), np.float32(2.0), np.float32(4.0), 
 _COOL = np.float32(0.14)  # of what grazing light adds: it comes from the sky, not from the sun
 _GREEN = np.float32(0.35)
 _TINY = np.float32(1e-12)
+_FILM, _UNEVEN, _DRIEST = (
+    np.float32(0.75),
+    np.float32(0.9),
+    np.float32(0.3),
+)  # of a wet road's water, by place
 _SIDE, _STEEPLY = (
     np.float32(0.45),
     np.float32(1.4),
@@ -146,12 +152,14 @@ def _texel(a: np.float32, b: np.float32, size: np.float32) -> np.float32:
 @inner_kernel
 def roughen(
     view: View, v: np.float32, count: int, keys: NDArray[np.int32], table: Floats32, grain: Floats32,
-    tiles: NDArray[np.int8], clear: np.float32, up: Floats32, mirrored: Floats32, work: Floats32,
+    tiles: NDArray[np.int8], clear: np.float32, wet: np.float32, up: Floats32, mirrored: Floats32,
+    work: Floats32,
 ) -> None:  # fmt: skip
     """Changes the colours of a block's surfaces in `work` by where they lie and how they lie to the sun.
 
-    v: m down per m ahead of the block's row; clear: of 1, light of the sun's disc; up, mirrored: (3,) camera
-    axes, the latter towards the sun's image below the ground; table: colours as in `gather`; grain, tiles:
+    v: m down per m ahead of the block's row; clear, wet: of 1, light of the sun's disc and water on the road;
+    up, mirrored: (3,) camera axes, the latter towards the sun's image below the ground; table: colours as in
+    `gather`; grain, tiles:
     `grain_table`, `make_tiles`. Near the camera grains are finer, so that no texel is seen as a square.
     """
     r = view.rotation
@@ -219,6 +227,11 @@ def roughen(
             run[R + n] *= share + hue
             run[G + n] *= share + _GREEN * hue
             run[B + n] *= share - hue
+        if wet > ZERO:
+            for n in range(size):  # water stands where patches are dark
+                film = _FILM - _UNEVEN * run[A + n]
+                film = film if film > _DRIEST else _DRIEST
+                run[T + n] *= film if film < ONE else ONE
         if grain[m, BENEATH] > ZERO:
             _dim_beneath(v, size, grain[m, BENEATH], up, run)
 

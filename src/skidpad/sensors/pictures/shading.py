@@ -477,6 +477,7 @@ def shade(
                         grain,
                         tiles,
                         clear,
+                        np.float32(light.wet),
                         up,
                         mirrored,
                         work,

@@ -26,6 +26,7 @@ from skidpad.cockpit.studio import SENSOR, View
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import CameraSpec
 from skidpad.core.states import ActorStates, ActorTable
+from skidpad.core.traffic.paints import draw_paint
 from skidpad.core.vocabulary import Bodywork, LightState, Scenery
 from skidpad.physics.presets import find_weather, preset
 from skidpad.physics.types import EGO_TYPE, vehicle_types
@@ -37,7 +38,6 @@ from skidpad.scenery.sides import RoadKind, kind_of
 from skidpad.sensors.finish.extras import ALL_EXTRAS
 from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.sensors.suite import PixelSettings, PixelSuite
-from skidpad.simulation.world.actors import draw_paint
 
 VIEWS, REMOTE = 4, 150.0  # of a map; m between two of them
 SIZE = (1280, 720)  # px

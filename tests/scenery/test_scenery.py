@@ -13,6 +13,7 @@ import shapely
 from skidpad.core.geometry import Pose, footprint
 from skidpad.core.run import Roads, RunSpec, run_from_plain
 from skidpad.core.setup import ActorSetup
+from skidpad.core.traffic.paints import PAINT_SHARES, PALETTE, draw_paint
 from skidpad.core.vocabulary import Scenery, SemanticClass
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import bundled_maps, load_map
@@ -33,7 +34,7 @@ from skidpad.scenery.dressing import (
 from skidpad.scenery.free_ground import outlines_of, sight_triangles
 from skidpad.scenery.sides import RoadKind, kind_of, sides_of
 from skidpad.simulation.carla_server.maps.maps import spawn_points
-from skidpad.simulation.world.actors import PAINT_SHARES, PALETTE, Role, draw_paint
+from skidpad.simulation.world.actors import Role
 
 MAPS = (*bundled_maps(), "Town01", "Town02", "Town04", "Town07", "Town10HD")
 

@@ -1,1 +1,1 @@
-"""What other drivers see, and how they deviate from what a scenario asks of them."""
+"""What other drivers see, how they deviate from what a scenario asks of them, and how cars are painted."""

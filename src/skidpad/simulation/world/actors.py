@@ -10,7 +10,6 @@ from msgspec import structs
 
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.geometry import Pose
-from skidpad.core.maths.randomness import stream
 from skidpad.core.setup import (
     RESERVE_NAME,
     VEHICLES_MAX,
@@ -19,6 +18,7 @@ from skidpad.core.setup import (
     Setup,
     TrafficSetup,
 )
+from skidpad.core.traffic.paints import PALETTE, draw_paint
 from skidpad.core.vocabulary import ActorKind, TrafficStart
 from skidpad.physics.types import VehicleType, traffic_types, vehicle_type, vehicle_types
 from skidpad.roads.queries import LanePoint, RoadMap
@@ -31,30 +31,6 @@ from skidpad.simulation.world.traffic.placement import (
     random_factors,
     type_of,
 )
-
-# Paint of cars by registrations: white, black, grey, silver, blue, red, green, yellow
-# (shares in the Axalta Global Automotive Color Popularity Report 2022).
-PALETTE = (
-    (225, 225, 225),
-    (25, 25, 28),
-    (95, 98, 102),
-    (170, 173, 177),
-    (30, 60, 130),
-    (150, 25, 30),
-    (35, 80, 50),
-    (215, 180, 45),
-)
-PAINT_SHARES = (
-    0.34,
-    0.21,
-    0.19,
-    0.08,
-    0.08,
-    0.05,
-    0.01,
-    0.04,
-)  # the same report; yellow: all others
-
 
 # Adult 95th-percentile stance and mass; city bicycle with rider; usual construction-site sizes.
 SHAPES = {
@@ -86,11 +62,6 @@ class Role:
             body = structs.replace(body, tyres=a.tyres)
         paint = PALETTE[i % len(PALETTE)] if paint_seed is None else draw_paint(paint_seed, a.name)
         return Newcomer(body, a.name, a.type, a.rgb or paint)
-
-
-def draw_paint(seed: int, name: str) -> tuple[int, int, int]:
-    """Returns the paint of the actor of this name, drawn as often as cars have it."""
-    return PALETTE[int(stream(seed, "paint", name).choice(len(PALETTE), p=PAINT_SHARES))]
 
 
 def place_of(map: RoadMap, place: Pose | LanePosition) -> Pose:

@@ -33,9 +33,11 @@ from skidpad.scenery.dressing import (
 )
 from skidpad.scenery.free_ground import outlines_of, sight_triangles
 from skidpad.scenery.sides import RoadKind, kind_of, sides_of
+from skidpad.scenery.things import Thing
 from skidpad.simulation.carla_server.maps.maps import spawn_points
 from skidpad.simulation.world.actors import Role
 
+PARKED = "parked car"
 MAPS = (*bundled_maps(), "Town01", "Town02", "Town04", "Town07", "Town10HD")
 
 
@@ -59,7 +61,11 @@ def lane_quads(samples) -> np.ndarray:
 def test_nothing_generated_stands_on_or_within_a_metre_of_lanes_crossings_or_ways(road_map) -> None:
     dressed = dress_map(road_map, Scenery.FULL)
     signs = list(signs_of(road_map.samples, road_map.lanes, road_map.signals, road_map.roadside))
-    added = dressed.roadside.boxes[len(road_map.roadside.boxes) + len(signs) :]
+    added = [
+        b
+        for b in dressed.roadside.boxes[len(road_map.roadside.boxes) + len(signs) :]
+        if b.shape is not Shape.CAR
+    ]
     assert added
     corners = np.array([footprint(b.x, b.y, b.yaw, b.length, b.width) for b in added])
     tree = shapely.STRtree(shapely.polygons(corners.reshape(-1, 4, 2)))
@@ -75,7 +81,7 @@ def test_no_way_of_pedestrians_leads_through_anything(road_map) -> None:
     if mesh is None:  # it has no pavements
         return
     ways = [shapely.Polygon(mesh.vertices[list(ring), :2]) for ring in mesh.polygons]
-    added = outlines_of(things_of(road_map))
+    added = outlines_of([t for t in things_of(road_map) if t.name != PARKED])
     assert not shapely.STRtree(added).query(ways, predicate="dwithin", distance=1.0).size
 
 
@@ -85,6 +91,107 @@ def test_sight_triangles_of_junctions_are_free_of_what_is_tall(road_map) -> None
         return
     tall = outlines_of([t for t in things_of(road_map) if t.is_tall])
     assert not shapely.STRtree(tall).query(triangles, predicate="intersects").size
+
+
+def polygons_of(samples, lanes, kinds=tuple(LaneKind), in_junctions=(True, False)) -> list:
+    """Returns the quads of the lanes of these kinds, in junctions or outside of them."""
+    step = samples.lane[:-1][samples.lane[:-1] == samples.lane[1:]]
+    inside = np.isin(lanes.junction[step] >= 0, in_junctions)
+    return lane_quads(samples)[np.isin(lanes.kind[step], kinds) & inside].tolist()
+
+
+def assert_parked_well(road_map: RoadMap) -> list[Thing]:
+    """Returns the parked cars, of which none is where traffic, walkers or drivers' eyes need the place."""
+    samples, lanes = road_map.samples, road_map.lanes
+    others = [t for t in things_of(road_map) if t.name != PARKED]
+    cars = [t for t in things_of(road_map) if t.name == PARKED]
+    if not cars:
+        return cars
+    tree = shapely.STRtree(outlines_of(cars))
+    driven = polygons_of(samples, lanes, (LaneKind.DRIVING, LaneKind.RAMP), (False,))
+    sidewalks = polygons_of(samples, lanes, (LaneKind.SIDEWALK, LaneKind.BIKING), (False,))
+    crossings = [shapely.Polygon(p[:, :2]) for p in road_map.roadside.crosswalks]
+    stops = outlines_of([t for t in others if t.name == "bus stop"])
+    signals = shapely.points(road_map.signals.x, road_map.signals.y)
+    spawns = [shapely.Point(p.x, p.y) for p in spawn_points(road_map)]
+    spaces = [
+        shapely.Polygon(footprint(p.x, p.y, p.yaw, p.length, p.width))
+        for p in road_map.roadside.parking
+    ]
+    for shapes, distance in (
+        (driven, 0.299),
+        (sidewalks, 0.0),
+        (polygons_of(samples, lanes, in_junctions=(True,)), 5.0),
+        ([*crossings, *stops, *signals], 5.0),
+        (spawns, 1.0),
+        ([*spaces, *outlines_of(others)], 0.5),
+        (sight_triangles(samples, lanes), 0.0),
+    ):
+        found = tree.query(np.array(shapes, dtype=object), "dwithin", distance)
+        assert not found.size
+    room = polygons_of(samples, lanes, (LaneKind.PARKING, LaneKind.SHOULDER), (False,))
+    outlines = outlines_of(cars)
+    assert (shapely.area(shapely.difference(outlines, shapely.union_all(room))) < 0.05).all()
+    first, second = tree.query(outlines, predicate="dwithin", distance=0.7)
+    assert (first == second).all()
+    return cars
+
+
+def test_cars_are_parked_where_nobody_drives_walks_or_looks(road_map) -> None:
+    cars = assert_parked_well(road_map)
+    assert bool(cars) == (road_map.name in ("town", "Town07", "Town10HD"))
+
+
+STREET = """<OpenDRIVE><header revMajor="1" revMinor="4"/>
+<road name="" length="200" id="1" junction="-1"><type s="0" type="town"><speed max="50" unit="km/h"/></type>
+<planView><geometry s="0" x="0" y="0" hdg="0.3" length="200"><line/></geometry></planView>
+<elevationProfile><elevation s="0" a="2" b="0.02" c="0" d="0"/></elevationProfile>
+<lanes><laneSection s="0"><center><lane id="0" type="none"/></center><right>
+<lane id="-1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>
+<lane id="-2" type="{kind}"><width sOffset="0" a="{width}" b="0" c="0" d="0"/></lane>
+<lane id="-3" type="{beyond}"><width sOffset="0" a="2" b="0" c="0" d="0"/></lane>
+</right></laneSection></lanes></road></OpenDRIVE>"""
+
+
+@pytest.mark.parametrize(
+    ("kind", "width", "beyond", "fits"),
+    [
+        ("parking", 2.2, "sidewalk", True),
+        ("parking", 3.0, "none", True),
+        ("parking", 2.1, "sidewalk", False),
+        ("parking", 2.5, "driving", False),
+        ("shoulder", 2.2, "sidewalk", True),
+        ("shoulder", 2.1, "sidewalk", False),
+        ("shoulder", 3.0, "none", False),
+        ("sidewalk", 3.0, "sidewalk", False),
+    ],
+)
+def test_cars_are_parked_on_wide_parking_lanes_and_on_shoulders_before_sidewalks(
+    kind: str, width: float, beyond: str, fits: bool
+) -> None:
+    text = STREET.format(kind=kind, width=width, beyond=beyond)
+    road = RoadMap(bake(text.encode(), "street", "street.xodr"))
+    cars = assert_parked_well(road)
+    assert bool(cars) == fits
+    if not fits:
+        return
+    assert 10 < len(cars) < 35
+    boxes = [b for b in dress_map(road, Scenery.FULL).roadside.boxes if b.shape is Shape.CAR]
+    assert len(boxes) == len(cars)
+    assert {b.label for b in boxes} == {SemanticClass.CAR}
+    assert {b.rgb for b in boxes} <= set(PALETTE)
+    for box in boxes:
+        assert box.solid
+        assert box.yaw == pytest.approx(0.3, abs=0.01)
+        ahead = box.x * np.cos(0.3) + box.y * np.sin(0.3)
+        assert box.z == pytest.approx(2.0 + 0.02 * ahead, abs=0.02), "it stands on the road"
+
+
+def test_no_car_is_parked_on_a_steep_street() -> None:
+    text = STREET.format(kind="parking", width=2.5, beyond="sidewalk")
+    steep = text.replace('b="0.02"', 'b="0.08"')
+    road = RoadMap(bake(steep.encode(), "street", "street.xodr"))
+    assert not assert_parked_well(road)
 
 
 def test_things_do_not_stand_in_each_other_or_in_what_the_file_names() -> None:

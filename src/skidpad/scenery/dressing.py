@@ -19,6 +19,7 @@ from skidpad.roads.queries import RoadMap
 from skidpad.roads.roadside import UNPAINTED, Box, Roadside, Shape
 from skidpad.roads.terrain import Terrain, terrain_of
 from skidpad.scenery.free_ground import FreeGround
+from skidpad.scenery.parked import park, parking_places
 from skidpad.scenery.rows import backdrop_of, rows_of
 from skidpad.scenery.sides import sides_of
 from skidpad.scenery.things import STOREY, WALLS, Thing
@@ -36,7 +37,7 @@ CORNERS: dict[SignalKind, tuple[int, tuple[int, int, int]]] = {
     SignalKind.YIELD: (3, WHITE),
     SignalKind.SPEED_LIMIT: (16, WHITE),
 }
-EDITION = 2  # of what is generated; raise it when the same map gets other things
+EDITION = 3  # of what is generated; raise it when the same map gets other things
 LEAST_FRONT = 4.0  # m of the shorter side of a building that has windows
 SUNK = 0.3  # m that things reach into the ground, whose triangles are coarse
 
@@ -84,14 +85,16 @@ def things_of(map: RoadMap) -> list[Thing]:
         return []
     signs = signs_of(map.samples, map.lanes, map.signals, map.roadside)
     named = replace(map.roadside, boxes=(*map.roadside.boxes, *signs))
-    return FreeGround(map.samples, map.lanes, named).place(found)
+    stand = FreeGround(map.samples, map.lanes, named).place(found)
+    places = list(parking_places(map.samples, map.lanes, seed))
+    return [*stand, *park(places, stand, map.samples, map.lanes, map.signals, named)]
 
 
 def boxes_of(things: Sequence[Thing], terrain: Terrain) -> list[Box]:
     """Returns the boxes of the things in the map's axes, z in m up.
 
     A box that begins at the thing's foot reaches SUNK m below the lowest ground under its outline; others
-    count from the ground at the centre.
+    count from the ground at the centre. What stands on a road counts from there.
     """
     corners = np.array([[*footprint(*t.outline), t.outline[:2]] for t in things]).reshape(-1, 5, 2)
     ground = terrain.at(corners[..., 0].ravel(), corners[..., 1].ravel()).reshape(-1, 5)
@@ -100,6 +103,9 @@ def boxes_of(things: Sequence[Thing], terrain: Terrain) -> list[Box]:
     found = []
     for thing, z, rise in zip(things, foot.tolist(), slope.tolist(), strict=True):
         for box in thing.boxes:
+            if thing.z is not None:
+                found.append(replace(box, z=round(thing.z + box.z, 3)))
+                continue
             low = z if box.z == 0.0 else z + rise + box.z
             height = box.height + (rise if box.z == 0.0 else 0.0)
             found.append(replace(box, z=round(low, 3), height=round(height, 3)))

@@ -28,11 +28,12 @@ class FreeGround:
     """Finds places for things on the ground of a map that nothing else covers."""
 
     def __init__(self, samples: LaneSamples, lanes: LaneTable, roadside: Roadside) -> None:
-        own, corners = _lane_polygons(samples, lanes)
+        is_corner = lanes.junction >= 0
+        own, corners = (lane_polygons(samples, lanes, m) for m in (~is_corner, is_corner))
         zebras = [shapely.MultiPoint(p[:, :2]).convex_hull for p in roadside.crosswalks]
-        self._lanes = shapely.STRtree([*own, *zebras])
+        self._lanes = shapely.STRtree([*own, *corners, *zebras])
         self._corners = shapely.STRtree(corners)
-        self._objects = shapely.STRtree(_find_named_objects(roadside))
+        self._objects = shapely.STRtree(find_named_objects(roadside))
         self._sight = shapely.STRtree(sight_triangles(samples, lanes))
 
     def place(self, things: Sequence[Thing]) -> list[Thing]:
@@ -52,17 +53,22 @@ class FreeGround:
             tall = np.array([t.is_tall for t in things])
             free[rows[tall[rows]]] = False
         kept = np.flatnonzero(free)
-        first, second = shapely.STRtree(outlines[kept]).query(
-            outlines[kept], predicate="intersects"
-        )
-        meets: dict[int, list[int]] = {}
-        for a, b in zip(first.tolist(), second.tolist(), strict=True):
-            if b < a:
-                meets.setdefault(a, []).append(b)
-        stands = np.ones(len(kept), dtype=np.bool_)
-        for a in range(len(kept)):
-            stands[a] = not any(stands[b] for b in meets.get(a, ()))
-        return [things[i] for i in kept[stands].tolist()]
+        return [things[i] for i in kept[stand_apart(outlines[kept], 0.0)].tolist()]
+
+
+def stand_apart(outlines: NDArray[np.object_], distance: float) -> NDArray[np.bool_]:
+    """Returns (n,) which of n outlines stay when, of two within `distance` in m, the first one stays."""
+    first, second = shapely.STRtree(outlines).query(
+        outlines, predicate="dwithin", distance=distance
+    )
+    meets: dict[int, list[int]] = {}
+    for a, b in zip(first.tolist(), second.tolist(), strict=True):
+        if b < a:
+            meets.setdefault(a, []).append(b)
+    stands = np.ones(len(outlines), dtype=np.bool_)
+    for a in range(len(outlines)):
+        stands[a] = not any(stands[b] for b in meets.get(a, ()))
+    return stands
 
 
 def outlines_of(things: Sequence[Thing]) -> NDArray[np.object_]:
@@ -72,28 +78,24 @@ def outlines_of(things: Sequence[Thing]) -> NDArray[np.object_]:
     return found
 
 
-def _lane_polygons(
-    samples: LaneSamples, lanes: LaneTable
-) -> tuple[list[shapely.Polygon], list[shapely.Polygon]]:
-    """Returns convex pieces of all lanes, PIECE samples long, and those of them that lie in a junction."""
+def lane_polygons(
+    samples: LaneSamples, lanes: LaneTable, chosen: NDArray[np.bool_], piece: int = PIECE
+) -> list[shapely.Polygon]:
+    """Returns convex pieces of the chosen lanes, `piece` samples long; chosen: (l,) for all lanes."""
     left = np.stack([-np.sin(samples.heading), np.cos(samples.heading)], axis=1)
     middle = np.stack([samples.x, samples.y], axis=1)
     half = 0.5 * samples.width[:, None]
     a, b = middle + half * left, middle - half * left
     found: list[shapely.Polygon] = []
-    corners: list[shapely.Polygon] = []
-    for lane, (first, size) in enumerate(
-        zip(lanes.first.tolist(), lanes.size.tolist(), strict=True)
-    ):
-        for k in range(first, first + size - 1, PIECE):
-            end = min(k + PIECE + 1, first + size)
+    for first, size in zip(lanes.first[chosen].tolist(), lanes.size[chosen].tolist(), strict=True):
+        for k in range(first, first + size - 1, piece):
+            end = min(k + piece + 1, first + size)
             ring = np.concatenate([a[k:end], b[k:end][::-1]])
-            piece = shapely.MultiPoint(ring).convex_hull
-            (found if lanes.junction[lane] < 0 else corners).append(piece)
-    return [*found, *corners], corners
+            found.append(shapely.MultiPoint(ring).convex_hull)
+    return found
 
 
-def _find_named_objects(roadside: Roadside) -> list[shapely.Geometry]:
+def find_named_objects(roadside: Roadside) -> list[shapely.Geometry]:
     """Returns the plan shapes of what the map itself names: boxes, barriers, signal heads, parking."""
     boxes = [shapely.Polygon(footprint(b.x, b.y, b.yaw, b.length, b.width)) for b in roadside.boxes]
     lines = [shapely.LineString(b.points[:, :2]) for b in roadside.barriers]

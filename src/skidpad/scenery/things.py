@@ -23,13 +23,6 @@ HEDGES: tuple[Rgb, ...] = ((58, 86, 40), (70, 92, 48))
 BARK: tuple[Rgb, ...] = ((86, 70, 54), (104, 92, 78))
 GREY, WOODEN, GLASS = (104, 106, 110), (126, 104, 78), (92, 104, 112)
 STOREY = 3.1  # m
-CARS: tuple[Rgb, ...] = (
-    (222, 222, 222),
-    (60, 62, 66),
-    (120, 122, 126),
-    (36, 60, 110),
-    (140, 32, 30),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,12 +34,14 @@ class Thing:
         boxes: Its parts.
         outline: Centre, direction, length and width of the ground that it covers.
         is_tall: Drivers of cars do not see over it.
+        z: Height in m of the road that it stands on; None where it stands on the ground.
     """
 
     name: str
     boxes: tuple[Box, ...]
     outline: tuple[float, float, float, float, float]
     is_tall: bool = True
+    z: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,3 +172,9 @@ def make_noise_wall(at: Place, length: float) -> Thing:
     """Returns a piece of a noise wall, `length` m along the road and 3.2 m high."""
     box = _part(at, SemanticClass.WALL, (length, 0.3, 3.2), (138, 132, 118), Shape.BOX)
     return _thing("noise wall", at, length, 0.3, box)
+
+
+def make_parked_car(at: Place, z: float, size: tuple[float, float, float], rgb: Rgb) -> Thing:
+    """Returns a car that stands on a road z m high; size: its length, width and height in m."""
+    box = _part(at, SemanticClass.CAR, size, rgb, Shape.CAR)
+    return Thing("parked car", (box,), (at.x, at.y, at.along, *size[:2]), z=z)

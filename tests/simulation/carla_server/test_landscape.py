@@ -8,6 +8,7 @@ import pytest
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import Scenery, SemanticClass
 from skidpad.roads.bundled import load_map, map_file
+from skidpad.scenery.dressing import dress_map
 from skidpad.sensors.ranging.around import Fan, look_around
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.maps import scenery
@@ -71,6 +72,31 @@ def test_layers_act_on_layered_maps_only():
     assert len(layered.roads.roadside.boxes) < len(roads.roadside.boxes)
     layered.load(0xFFFF, on=True)
     assert layered.roads is roads
+
+
+def test_parked_cars_are_objects_of_the_map_in_a_layer_of_their_own():
+    roads = dress_map(load_map(map_file("town")), Scenery.FULL)
+    landscape = Landscape(roads, layered=True)
+    cars = [o for o in landscape.present() if o.label == SemanticClass.CAR]
+    assert cars
+    assert all(o.half[0] > 1.8 and o.half[2] > 0.7 for o in cars)
+    landscape.load(16, on=False)  # carla.MapLayer.ParkedVehicles
+    assert SemanticClass.CAR not in {o.label for o in landscape.present()}
+    names = obstacles(roads).names
+    assert names.count("car") == 4 * len(cars)
+    assert "car" not in obstacles(landscape.roads).names
+
+
+def test_lidar_meets_a_parked_car_in_its_shape():
+    served = Served(ServerOptions(map="town_Opt", scenery=Scenery.FULL), StreamHub())
+    car = next(o for o in objects(served.episode.map.roads) if o.label == SemanticClass.CAR)
+    yaw, away = car.centre.yaw, car.half[0] + 3.0
+    x, y = car.centre.x - away * np.cos(yaw), car.centre.y - away * np.sin(yaw)
+    eye = Pose(x, y, car.centre.z - car.half[2] + 0.6, yaw=yaw)
+    ahead = Fan(np.zeros(1), np.zeros(1), np.zeros(1, dtype=int), np.zeros(1, dtype=int))
+    seen = look_around(served.episode.surroundings.picture().live, eye, ahead, 50.0, -1)
+    assert seen.label[0] == SemanticClass.CAR
+    assert seen.distance[0] == pytest.approx(3.0, abs=0.2)
 
 
 def facing_a_building(served: Served):

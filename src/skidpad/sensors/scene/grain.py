@@ -47,6 +47,8 @@ def grain_table(boxes: Iterable[tuple[int, int]]) -> Floats32:
         for one in (material, *TRACKS.get(material, ())):
             table[one] = (*strengths, *GROUND_GRAIN)
     for label, number in boxes:
+        if label == SemanticClass.CAR:
+            continue
         is_leaf = label == SemanticClass.VEGETATION
         table[number] = (*LEAVES, *LEAF_GRAIN) if is_leaf else (*WALLS, *GROUND_GRAIN)
     return table

@@ -33,6 +33,7 @@ HEAD = (0.18, 0.45, 1.26)  # m: a head's depth, width and height for lamps of 0.
 LAYERS = {  # bits of carla.MapLayer
     SemanticClass.BUILDING: 1,
     SemanticClass.VEGETATION: 4,
+    SemanticClass.CAR: 16,
     SemanticClass.STATIC: 64,
     SemanticClass.POLE: 128,
     SemanticClass.WALL: 256,

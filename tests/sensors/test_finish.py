@@ -16,6 +16,7 @@ from skidpad.physics.optics import transmission
 from skidpad.physics.presets import preset
 from skidpad.roads.roadside import Box, Shape, SignalHead
 from skidpad.sensors.finish.extras import ALL_EXTRAS, NO_EXTRAS, Extra
+from skidpad.sensors.finish.fog import fog_of
 from skidpad.sensors.finish.outline import MOST, spans
 from skidpad.sensors.finish.stars import light_night, starlight_of
 from skidpad.sensors.finish.sun import sun_of
@@ -85,7 +86,8 @@ def test_a_low_sun_has_a_disc_and_its_glare_lies_over_what_stands_before_the_sky
     assert abs(150.0 - rows.mean() - focal * np.tan(np.radians(6.0))) < 8.0
     assert changed[~sky].mean() > 0.5
     fog = replace(low, fog_density=90.0)
-    assert sun_of(fog, lighting(fog)).colour.max() == 0.0
+    light = lighting(fog)
+    assert sun_of(fog, light, fog_of(fog, light)).colour.max() == 0.0
     for hidden in (replace(low, cloudiness=100.0), replace(low, sun_azimuth_deg=180.0)):
         plain, added, _ = both(hidden, Extra.LAMPS)
         lit = (added.rgb - plain.rgb)[np.isin(plain.labels, (SemanticClass.TERRAIN,))]

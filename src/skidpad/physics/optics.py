@@ -42,6 +42,11 @@ HIGH_BEAM_CANDELA = 40_500.0  # least maximum of a class B driving beam, UN R149
 VISIBILITY_MOST = 1000.0  # m, what an estimate begins with (A-220)
 E_SEEN_LUX = 1.0  # illuminance at which a dark object is noticed; Schmidt-Clausen (1982), 1 to 3
 NIGHT_LUX = 0.05  # moonless sky with skyglow beside a road
+SUN_LUX, DIMMED = (
+    133_100.0,
+    0.21,
+)  # lux beyond the air, and its extinction by one air mass (IES RP-21-84)
+CLEAR_SKY, OVERCAST_SKY = (800.0, 15_500.0), (300.0, 21_000.0)  # lux of it, by height of the sun
 
 
 def fog_extinction(weather: Weather) -> float:
@@ -180,9 +185,9 @@ def daylight(weather: Weather) -> float:
     """
     h = weather.sun_altitude_deg
     rise = sin(radians(max(h, 0.0)))
-    beam = 133_100.0 * exp(-0.21 / rise) * rise if rise > 1e-6 else 0.0
-    clear = beam + 800.0 + 15_500.0 * sqrt(rise)
-    overcast = 300.0 + 21_000.0 * rise
+    beam = SUN_LUX * exp(-DIMMED / rise) * rise if rise > 1e-6 else 0.0
+    clear = beam + CLEAR_SKY[0] + CLEAR_SKY[1] * sqrt(rise)
+    overcast = OVERCAST_SKY[0] + OVERCAST_SKY[1] * rise
     cloud = weather.cloudiness / 100.0
     lux = (1.0 - cloud) * clear + cloud * overcast
     if h >= 0.0:
@@ -202,9 +207,10 @@ def sunlight(weather: Weather) -> tuple[float, float]:
         return 0.0, 0.0
     rise, cloud = sin(radians(h)), weather.cloudiness / 100.0
     mass = 1.0 / (rise + 0.50572 * (h + 6.07995) ** -1.6364)
-    sun = 133_100.0 * exp(-0.21 * mass)
-    sky = (1.0 - cloud) * (800.0 + 15_500.0 * sqrt(rise)) + cloud * (300.0 + 21_000.0 * rise)
-    return (1.0 - cloud) * sun, sky
+    sun = SUN_LUX * exp(-DIMMED * mass)
+    clear = CLEAR_SKY[0] + CLEAR_SKY[1] * sqrt(rise)
+    overcast = OVERCAST_SKY[0] + OVERCAST_SKY[1] * rise
+    return (1.0 - cloud) * sun, (1.0 - cloud) * clear + cloud * overcast
 
 
 def _reach(beta: float, start: float, budget: float) -> float:

@@ -93,17 +93,17 @@ def _row(
         rgb = PALETTE[int(rng.choice(len(PALETTE), p=PAINT_SHARES))]
         to_kerb, is_taken = float(rng.uniform(*TO_KERB)), bool(rng.random() < share)
         under = (s >= at - 1.0) & (s <= at + size[0] + 1.0)
-        room = float(width[under].min()) - size[1]
+        narrowest = float(width[under].min())
         middle = at + 0.5 * size[0]
         at += float(rng.uniform(*STEP))
         if (
             middle + 0.5 * size[0] < s[-1]
-            and room + size[1] >= LEAST_WIDTH
+            and narrowest >= LEAST_WIDTH
             and np.abs(grade[under]).max() < STEEPEST
         ):
             x, y, z, along = (float(np.interp(middle, s, v)) for v in course)
             border = 0.5 * float(np.interp(middle, s, width))
-            aside = border - 0.5 * size[1] - min(to_kerb, room - TO_TRAFFIC)
+            aside = border - 0.5 * size[1] - min(to_kerb, narrowest - size[1] - TO_TRAFFIC)
             place = Place(x, y, along).move(0.0, outward * aside)
             car = things.make_parked_car(place, round(z, 3), size, rgb)
             yield car if is_taken else replace(car, boxes=())

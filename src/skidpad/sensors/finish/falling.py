@@ -33,7 +33,6 @@ NEAR = 1.6  # m, before which none is drawn: there is a car or a glass
 SHELTER = 0.35  # share of the wind near the ground
 LEAST = 0.02  # share below which a stroke is not seen
 LONGEST = 160.0  # px
-LAMPLIT = 1.0  # of the ego's beam that comes back from what falls
 WHITE = np.float32(255.0)
 
 
@@ -87,7 +86,7 @@ def draw_falling(
     r, c = view.rotation, view.centre
     cos_ego, sin_ego = np.cos(ego[3]), np.sin(ego[3])
     strength, slope, reach = beam_of(light)
-    strength *= np.float32(LAMPLIT * light.lamps)
+    strength *= np.float32(light.lamps)
     moved = (falling.velocity - velocity) * EXPOSED
     nearing = r[2, 0] * moved[0] + r[2, 1] * moved[1] + r[2, 2] * moved[2]
     wide_u, wide_v = 0.5 * view.width / view.focal, (view.height + view.cy) / view.focal

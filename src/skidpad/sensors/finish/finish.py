@@ -70,8 +70,8 @@ class Finish:
         self._curve = curve_of(light)
         self._layer = layer_of(weather, light)
         self._stars = starlight_of(weather)
-        self._sun = sun_of(weather, light)
         self._fog = fog_of(weather, light)
+        self._sun = sun_of(weather, light, self._fog)
         self._falling = falling_in(weather, light)
         self._wet = light.wet * (1.0 - light.snow) if light.wet > LEAST_WET else 0.0
         self._drift = DRIFT * self._dt * (0.2 + 0.8 * weather.wind_intensity / 100.0)

@@ -17,7 +17,7 @@ from skidpad.core.arrays import Floats, Floats32
 from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.weather import Weather
 from skidpad.physics.optics import sunlight
-from skidpad.sensors.finish.fog import fog_of
+from skidpad.sensors.finish.fog import Fog
 from skidpad.sensors.pictures.lighting import Colour, Lighting
 from skidpad.sensors.pictures.packing import pack, unpack
 from skidpad.sensors.raster.view import View
@@ -42,12 +42,12 @@ class Sun(NamedTuple):
     colour: Colour  # (3,) linear, times its strength; 0 where it is not seen
 
 
-def sun_of(weather: Weather, light: Lighting) -> Sun:
+def sun_of(weather: Weather, light: Lighting, fog: Fog) -> Sun:
     """Returns the sun of a weather as it is seen through its clouds and fog."""
     beam, sky = sunlight(weather)
     strength = min(beam / (SUNNY * sky), 1.0) if sky > 0.0 else 0.0
     rise = max(float(light.sun_direction[2]), 1e-3)
-    strength *= float(np.exp(-fog_of(weather, light).depth / rise))
+    strength *= float(np.exp(-fog.depth / rise))
     seen = strength if strength > LEAST else 0.0
     colour = seen * light.sun / max(float(light.sun.max()), 1e-6)
     return Sun(light.sun_direction, colour.astype(np.float32))

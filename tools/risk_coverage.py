@@ -216,7 +216,10 @@ def main() -> None:
         once = partial(repeat, folder, asked.chains, asked.per_level, asked.samples)
         numbers = range(asked.repetitions)
         drive(folder / REPEATED, Repeated, once, numbers, asked.minutes, asked.workers)
-    sys.stdout.write(table(folder) + "\n" if (folder / COUNTED).is_file() else "")
+    elif not (folder / COUNTED).is_file():
+        parser.error(f"{folder} has no {COUNTED}: run count first")
+    if (folder / COUNTED).is_file():
+        sys.stdout.write(table(folder) + "\n")
 
 
 if __name__ == "__main__":

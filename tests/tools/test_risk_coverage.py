@@ -55,6 +55,14 @@ def test_table_says_how_often_an_interval_holds_the_counted_share(tmp_path):
     assert "determined: 1 of 3" in text
 
 
+def test_a_table_of_a_folder_without_counts_is_refused(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["risk_coverage.py", "table", str(tmp_path)])
+    with pytest.raises(SystemExit) as ended:
+        coverage.main()
+    assert ended.value.code == 2
+    assert "has no counted.jsonl: run count first" in capsys.readouterr().err
+
+
 def test_a_block_of_real_runs_depends_on_its_number_alone(tmp_path, monkeypatch):
     monkeypatch.setattr(coverage, "BLOCK", 3)
     course = Scenario(

@@ -5,7 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from itertools import permutations
 from pathlib import Path
+from threading import Condition
+from typing import Any
 
 import pytest
 
@@ -137,3 +142,53 @@ def test_a_record_that_was_renamed_does_not_break_the_kept_code_of_others(tmp_pa
             env=os.environ | {"XDG_CACHE_HOME": str(tmp_path / "cache")},
         )  # fmt: skip
         assert done.returncode == 0, done.stderr
+
+
+class InTurns(jit.SharedIndex):
+    """A writer whose every access to the disk waits for its turn in `order`, a list of names."""
+
+    def __init__(self, folder: Path, name: str, order: list[str], turn: Condition) -> None:
+        super().__init__(str(folder), "hold-1.py311", "stamp")
+        self.name, self.order, self.turn = name, order, turn
+
+    def in_turn(self, access: Callable[..., Any], *arguments: object) -> Any:
+        with self.turn:
+            assert self.turn.wait_for(lambda: self.order[:1] == [self.name], timeout=10)
+            try:
+                return access(*arguments)
+            finally:
+                self.order.pop(0)
+                self.turn.notify_all()
+
+    def _load_index(self) -> Any:
+        return self.in_turn(super()._load_index)
+
+    def _save_index(self, overloads: Any) -> None:
+        self.in_turn(super()._save_index, overloads)
+
+    def _save_data(self, name: str, data: object) -> None:
+        self.in_turn(super()._save_data, name, data)
+
+
+ORDERS = ["".join(order) for order in sorted(set(permutations("AAABBB")))]
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_two_processes_that_compile_at_once_do_not_mix_their_code(
+    tmp_path: Path, order: str
+) -> None:
+    """What is kept for a signature is its machine code, however two writers take turns.
+
+    It ended in a segmentation fault, or in numbers of no meaning, once in a few hours of tests.
+    """
+    turns, turn = list(order), Condition()
+    with ThreadPoolExecutor(2) as pool:
+        for name in "AB":
+            writer = InTurns(tmp_path, name, turns, turn)
+            pool.submit(writer.save, f"signature of {name}", f"code of {name}")
+    assert not turns
+    kept = jit.SharedIndex(str(tmp_path), "hold-1.py311", "stamp")
+    found = [kept.load(f"signature of {name}") for name in "AB"]
+    assert found[0] in ("code of A", None), "None: lost, to be compiled again"
+    assert found[1] in ("code of B", None)
+    assert any(found)

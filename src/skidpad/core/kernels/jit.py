@@ -141,19 +141,32 @@ def _compile(function: Callable[..., Any], **flags: bool) -> Any:
         cache=True, nogil=True, error_model="numpy", pipeline_class=LeanCompiler, **flags
     )
     compiled = decorate(function)
-    compiled._cache._cache_file.__class__ = ForgivingIndex
+    compiled._cache._cache_file.__class__ = SharedIndex
     return compiled
 
 
-class ForgivingIndex(IndexDataCacheFile):  # type: ignore[misc]
-    """An index of machine code whose types may be gone: then it is empty, and written anew.
+class SharedIndex(IndexDataCacheFile):  # type: ignore[misc]
+    """The machine code of one kernel, kept by signature, for processes that compile it at once.
 
-    Generic kernels such as `hold` are kept by their own text, for records of any file: numba would
-    end with an AttributeError once such a record is renamed.
+    Numba numbers the files of code. Two processes that save at once may then both write number 1, and
+    the index names it for the signature of one while it holds the code of the other. Here a file is
+    named after its signature, so at worst an entry of the index is lost, and compiled again.
     """
 
+    def save(self, key: object, data: object) -> None:
+        """Writes the code of a signature, then its entry in the index."""
+        name = (
+            f"{Path(self._index_name).stem}.{hashlib.sha256(self._dump(key)).hexdigest()[:16]}.nbc"
+        )
+        self._save_data(name, data)
+        self._save_index(self._load_index() | {key: name})
+
     def _load_index(self) -> dict[Any, str]:
-        """Returns the index of the cache; empty where it cannot be read by this version."""
+        """Returns the index; empty where it cannot be read by this version.
+
+        Generic kernels such as `hold` are kept by their own text, for records of any file: numba would
+        end with an AttributeError once such a record is renamed.
+        """
         try:
             return dict(super()._load_index())
         except (AttributeError, ImportError):

@@ -8,8 +8,8 @@ from skidpad.core.geometry import Pose
 from skidpad.core.specs import CameraSpec, Modality
 from skidpad.sensors.pictures.blocks import BLOCK, COLUMNS, LANES, gather
 from skidpad.sensors.pictures.degradation import CameraNoise, Degradation
+from skidpad.sensors.pictures.headlamps import behind_lamps
 from skidpad.sensors.pictures.packing import pack, rounded, unpack
-from skidpad.sensors.pictures.shading import behind_lamps
 from skidpad.sensors.raster.view import camera_view
 from skidpad.sensors.scene.materials import MATERIALS
 

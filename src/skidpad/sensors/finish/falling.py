@@ -18,9 +18,9 @@ from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.weather import Weather
 from skidpad.physics.optics import snow_rate
 from skidpad.physics.wind import wind_of_intensity
+from skidpad.sensors.pictures.headlamps import HEADLAMP_X, HEADLAMP_Z, beam_at, beam_of
 from skidpad.sensors.pictures.lighting import Colour, Lighting
 from skidpad.sensors.pictures.packing import pack, unpack
-from skidpad.sensors.pictures.shading import HEADLAMP_X, HEADLAMP_Z, beam_at, beam_of
 from skidpad.sensors.raster.view import View
 
 BOXES = np.array([[7.0, 0.4], [18.0, 1.0], [40.0, 1.0]])  # m of edge, share of DROPS

@@ -33,8 +33,8 @@ from skidpad.sensors.finish.shadows import (
 from skidpad.sensors.finish.stars import STARS, draw_stars, starlight_of
 from skidpad.sensors.finish.sun import draw_sun, sun_of
 from skidpad.sensors.finish.tone import curve_of, set_tone
+from skidpad.sensors.pictures.colours import ROADLIKE
 from skidpad.sensors.pictures.lighting import Lighting
-from skidpad.sensors.pictures.shading import ROADLIKE
 from skidpad.sensors.raster.passes import Pass
 from skidpad.sensors.raster.view import View
 from skidpad.sensors.scene.materials import MATERIALS

@@ -15,8 +15,7 @@ from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.physics.optics import air_depth
 from skidpad.sensors.finish.glow import add_light
-from skidpad.sensors.pictures.lighting import Lighting
-from skidpad.sensors.pictures.shading import (
+from skidpad.sensors.pictures.headlamps import (
     HEADLAMP_X,
     HEADLAMP_Z,
     beam_at,
@@ -24,6 +23,7 @@ from skidpad.sensors.pictures.shading import (
     behind_lamps,
     rise_of_beam,
 )
+from skidpad.sensors.pictures.lighting import Lighting
 from skidpad.sensors.raster.view import View
 from skidpad.sensors.scene.materials import MATERIALS, Material
 

@@ -23,8 +23,8 @@ from skidpad.physics.camera import (
     saturation_luminance,
 )
 from skidpad.physics.optics import HEADLIGHT_CANDELA, HIGH_BEAM_CANDELA, daylight
+from skidpad.sensors.pictures.headlamps import beam_at, beam_of
 from skidpad.sensors.pictures.lighting import Lighting
-from skidpad.sensors.pictures.shading import beam_at, beam_of
 
 DARKEST = exposure_value(2.0, 1.0 / 30.0, 1600.0)  # EV100 of the longest exposure
 BRIGHTEST = exposure_value(2.0, 1.0 / 20_000.0, 100.0)

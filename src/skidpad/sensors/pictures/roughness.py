@@ -125,15 +125,10 @@ _HALF, _TWO, _FOUR, _EIGHT = np.float32(0.5), np.float32(2.0), np.float32(4.0), 
 _COOL = np.float32(0.14)  # of what grazing light adds: it comes from the sky, not from the sun
 _GREEN = np.float32(0.35)
 _TINY = np.float32(1e-12)
-_FILM, _UNEVEN, _DRIEST = (
-    np.float32(0.75),
-    np.float32(0.9),
-    np.float32(0.3),
-)  # of a wet road's water, by place
-_SIDE, _STEEPLY = (
-    np.float32(0.45),
-    np.float32(1.4),
-)  # of the dark beneath: on what stands upright, per climb
+# of a wet road's water, by place
+_FILM, _UNEVEN, _DRIEST = np.float32(0.75), np.float32(0.9), np.float32(0.3)
+# of the dark beneath: on what stands upright, per climb
+_SIDE, _STEEPLY = np.float32(0.45), np.float32(1.4)
 _TURNED = np.float32(0.55)  # by which grains of leaves turn them up or down
 _SHEEN = np.float32(0.5)  # of rough ground towards the sun's image, by eye
 
@@ -159,8 +154,8 @@ def roughen(
 
     v: m down per m ahead of the block's row; clear, wet: of 1, light of the sun's disc and water on the road;
     up, mirrored: (3,) camera axes, the latter towards the sun's image below the ground; table: colours as in
-    `gather`; grain, tiles:
-    `grain_table`, `make_tiles`. Near the camera grains are finer, so that no texel is seen as a square.
+    `gather`; grain, tiles: `grain_table`, `make_tiles`. Near the camera grains are finer, so that no texel
+    is seen as a square.
     """
     r = view.rotation
     x_u, x_1 = np.float32(r[0, 0]), np.float32(r[1, 0]) * v + np.float32(r[2, 0])
@@ -175,12 +170,8 @@ def roughen(
     x, begin, focal = 0, 0, np.float32(view.focal)
     while x < count:
         m, end = keys[x] & 255, end_of_run(keys, x)
-        grains, patches, tints, repairs = (
-            grain[m, GRAINS],
-            grain[m, PATCHES],
-            grain[m, TINTS],
-            grain[m, REPAIRS],
-        )
+        grains, patches = grain[m, GRAINS], grain[m, PATCHES]
+        tints, repairs = grain[m, TINTS], grain[m, REPAIRS]
         graze, texel, reach = grain[m, GRAZING], grain[m, TEXEL], grain[m, NEAR]
         per_patch, per_repair = patches * _PER_BYTE, repairs * _PER_BYTE
         if x > 0:

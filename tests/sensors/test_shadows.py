@@ -93,13 +93,29 @@ def test_without_sun_there_is_no_edge_but_still_contact():
 
 
 def test_fog_before_a_shadow_veils_it():
-    """20 m of dense fog leave (1 + 1.2 / 16)^-16 = 0.31 of the dark."""
-    fog = Weather(fog_density=100.0)
+    """20 m of dense fog leave (1 + 1.2 / 16)^-16 = 0.31 of the ground's light; what the air adds stays."""
+    fog, left = Weather(fog_density=100.0), 0.314
     assert fog_extinction(fog) == pytest.approx(0.06, rel=0.01)
-    clear = (seen(Weather(), True)[0] / seen(Weather(), False)[0]) ** 2
-    veiled = (seen(fog, True)[0] / seen(fog, False)[0]) ** 2
-    assert clear.min() < 0.5
-    assert veiled.min() == pytest.approx(1.0 - 0.31 * (1.0 - clear.min()), abs=0.03)
+    light = lighting(fog)
+    view = camera_view(CameraSpec("rgb", Modality.RGB, 400, 400, 90.0, ABOVE), Pose(10.0, 0.0, 0.0))
+    keys = np.full((400, 400), Material.GRASS, dtype=np.int32)
+    inverse = np.full((400, 400), 1.0 / 20.0, dtype=np.float32)
+    shade = shade_of(fog, light)
+
+    def darkest(ground, veil, air):
+        value = round(255.0 * np.sqrt(ground + veil))
+        picture = np.full((400, 400), 0xFF000000 + value * 0x010101, dtype=np.uint32)
+        bodies, inside = standing([post(10.0, 4.0)]), shade._replace(air=air)
+        cast_shadows(view, bodies, inside, GROUND_MASK, inverse, keys, picture)
+        return (picture.view(np.uint8).reshape(400, 400, 4)[200, 200:, 1].min() / 255.0) ** 2
+
+    share = darkest(0.3, 0.0, shade.air._replace(fog=0.0)) / 0.3
+    assert share < 0.6
+    veil = (1.0 - left) * float(light.horizon[1])
+    assert darkest(left * 0.1, veil, shade.air) == pytest.approx(
+        left * 0.1 * share + veil, abs=0.01
+    )
+    assert veil > 0.3, "and not by 0.31 of the dark, as if the air were as dark as the ground"
 
 
 def test_a_crown_throws_a_round_shadow_beside_its_stem_and_a_beam_over_the_road_none():

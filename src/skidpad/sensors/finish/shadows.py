@@ -84,6 +84,7 @@ class Shade(NamedTuple):
     sun_y: float
     sun: Colour  # (3,) share of the light that comes from the sun's direction, by colour
     air: Air  # between a shadow and the eye
+    haze: Colour  # (3,) what the air puts in place of the light that it keeps away, of 255^2
     curved: float  # as in `Lighting`
 
 
@@ -135,7 +136,8 @@ def shade_of(weather: Weather, light: Lighting) -> Shade:
     of_sun, of_sky = (c / max(float(c.mean()), 1e-6) for c in (light.sun, light.sky))
     share = sun * of_sun / np.maximum(sun * of_sun + sky * of_sky, 1e-6)
     x, y = -float(direction[0]) / up, -float(direction[1]) / up
-    return Shade(x, y, share.astype(np.float32), light.air, light.curved)
+    haze = light.horizon * np.float32(light.exposure * 255.0**2)
+    return Shade(x, y, share.astype(np.float32), light.air, haze, light.curved)
 
 
 GROUND_MASK = np.zeros(MATERIALS, dtype=np.bool_)  # by material: shadows are seen on it
@@ -340,10 +342,19 @@ def _darken(
 
 
 @inner_kernel
+def _dimmed(value: np.float32, veil: np.float32, left: np.float32) -> np.float32:
+    """Returns a byte whose light, but for the veil of the air, is dimmed to a share. veil: of 255^2."""
+    ground = value * value - veil
+    ground = ground if ground > ZERO else ZERO
+    dimmed: np.float32 = np.sqrt(value * value - ground * (ONE - left))
+    return dimmed
+
+
+@inner_kernel
 def _dim_block(
     shade: Shade, height: float, count: int, lanes: Floats32, pixels: NDArray[np.uint32]
 ) -> None:
-    """Takes the light from a block's pixels that does not reach them, as much as the air lets through.
+    """Takes from a block's pixels the light that shadows keep from the ground; what the air adds stays.
 
     Their bytes are square roots of light. height: m, of the camera.
     """
@@ -351,16 +362,17 @@ def _dim_block(
     fog, start = np.float32(shade.air.fog), np.float32(shade.air.fog_start)
     rain, curved = np.float32(shade.air.rain), np.float32(shade.curved)
     red, green, blue = shade.sun[0], shade.sun[1], shade.sun[2]
+    haze_r, haze_g, haze_b = shade.haze[0], shade.haze[1], shade.haze[2]
     for x in range(count):
         way = lanes[WAY + x]
         foggy = (way - start if way > start else ZERO) * fog
         foggy *= thinned_fog(eye, lanes[Z + x], start / way, fall) if fall > ZERO else ONE
-        left = share_left(foggy + way * rain, curved)
+        lost = ONE - share_left(foggy + way * rain, curved)
         touched, dark = lanes[TOUCHED + x], lanes[HIDDEN + x]
         r, g, b = unpack(pixels[x])
-        r *= np.sqrt(ONE - left * (ONE - touched * (ONE - dark * red)))
-        g *= np.sqrt(ONE - left * (ONE - touched * (ONE - dark * green)))
-        b *= np.sqrt(ONE - left * (ONE - touched * (ONE - dark * blue)))
+        r = _dimmed(r, lost * haze_r, touched * (ONE - dark * red))
+        g = _dimmed(g, lost * haze_g, touched * (ONE - dark * green))
+        b = _dimmed(b, lost * haze_b, touched * (ONE - dark * blue))
         pixels[x] = pack(r, g, b)
 
 

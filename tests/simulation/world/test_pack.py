@@ -96,7 +96,7 @@ def test_who_leaves_enters_out_of_sight_at_speed(factor: float, least: int) -> N
             kept.append(sum(there))
     assert entered >= 2
     assert np.mean(kept) >= least
-    assert world.background == ()
+    assert world.events.background == ()
 
 
 def test_more_than_the_published_places_enter_when_there_is_room() -> None:

@@ -241,7 +241,7 @@ class QuickDrive:
         while driven < min(most, arrays.left) and not script.ended:
             assert stepper.action is not None
             begun = begun or self._make_step(stepper.action.command, stepper.words)
-            if not (begun and world.is_quiet and world.lights.by_id is shown):
+            if not (begun and world.events.is_empty and world.lights.by_id is shown):
                 stepper.next_frame = inner.read_frame()
                 break
             story, n = self._story_ahead(min(most, arrays.left) - driven)
@@ -292,7 +292,7 @@ class QuickDrive:
             last, driven = stop.request, driven + stop.ticks
             if stop.why in (MOVED, STEPPED):
                 world.finish_step(stop.touches, stop.crossed, settled=stop.why == STEPPED)
-                begun = world.is_quiet and lights.by_id is shown
+                begun = world.events.is_empty and lights.by_id is shown
                 if begun:
                     continue
             if stop.why == REFUSED:

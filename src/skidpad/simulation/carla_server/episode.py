@@ -46,12 +46,19 @@ from skidpad.simulation.carla_server.vehicles.falling import DROP, Falling, grou
 from skidpad.simulation.carla_server.vehicles.giving_way import GivingWay
 from skidpad.simulation.carla_server.vehicles.vehicles import Vehicles
 from skidpad.simulation.carla_server.weather import Sky
+from skidpad.simulation.world.conditions import Conditions
 from skidpad.simulation.world.ground import ground_height
+from skidpad.simulation.world.interventions import (
+    set_collides,
+    set_grounded,
+    set_simulated,
+    teleport,
+)
 from skidpad.simulation.world.lights import Lights
 from skidpad.simulation.world.obstacles import obstacles
 from skidpad.simulation.world.patches import FrictionZone, Patches
 from skidpad.simulation.world.surface_files import read_surface
-from skidpad.simulation.world.world import Conditions, World
+from skidpad.simulation.world.world import World
 
 KINDS = ("point", "line", "arrow", "box", "text", "hud point", "hud line", "hud arrow", "hud box")
 MOST = 10_000
@@ -121,7 +128,7 @@ class Episode:
             seed=seed, dt=clock.step, grip=self.sky.grip, road_noise=0.0, all_lanes=True
         )
         self.moving = World(map.roads, Lights(map.roads, arms=True), conditions)
-        self.moving.lay_patches(stock.patches_on(map.roads, self.sky.road))
+        self.moving.wheel_grip.lay_patches(stock.patches_on(map.roads, self.sky.road))
         self.actors = ActorTable(self.moving, stock.ids)
         self.rows = Rows()
         self.vehicles = Vehicles(self.moving)
@@ -255,10 +262,10 @@ class Episode:
             return
         (body,) = self.moving.enter([shapes.body_of(actor)])
         actor.body = body
-        self.moving.set_grounded(body, actor.family is Family.WALKER)
-        self.moving.set_collides(body, not shapes.is_flat(actor))
+        set_grounded(self.moving, body, actor.family is Family.WALKER)
+        set_collides(self.moving, body, not shapes.is_flat(actor))
         self.moving.put(self.moving.row(body), feet, 0.0)
-        self.moving.teleport(body, feet)
+        teleport(self.moving, body, feet)
         self.moving.settle()
 
     def _enlist(self, actor: Actor) -> None:
@@ -283,7 +290,7 @@ class Episode:
 
     def _mark_zones(self) -> None:
         """Friction triggers act on every tyre inside, where they are now."""
-        self.moving.zones = [
+        self.moving.wheel_grip.zones = [
             FrictionZone(t.pose, t.half, float(t.attributes["friction"]))
             for t in self.actors.of(Family.TRIGGER)
         ]
@@ -299,14 +306,14 @@ class Episode:
             if actor.family is Family.TRIGGER:
                 self._mark_zones()
         else:
-            self.moving.teleport(actor.body, replace(pose, z=pose.z - actor.lift))
+            teleport(self.moving, actor.body, replace(pose, z=pose.z - actor.lift))
             self.falling.start_fall(actor)
 
     def simulate(self, actor: Actor, on: bool) -> None:
         """Switches an actor's physics; off, it stays where clients put it."""
         if actor.body is not None and actor.family is not Family.PROP:
-            self.moving.set_simulated(actor.body, on)
-            self.moving.set_grounded(actor.body, on)
+            set_simulated(self.moving, actor.body, on)
+            set_grounded(self.moving, actor.body, on)
             self.falling.start_fall(actor)
 
     def relandscape(self) -> None:
@@ -325,9 +332,10 @@ class Episode:
 
     def _feel_weather(self) -> None:
         """Lets the weather act on the road, and on what the server's surface lays there."""
-        if self.moving.patches is None:
-            self.moving.grip = self.sky.grip
-        elif self.moving.road is not self.sky.road:
+        grip = self.moving.wheel_grip
+        if grip.patches is None:
+            grip.set_for_all(self.sky.grip)
+        elif grip.road is not self.sky.road:
             self.moving.lay(self.sky.road)
 
     def follow(self) -> None:

@@ -12,7 +12,8 @@ import pytest
 from msgspec.structs import replace
 from PIL import Image
 
-from skidpad.campaign.runs.run import Run, drive
+from skidpad.campaign.runs.drive import drive
+from skidpad.campaign.runs.run import Run
 from skidpad.campaign.runs.run import run as run_spec
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import Frame, Segments, SensorFrame

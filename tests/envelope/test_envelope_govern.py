@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from skidpad.campaign.driving.governing import choose_envelope
-from skidpad.campaign.runs.run import drive
+from skidpad.campaign.runs.drive import drive
 from skidpad.campaign.runs.run import run as drive_run
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import EgoEstimate, RadarPoints, SensorFrame

@@ -159,7 +159,7 @@ def test_false_alarms_and_ways_on_the_prior_are_counted_apart():
 
 @pytest.mark.parametrize(("weather", "low", "high"), [("icy_100", 0.09, 0.15), ("snow", 0.2, 0.45)])
 def test_a_drive_on_a_slippery_road_finds_its_grip(weather, low, high):
-    from skidpad.campaign.runs.run import drive
+    from skidpad.campaign.runs.drive import drive
 
     run = drive(5, weather=weather, sensors="objects", duration=25.0, seed=900_001)
     rows = run.readings.table

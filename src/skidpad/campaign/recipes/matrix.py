@@ -28,7 +28,7 @@ TIMES_OF_DAY = ("sunrise", "noon", "night")
 
 def warm_up() -> None:
     """Compiles every kernel that a run may need, by driving a moment of each kind."""
-    from skidpad.campaign.runs.run import drive
+    from skidpad.campaign.runs.drive import drive
     from skidpad.evidence.drive.metrics import run_metrics
     from skidpad.roads.bundled import load_map
 

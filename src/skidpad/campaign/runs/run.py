@@ -15,13 +15,8 @@ from numpy.typing import NDArray
 from skidpad.campaign.driving.backends import make_backend
 from skidpad.campaign.driving.loop import Driver, Moment, Sink, Stepper
 from skidpad.campaign.driving.outdoors import ChangedBackend, FileChanges, branch_backend
-from skidpad.campaign.driving.quick import (
-    ANOTHER_SIMULATOR,
-    Calls,
-    QuickDrive,
-    find_parts,
-    make_calls,
-)
+from skidpad.campaign.driving.quick import Calls, QuickDrive, make_calls
+from skidpad.campaign.driving.quick_parts import ANOTHER_SIMULATOR, find_parts
 from skidpad.campaign.driving.readings import ReadingsRecorder
 from skidpad.campaign.driving.run_setup import (
     StackAtWheel,

@@ -33,7 +33,8 @@ from skidpad.scenarios.playing.table_kernel import play_tick
 from skidpad.scenarios.shipped import NAMES
 from skidpad.sensors.object_level.objects import sense
 from skidpad.simulation.embedded.engine import EmbeddedBackend
-from skidpad.simulation.recovery import RecoverySettings, Supervisor, find_ego, has_reason
+from skidpad.simulation.recovery import RecoverySettings, Supervisor, find_ego
+from skidpad.simulation.standing import has_reason
 from skidpad.simulation.world.feel import feel_motion
 from skidpad.simulation.world.step import advance
 from skidpad.stack.perception.lights import heed_light

@@ -45,7 +45,8 @@ from skidpad.recording.run.ticks import TickArrays, TickLog, copy_actors
 from skidpad.scenarios.playing.table import hold_no_story
 from skidpad.scenarios.playing.table_kernel import Table, play_tick
 from skidpad.sensors.object_level.objects import sense
-from skidpad.simulation.recovery import Action, find_ego, has_reason, stops_of
+from skidpad.simulation.recovery import Action, find_ego
+from skidpad.simulation.standing import has_reason, stops_of
 from skidpad.simulation.world.feel import feel_motion
 from skidpad.simulation.world.step import advance
 from skidpad.simulation.world.touch import EGO

@@ -47,7 +47,8 @@ from skidpad.recording.files import write_bytes
 from skidpad.roads.kernels import project_kernel, sample_kernel
 from skidpad.sensors.object_level.object_camera import see_boxes
 from skidpad.sensors.object_level.object_radar import cast_radar, find_slope
-from skidpad.simulation.recovery import find_ego, has_reason
+from skidpad.simulation.recovery import find_ego
+from skidpad.simulation.standing import has_reason
 from skidpad.simulation.world.ground import settle
 from skidpad.simulation.world.step import advance
 from skidpad.simulation.world.touch import cross_markings

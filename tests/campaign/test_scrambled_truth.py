@@ -12,7 +12,8 @@ import pytest
 
 from skidpad.campaign.channels.drive import Crew
 from skidpad.campaign.channels.world import segment_of
-from skidpad.campaign.driving.run_setup import StackAtWheel, stage_of, with_sensors
+from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.campaign.driving.stack_at_wheel import StackAtWheel, with_sensors
 from skidpad.core.geometry import Pose
 from skidpad.core.run import Roads, RunSpec, StackDriver
 from skidpad.core.specs import EyesSpec, LidarSpec

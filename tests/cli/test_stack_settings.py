@@ -8,7 +8,8 @@ import pytest
 from typer.testing import CliRunner
 
 import skidpad
-from skidpad.campaign.driving.run_setup import driver_of, stage_of
+from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.campaign.driving.stack_at_wheel import driver_of
 from skidpad.campaign.runs.stored import read_run
 from skidpad.cli.main import app
 from skidpad.cli.options.asked import Drivers, EgoStack, read_stack_settings

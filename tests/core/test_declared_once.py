@@ -56,7 +56,8 @@ def test_a_new_setting_appears_in_help_files_python_and_docs(tmp_path: Path) -> 
 
 
 RUN_PATH = ("core/run.py", "core/settings/parts.py", "campaign/runs/run.py", "campaign/runs/drive.py",
-            "campaign/driving/run_setup.py", "campaign/recipes/matrix.py", "campaign/cells/matrix.py",
+            "campaign/driving/run_setup.py", "campaign/driving/stack_at_wheel.py",
+            "campaign/driving/course_file.py", "campaign/recipes/matrix.py", "campaign/cells/matrix.py",
             "campaign/stepping.py", "cli/options/asked.py")  # fmt: skip
 
 

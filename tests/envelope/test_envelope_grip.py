@@ -173,7 +173,8 @@ def test_what_only_the_truth_knows_of_the_weather_changes_no_limit():
     from msgspec import structs
 
     from skidpad.campaign.driving.loop import Sink
-    from skidpad.campaign.driving.run_setup import driver_of, stage_of
+    from skidpad.campaign.driving.run_setup import stage_of
+    from skidpad.campaign.driving.stack_at_wheel import driver_of
     from skidpad.campaign.runs.run import run as drive_run
     from skidpad.core.run import Roads, RunSpec
     from skidpad.core.vocabulary import SensorLevel

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from skidpad.campaign.driving.course_file import load_scenario
 from skidpad.campaign.driving.file_drivers import FollowingDriver
-from skidpad.campaign.driving.run_setup import load_scenario
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import Scenario
 from skidpad.scenarios.playing.stage import play_ideal

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import skidpad
-from skidpad.campaign.driving.run_setup import check_scenario
+from skidpad.campaign.driving.course_file import check_scenario
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import Scenario
 from skidpad.core.states import VehicleCommand

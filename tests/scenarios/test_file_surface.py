@@ -9,9 +9,10 @@ import pytest
 from msgspec import structs
 from typer.testing import CliRunner
 
+from skidpad.campaign.driving.course_file import check_scenario
 from skidpad.campaign.driving.loop import Sink
 from skidpad.campaign.driving.outdoors import NO_SURFACE, FileChanges
-from skidpad.campaign.driving.run_setup import check_scenario, stage_of
+from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.campaign.runs.rerun import last_ticks
 from skidpad.campaign.runs.run import OpenRun
 from skidpad.campaign.runs.run import run as drive

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from skidpad.campaign.driving.run_setup import load_scenario
+from skidpad.campaign.driving.course_file import load_scenario
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import RunSpec, Scenario

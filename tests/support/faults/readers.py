@@ -243,7 +243,7 @@ def beside(path: Path) -> None:
 
 
 def read_scenario(path: Path) -> object:
-    from skidpad.campaign.driving.run_setup import check_scenario
+    from skidpad.campaign.driving.course_file import check_scenario
     from skidpad.core.run import Scenario
 
     beside(path)

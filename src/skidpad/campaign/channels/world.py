@@ -7,7 +7,8 @@ from math import hypot
 
 import numpy as np
 
-from skidpad.campaign.driving.run_setup import ego_model, setup_of
+from skidpad.campaign.driving.run_setup import setup_of
+from skidpad.campaign.driving.stack_at_wheel import ego_model
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
 from skidpad.core.maths.randomness import stream

@@ -13,8 +13,8 @@ from pathlib import Path
 from msgspec import structs
 
 from skidpad.campaign.cells.grip import scenario_of
+from skidpad.campaign.driving.course_file import load_scenario
 from skidpad.campaign.driving.outdoors import in_weather_of_file
-from skidpad.campaign.driving.run_setup import load_scenario
 from skidpad.campaign.recipes.grip import recipe
 from skidpad.campaign.recipes.recipe import nothing_else
 from skidpad.core.errors import FileError

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from skidpad.campaign.driving.backends import WATCHDOG, keep_server, make_backend
-from skidpad.campaign.driving.run_setup import load_scenario
+from skidpad.campaign.driving.course_file import load_scenario
 from skidpad.campaign.runs.folder import write_drive
 from skidpad.campaign.runs.run import Run, run
 from skidpad.campaign.user_files import keep_road

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from skidpad.campaign.driving.run_setup import load_scenario
+from skidpad.campaign.driving.course_file import load_scenario
 from skidpad.campaign.runs.stored import read_run
 from skidpad.core.errors import FileError, InputError
 from skidpad.core.run import Roads, Scenario

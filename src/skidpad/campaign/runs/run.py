@@ -18,14 +18,9 @@ from skidpad.campaign.driving.outdoors import ChangedBackend, FileChanges, branc
 from skidpad.campaign.driving.quick import Calls, QuickDrive, make_calls
 from skidpad.campaign.driving.quick_parts import ANOTHER_SIMULATOR, find_parts
 from skidpad.campaign.driving.readings import ReadingsRecorder
-from skidpad.campaign.driving.run_setup import (
-    StackAtWheel,
-    Stage,
-    driver_of,
-    stage_of,
-    with_sensors,
-)
+from skidpad.campaign.driving.run_setup import Stage, stage_of
 from skidpad.campaign.driving.snapshots import Snapshots
+from skidpad.campaign.driving.stack_at_wheel import StackAtWheel, driver_of, with_sensors
 from skidpad.campaign.runs.checkpoints import RunCheckpoint
 from skidpad.campaign.runs.log_sink import log_of
 from skidpad.campaign.runs.state_files import CheckpointWriter

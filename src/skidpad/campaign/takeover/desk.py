@@ -14,7 +14,7 @@ import numpy as np
 
 from skidpad.campaign.driving.loop import Script, Supervising
 from skidpad.campaign.driving.outdoors import ChangedBackend
-from skidpad.campaign.driving.run_setup import StackAtWheel
+from skidpad.campaign.driving.stack_at_wheel import StackAtWheel
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import SensorFrame
 from skidpad.core.inputs import (

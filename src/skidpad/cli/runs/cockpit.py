@@ -164,7 +164,7 @@ def require_place(spec: RunSpec) -> None:
 
     A CARLA server's map is not checked.
     """
-    from skidpad.campaign.driving.run_setup import load_scenario
+    from skidpad.campaign.driving.course_file import load_scenario
     from skidpad.campaign.user_files import road_file
     from skidpad.roads.bundled import load_map
 

@@ -18,9 +18,10 @@ from skidpad.campaign.driving.loop import Arrival, Moment, Sink, Timer, Unsuperv
 from skidpad.campaign.driving.quick_kernel import drive_ticks
 from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.campaign.runs.run import OpenRun, Run
+from skidpad.core.courses import Roads
 from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.inputs import Outside
-from skidpad.core.run import Function, Roads, RunSpec
+from skidpad.core.run import Function, RunSpec
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import Govern, Outcome, RelocationReason, SensorLevel, TrafficStart

@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 from skidpad.campaign.driving.governing import choose_envelope
 from skidpad.campaign.runs.drive import drive
 from skidpad.campaign.runs.run import run as drive_run
+from skidpad.core.courses import Roads, Scenario
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import EgoEstimate, RadarPoints, SensorFrame
 from skidpad.core.geometry import Pose
-from skidpad.core.run import Passenger, Roads, RunSpec, Scenario
+from skidpad.core.run import Passenger, RunSpec
 from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.specs import RadarSpec
 from skidpad.core.states import VehicleCommand

@@ -176,7 +176,8 @@ def test_what_only_the_truth_knows_of_the_weather_changes_no_limit():
     from skidpad.campaign.driving.run_setup import stage_of
     from skidpad.campaign.driving.stack_at_wheel import driver_of
     from skidpad.campaign.runs.run import run as drive_run
-    from skidpad.core.run import Roads, RunSpec
+    from skidpad.core.courses import Roads
+    from skidpad.core.run import RunSpec
     from skidpad.core.vocabulary import SensorLevel
     from skidpad.physics.presets import preset
     from skidpad.stack.configurations import numbered_driver

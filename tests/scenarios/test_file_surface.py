@@ -19,9 +19,9 @@ from skidpad.campaign.runs.run import run as drive
 from skidpad.campaign.runs.state_files import StateFiles, read_state
 from skidpad.campaign.runs.stored import read_run
 from skidpad.cli.main import app
+from skidpad.core.courses import Scenario
 from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import FileError
-from skidpad.core.run import Scenario
 from skidpad.core.simulator import BackendKind
 from skidpad.recording.run.log_files import log_hash, read_log
 from skidpad.recording.run.surfaces import read_laid_surfaces, read_run_surface, read_surfaces

@@ -15,10 +15,11 @@ from skidpad.campaign.driving.stack_at_wheel import StackAtWheel
 from skidpad.campaign.recipes.files import runs_of
 from skidpad.campaign.runs.checkpoints import RunCheckpoint
 from skidpad.campaign.runs.run import OpenRun, Run
+from skidpad.core.courses import ActorMode
+from skidpad.core.courses import Scenario as Course
 from skidpad.core.errors import CheckpointError, ConfigError, require_choice
 from skidpad.core.frames import SensorFrame
-from skidpad.core.run import ActorMode, Friction
-from skidpad.core.run import Scenario as Course
+from skidpad.core.run import Friction
 from skidpad.core.settings.parts import load_profile
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth

@@ -8,8 +8,8 @@ from enum import Enum
 from math import hypot, sqrt
 from typing import Any, Protocol
 
+from skidpad.core.courses import ActorMode
 from skidpad.core.geometry import Pose
-from skidpad.core.run import ActorMode
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import LightState

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from skidpad.core.courses import Roads
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import Roads, RunSpec
+from skidpad.core.run import RunSpec
 from skidpad.core.setup import ActorSetup, LanePosition, Setup, TrafficSetup
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.states import VehicleCommand

@@ -10,7 +10,8 @@ import numpy as np
 from skidpad.campaign.bench.traffic_options import TrafficBench
 from skidpad.campaign.bench.traffic_watch import TrafficCounts, Watch
 from skidpad.campaign.driving.run_setup import stage_of
-from skidpad.core.run import Roads, RunSpec
+from skidpad.core.courses import Roads
+from skidpad.core.run import RunSpec
 from skidpad.core.settings.parts import load_profile
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import TrafficStart

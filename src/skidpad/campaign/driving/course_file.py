@@ -13,8 +13,8 @@ from skidpad.campaign.driving.file_drivers import FILE_DRIVERS
 from skidpad.campaign.driving.file_stack import NAME as STACK_NAME
 from skidpad.campaign.driving.file_stack import PilotConditions, PilotMaker
 from skidpad.campaign.driving.sharing import find_shared
+from skidpad.core.courses import Scenario
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import Scenario
 from skidpad.core.text.told import describe_value
 from skidpad.scenarios import scenario as scenarios
 from skidpad.scenarios.playing.disturbing import read_disturbances

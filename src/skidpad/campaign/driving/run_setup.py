@@ -11,19 +11,11 @@ from skidpad.campaign.driving.loop import Arrival, Script, Supervising, Timer, U
 from skidpad.campaign.driving.outdoors import lay_beside
 from skidpad.campaign.driving.starts import start_of
 from skidpad.campaign.user_files import road_file
+from skidpad.core.courses import ActorMode, Roads, Scenario
 from skidpad.core.environment.lidar_effects import LidarEffects
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.geometry import Pose, kmh_from_mps
-from skidpad.core.run import (
-    ActorMode,
-    AgentDriver,
-    Passenger,
-    Render,
-    Roads,
-    RunSpec,
-    Scenario,
-    StackDriver,
-)
+from skidpad.core.run import AgentDriver, Passenger, Render, RunSpec, StackDriver
 from skidpad.core.settings.parts import NightRain, Relocation, TrafficSettings
 from skidpad.core.setup import ActorSetup, CameraOptics, Setup, TrafficSetup, Wind
 from skidpad.core.simulator import BackendKind

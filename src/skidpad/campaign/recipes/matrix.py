@@ -11,8 +11,9 @@ from skidpad.campaign.driving.pace import Pace
 from skidpad.campaign.recipes.recipe import Driven, Recipe, find_reason
 from skidpad.campaign.runs.folder import Stopwatch, fresh_folder, last_line, write_config, write_run
 from skidpad.campaign.user_files import road_file, with_kept_map
+from skidpad.core.courses import Roads
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import AdasDriver, Function, Roads, RunSpec
+from skidpad.core.run import AdasDriver, Function, RunSpec
 from skidpad.core.settings.parts import LaneTruth
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Outcome, SensorLevel

@@ -9,8 +9,9 @@ from typing import Any
 from skidpad.campaign.cells.matrix import describe_run
 from skidpad.campaign.driving.drivers import describe_driver
 from skidpad.campaign.runs.run import Run, run
+from skidpad.core.courses import Roads
 from skidpad.core.errors import require_choice
-from skidpad.core.run import DriverSpec, Roads, RunSpec, StackDriver
+from skidpad.core.run import DriverSpec, RunSpec, StackDriver
 from skidpad.core.settings.parts import load_profile
 from skidpad.core.settings.setting import Plain
 from skidpad.core.simulator import BackendChoice

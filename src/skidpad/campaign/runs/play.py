@@ -12,8 +12,9 @@ from skidpad.campaign.runs.run import Run, run
 from skidpad.campaign.user_files import keep_road
 from skidpad.campaign.workers.pool import run_jobs
 from skidpad.campaign.workers.worker import Job
+from skidpad.core.courses import Scenario
 from skidpad.core.errors import BackendError
-from skidpad.core.run import RunSpec, Scenario
+from skidpad.core.run import RunSpec
 from skidpad.core.simulator import BackendKind
 from skidpad.recording.files import require_free
 

@@ -13,7 +13,8 @@ from skidpad.cli.options.asked import OF_FILE, EgoStack, PlayCross, Tuned
 from skidpad.cli.options.campaigns import CampaignOptions, Checkpoints, Driving, How, Seeds
 from skidpad.cli.options.spread import spread_fields
 from skidpad.cli.scenarios.expected import Expected, exit_by_verdicts, played_report
-from skidpad.core.run import RunSpec, Scenario
+from skidpad.core.courses import Scenario
+from skidpad.core.run import RunSpec
 from skidpad.core.simulator import BackendChoice
 from skidpad.core.vocabulary import SensorLevel
 

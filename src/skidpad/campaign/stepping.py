@@ -26,7 +26,7 @@ from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTr
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import find_weather
-from skidpad.scenarios.scene import State
+from skidpad.scenarios.elements import State
 from skidpad.scenarios.shipped import find_scenario
 
 PLAIN = "clear-noon"  # what a file leaves open of the weather, as in `skidpad play`

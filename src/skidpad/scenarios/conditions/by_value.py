@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from skidpad.roads.opendrive.document import id_number
+from skidpad.roads.opendrive.reader import id_number
 from skidpad.scenarios.conditions.base import Condition, Probe, Rule, rule, rule_name
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.criteria import is_criterion

@@ -20,16 +20,8 @@ from skidpad.core.specs import RadarSpec
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import Govern, GripModel, Outcome, RangeModel, SensorLevel
 from skidpad.core.weather import Weather
-from skidpad.envelope.govern import (
-    AIR_ID,
-    RAIN_ID,
-    SENSORS,
-    Envelope,
-    EnvelopeSettings,
-    GovernedStack,
-    govern,
-    with_pedals,
-)
+from skidpad.envelope.envelope import AIR_ID, RAIN_ID, SENSORS, Envelope, EnvelopeSettings
+from skidpad.envelope.govern import GovernedStack, govern, with_pedals
 from skidpad.envelope.govern_kernel import (
     PULSE_BRAKE,
     PULSE_TIME,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import Any
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
@@ -32,10 +31,10 @@ from skidpad.simulation.carla_server.actors.posts import Posts, posts_of
 from skidpad.simulation.carla_server.actors.registry import SOLID, Actor, ActorTable, Attachment
 from skidpad.simulation.carla_server.actors.walkers import WalkerControl
 from skidpad.simulation.carla_server.clock import Clock
+from skidpad.simulation.carla_server.debug_shapes import DebugShapes
 from skidpad.simulation.carla_server.maps.landscape import ALL_LAYERS, Landscape
 from skidpad.simulation.carla_server.maps.maps import ServedMap
 from skidpad.simulation.carla_server.options import ServerOptions
-from skidpad.simulation.carla_server.protocol import wire
 from skidpad.simulation.carla_server.protocol.rpc import CallError
 from skidpad.simulation.carla_server.protocol.streams import StreamHub
 from skidpad.simulation.carla_server.sensing.producers import PRODUCERS
@@ -60,8 +59,6 @@ from skidpad.simulation.world.patches import FrictionZone, Patches
 from skidpad.simulation.world.surface_files import read_surface
 from skidpad.simulation.world.world import World
 
-KINDS = ("point", "line", "arrow", "box", "text", "hud point", "hud line", "hud arrow", "hud box")
-MOST = 10_000
 COLLISION = "Spawn failed because of collision at spawn position"
 NO_STREAM = ("sensor.other.lane_invasion",)  # computed in the client
 
@@ -359,52 +356,3 @@ class Episode:
                 filling.fill_actor(self.rows, self.actors, actor)
         for id, control in self.walkers.items():
             filling.fill_walker(self.rows, self.actors, self.actors.alive[id], control, dt)
-
-
-# Debug shapes that clients draw: kept while they live, for views; nothing renders them yet.
-
-
-@dataclass(slots=True)
-class Shape:
-    """One shape as it came, in CARLA's axes."""
-
-    kind: str
-    body: Any
-    colour: Any
-    left: float | None  # s still to live; None: for good
-
-
-class DebugShapes:
-    """The newest shapes, at most 10 000."""
-
-    def __init__(self) -> None:
-        self.shapes: list[Shape] = []
-
-    def draw(self, value: Any) -> None:
-        """Adds one debug shape from a call, for its life time in s or for ever; the oldest beyond MOST go.
-
-        For ever: a negative time, or 0 and persistent. WireError for another shape.
-        """
-        primitive, colour, life, persistent = wire.items(value, "debug shape", 4)
-        index, body = wire.items(primitive, "debug shape.primitive", 2)
-        kind = KINDS[wire.integer(index, "debug shape.primitive", 0, len(KINDS) - 1)]
-        seconds = wire.number(life, "debug shape.life_time")
-        forever = seconds < 0.0 or (seconds == 0.0 and bool(persistent))
-        self.shapes.append(Shape(kind, body, colour, None if forever else seconds))
-        del self.shapes[:-MOST]
-
-    def age(self, dt: float) -> None:
-        """Lets shapes grow older by dt s and removes those whose time is over."""
-        if not self.shapes:
-            return
-        for shape in self.shapes:
-            if shape.left is not None:
-                shape.left -= dt
-        self.shapes = [s for s in self.shapes if s.left is None or s.left > 0.0]
-
-    def clear(self, texts: bool | None = None) -> None:
-        """Removes all shapes; only the texts (True), or all but the texts (False)."""
-        if texts is None:
-            self.shapes = []
-        else:
-            self.shapes = [s for s in self.shapes if (s.kind == "text") != texts]

@@ -13,8 +13,8 @@ from skidpad.core.vocabulary import LightState
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.simulation.world.lights import Lights
-from skidpad.simulation.world.traffic.manager import priority_of
 from skidpad.simulation.world.traffic.priority import STOP, YIELD, bake_priority
+from skidpad.simulation.world.traffic.streets import priority_of
 from support.runs import segment_run
 
 TOWN = load_map("town")

@@ -14,7 +14,7 @@ from skidpad.campaign.bench.traffic import FIRST_SEED, background_world
 from skidpad.campaign.bench.traffic_options import TrafficBench
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
-from skidpad.simulation.world.traffic.manager import priority_of
+from skidpad.simulation.world.traffic.streets import priority_of
 
 LARGE = next(
     (

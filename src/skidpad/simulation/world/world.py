@@ -43,9 +43,10 @@ from skidpad.simulation.world.step import (
 )
 from skidpad.simulation.world.touch import EGO, ContactBook, Touches, forget, invasions, markings_of
 from skidpad.simulation.world.traffic.care import careless
-from skidpad.simulation.world.traffic.manager import CHECK_PERIOD, Reason, Traffic, no_streets
+from skidpad.simulation.world.traffic.manager import CHECK_PERIOD, Reason, Traffic
 from skidpad.simulation.world.traffic.occupancy import occupancy
 from skidpad.simulation.world.traffic.state import drivers
+from skidpad.simulation.world.traffic.streets import no_streets
 from skidpad.simulation.world.wheel_grip import WheelGrip
 
 CARELESS = careless()

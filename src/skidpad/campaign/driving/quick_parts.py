@@ -49,7 +49,7 @@ def find_parts(stepper: Stepper, changes: FileChanges | None = None) -> QuickPar
 
     changes: of a file that is played.
     """
-    driver, script = stepper.driver, stepper.script
+    script = stepper.script
     backend: object = stepper.backend
     changed: tuple[ChangedBackend, FileChanges] | None = None
     if isinstance(backend, ChangedBackend) and changes is not None and script is changes.player:
@@ -62,17 +62,10 @@ def find_parts(stepper: Stepper, changes: FileChanges | None = None) -> QuickPar
     sensing, supervisor = backend.sensing, stepper.supervisor
     if type(sensing) is not Objects:
         return "its sensors are pixels, or a radar with noise"
-    if type(driver) is not StackAtWheel:
-        return "another driver is at the wheel"
-    outer, suite, timer, way = driver.stack.stack, sensing.suite, None, None
-    governed = outer if isinstance(outer, GovernedStack) else None
-    stack = outer if governed is None else governed.inner
-    if type(stack) is not AdasStack:
-        return "another stack drives"
-    if stack.config.dt != backend.world.dt:
-        return "the steps of its stack have another length"
-    if reason := stack.why_not_quick() or (governed and governed.why_not_quick()):
-        return reason
+    driving = _find_stack(stepper.driver, backend.world.dt)
+    if isinstance(driving, str):
+        return driving
+    suite, timer, way = sensing.suite, None, None
     if not backend.has_common_frames or suite.hold_common(backend.world.states) is None:
         return "it has other sensors than the common ones, or its localisation is noisy"
     if type(supervisor) not in (Supervisor, Unsupervised):
@@ -87,10 +80,27 @@ def find_parts(stepper: Stepper, changes: FileChanges | None = None) -> QuickPar
     for sink in stepper.sinks:
         if sink.sees_all:
             return f"{type(sink).__name__} is shown each tick"
-    world = backend.world
-    return QuickParts(
-        backend, world, suite, driver.stack, stack, governed, supervising, timer, way, changed
-    )
+    return QuickParts(backend, backend.world, suite, *driving, supervising, timer, way, changed)
+
+
+def _find_stack(
+    driver: object, dt: float
+) -> tuple[GuardedStack, AdasStack, GovernedStack | None] | str:
+    """Returns the driver's stack in its guard, and what keeps it inside an envelope; else the reason.
+
+    dt: s of the world's steps.
+    """
+    if type(driver) is not StackAtWheel:
+        return "another driver is at the wheel"
+    outer = driver.stack.stack
+    governed = outer if isinstance(outer, GovernedStack) else None
+    stack = outer if governed is None else governed.inner
+    if type(stack) is not AdasStack:
+        return "another stack drives"
+    if stack.config.dt != dt:
+        return "the steps of its stack have another length"
+    reason = stack.why_not_quick() or (governed and governed.why_not_quick())
+    return reason or (driver.stack, stack, governed)
 
 
 def make_rules(parts: QuickParts, weather: int) -> Rules:

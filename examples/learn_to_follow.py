@@ -12,7 +12,8 @@ import numpy as np
 from cmaes import CMA
 
 from skidpad.env import OBSERVED
-from skidpad.evidence.statistics import compare_pairs, interval_text, share_bound
+from skidpad.evidence.statistics import compare_pairs, share_bound
+from skidpad.evidence.statistics_text import interval_text
 
 AT = {quantity.name: i for i, quantity in enumerate(OBSERVED)}
 TRAINING, UNSEEN = range(1, 7), 1001

@@ -25,8 +25,9 @@ import numpy as np
 
 import skidpad
 from skidpad.campaign.runs.card import ROWS, Stages, drive_on_card
+from skidpad.campaign.runs.drive import describe
 from skidpad.campaign.runs.many import DEFAULTS
-from skidpad.campaign.runs.run import Run, describe
+from skidpad.campaign.runs.run import Run
 from skidpad.core.kernels.card import require_card
 
 START = 50  # ticks that are promised

@@ -13,7 +13,8 @@ from skidpad.campaign.driving.drivers import describe_driver
 from skidpad.campaign.runs.run import OpenRun
 from skidpad.campaign.runs.state_files import StateFiles, unpack_state
 from skidpad.campaign.stepping import Scenario
-from skidpad.core.run import Roads, RunSpec
+from skidpad.core.courses import Roads
+from skidpad.core.run import RunSpec
 from skidpad.core.settings.parts import load_profile
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.physics.presets import find_weather

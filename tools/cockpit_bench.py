@@ -30,7 +30,8 @@ from skidpad.cockpit.replaying import Replayer
 from skidpad.cockpit.serving import application
 from skidpad.cockpit.studio import Looks, Studio, View, plane
 from skidpad.cockpit.words import Link
-from skidpad.core.run import AdasDriver, Roads, RunSpec
+from skidpad.core.courses import Roads
+from skidpad.core.run import AdasDriver, RunSpec
 from skidpad.core.vocabulary import Quality
 from skidpad.pages.server import Server
 from skidpad.physics.presets import preset

@@ -24,8 +24,9 @@ from skidpad.cockpit.film import stretch_of, write_film
 from skidpad.cockpit.pictures import Picture, colours
 from skidpad.cockpit.replay import RecordedRun
 from skidpad.cockpit.studio import Studio, View, plane
+from skidpad.core.courses import Roads
 from skidpad.core.inputs import Sky, Timed
-from skidpad.core.run import AdasDriver, Roads, RunSpec
+from skidpad.core.run import AdasDriver, RunSpec
 from skidpad.core.vocabulary import GripModel, RangeModel, SensorLevel
 from skidpad.physics.presets import preset
 from skidpad.sensors.finish.extras import ALL_EXTRAS, NO_EXTRAS, Extra

@@ -15,14 +15,10 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from grip_judging import (
-    Estimates,
-    estimate_again,
-    judge_estimates,
-    keep_signals,
-)
+from grip_judging import Estimates, estimate_again, judge_estimates, keep_signals
+from skidpad.core.courses import Roads
 from skidpad.core.environment.surface import SurfacePatch
-from skidpad.core.run import Roads, RunSpec
+from skidpad.core.run import RunSpec
 from skidpad.core.settings.parts import load_profile
 from skidpad.core.vocabulary import Govern, SensorLevel
 from skidpad.evidence.statistics import poisson_interval

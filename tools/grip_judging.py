@@ -18,7 +18,7 @@ from skidpad.core.arrays import Floats
 from skidpad.core.run import RunSpec
 from skidpad.core.setup import DT
 from skidpad.core.states import EgoEstimate, VehicleCommand
-from skidpad.envelope.govern import AIR_ID, RAIN_ID
+from skidpad.envelope.envelope import AIR_ID, RAIN_ID
 from skidpad.envelope.grip import STIFFNESS, GripEstimator, drive_at
 from skidpad.envelope.sight import way_ahead
 from skidpad.envelope.signals import BusModel, CarBus

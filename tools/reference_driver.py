@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.campaign.driving.run_setup import ego_model
+from skidpad.campaign.driving.stack_at_wheel import ego_model
 from skidpad.core.setup import ActorCommand, ActorSetup, LanePosition, Setup
 from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.traffic.sight import DriverView, RoadLook, SeenActors

@@ -24,7 +24,8 @@ from msgspec import structs
 
 from skidpad.campaign.cells.grip import Cross, cross, template
 from skidpad.campaign.runs.run import run
-from skidpad.core.run import AdasDriver, Roads, RunSpec
+from skidpad.core.courses import Roads
+from skidpad.core.run import AdasDriver, RunSpec
 from skidpad.core.settings.parts import load_profile
 from skidpad.core.vocabulary import SensorLevel, TrafficStart
 from skidpad.physics.presets import all_presets

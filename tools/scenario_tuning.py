@@ -27,8 +27,9 @@ from skidpad.campaign.recipes.recipe import Driven, Recipe
 from skidpad.campaign.runs.folder import Stopwatch, last_line
 from skidpad.campaign.runs.run import run
 from skidpad.campaign.workers.pool import local
+from skidpad.core.courses import Scenario
 from skidpad.core.geometry import mps_from_kmh
-from skidpad.core.run import Friction, RunSpec, Scenario
+from skidpad.core.run import Friction, RunSpec
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Outcome
 from skidpad.evidence.grip.scores import npc_contact_row

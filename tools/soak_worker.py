@@ -20,7 +20,8 @@ import dated_lines
 from processes import memory_mb
 from skidpad.campaign.runs.run import run
 from skidpad.campaign.workers.worker import Job, Worker
-from skidpad.core.run import AdasDriver, Roads, RunSpec
+from skidpad.core.courses import Roads
+from skidpad.core.run import AdasDriver, RunSpec
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.physics.presets import find_weather
 from skidpad.recording.run.log_files import log_hash

@@ -12,7 +12,7 @@ __all__ = ["Scenario", "__version__", "drive", "drive_many", "register"]
 def __getattr__(name: str) -> Any:
     # Lazy, so that `skidpad --version` does not pay for numba.
     if name == "drive":
-        return import_module("skidpad.campaign.runs.run").drive
+        return import_module("skidpad.campaign.runs.drive").drive
     if name == "drive_many":
         return import_module("skidpad.campaign.runs.many").drive_many
     if name == "Scenario":

@@ -15,8 +15,9 @@ from numba.core import types
 
 import skidpad
 from skidpad.campaign.driving.quick_kernel import drive_ticks
+from skidpad.campaign.runs.drive import describe
 from skidpad.campaign.runs.many import DEFAULTS
-from skidpad.campaign.runs.run import OpenRun, describe
+from skidpad.campaign.runs.run import OpenRun
 from skidpad.core.errors import ConfigError
 from skidpad.core.kernels.batch import call_directly, find_leaves
 from skidpad.core.kernels.jit import hold
@@ -26,7 +27,7 @@ import json, sys
 import skidpad
 from skidpad.campaign.runs.card import Stages, drive_on_card
 from skidpad.campaign.runs.many import DEFAULTS
-from skidpad.campaign.runs.run import describe
+from skidpad.campaign.runs.drive import describe
 from skidpad.recording.run.log_files import log_hash
 
 runs = [
@@ -48,7 +49,7 @@ import json
 import skidpad
 from skidpad.campaign.runs import card
 from skidpad.campaign.runs.many import DEFAULTS
-from skidpad.campaign.runs.run import describe
+from skidpad.campaign.runs.drive import describe
 from skidpad.recording.run.log_files import log_hash
 from skidpad.simulation.recovery import Supervisor
 

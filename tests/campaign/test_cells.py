@@ -7,8 +7,9 @@ from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.campaign.recipes.matrix import RECIPE
 from skidpad.cli.campaigns.adas_plan import plan
 from skidpad.cli.options.asked import Climate, Drivers, Tuned
+from skidpad.core.courses import Roads
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import Roads, RunSpec
+from skidpad.core.run import RunSpec
 from skidpad.core.vocabulary import TrafficStart
 from skidpad.core.weather import Weather
 from skidpad.simulation.recovery import Supervisor

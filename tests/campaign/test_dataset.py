@@ -13,8 +13,9 @@ from skidpad.campaign.cells.grip import template
 from skidpad.campaign.dataset import COLUMNS, export_drive
 from skidpad.campaign.runs.stored import read_run
 from skidpad.cli.main import app
+from skidpad.core.courses import Roads
 from skidpad.core.errors import ConfigError, OutputError
-from skidpad.core.run import Roads, RunSpec, StackDriver
+from skidpad.core.run import RunSpec, StackDriver
 
 
 def test_images_labels_and_controls_of_a_drive(tmp_path):

@@ -10,9 +10,9 @@ from skidpad.campaign.runs.run import run
 from skidpad.campaign.takeover.desk import FROM_EGO, Density, Desk, Recorded
 from skidpad.cli.main import app
 from skidpad.cli.runs.cockpit import with_reserve as with_more
+from skidpad.core.courses import Roads
 from skidpad.core.errors import ConfigError
 from skidpad.core.inputs import Crowd, Timed
-from skidpad.core.run import Roads
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.vocabulary import SensorLevel, TrafficStart
 from skidpad.recording.run.inputs import decode_inputs, encode_inputs

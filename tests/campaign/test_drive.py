@@ -12,12 +12,14 @@ import pytest
 from msgspec.structs import replace
 from PIL import Image
 
-from skidpad.campaign.runs.run import Run, drive
+from skidpad.campaign.runs.drive import drive
+from skidpad.campaign.runs.run import Run
 from skidpad.campaign.runs.run import run as run_spec
+from skidpad.core.courses import Edges, Roads
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import Frame, Segments, SensorFrame
 from skidpad.core.geometry import Pose
-from skidpad.core.run import Edges, Roads, RunSpec
+from skidpad.core.run import RunSpec
 from skidpad.core.setup import ActorCommand
 from skidpad.core.specs import CameraSpec, LidarSpec, Modality, PointSensorSpec, SensorSpec
 from skidpad.core.states import ContactEvent, VehicleCommand, WorldTruth

@@ -10,12 +10,12 @@ import pytest
 from skidpad.campaign import stepping
 from skidpad.campaign.channels import drive as channel_drive
 from skidpad.campaign.driving import loop as drive
-from skidpad.campaign.driving import run_setup as cast
+from skidpad.campaign.driving import stack_at_wheel
 from skidpad.campaign.takeover import desk
 from skidpad.cockpit import source
 
 DRIVERS = [
-    drive.Driver, cast.StackAtWheel, channel_drive.Crew, desk.DeskDriver, source.Said,
+    drive.Driver, stack_at_wheel.StackAtWheel, channel_drive.Crew, desk.DeskDriver, source.Said,
     *(
         kind
         for _, kind in inspect.getmembers(stepping, inspect.isclass)

@@ -14,8 +14,9 @@ from skidpad.campaign.runs.run import run
 from skidpad.campaign.workers.pool import local
 from skidpad.cli.campaigns.adas_plan import plan
 from skidpad.cli.options.asked import Climate, Drivers
+from skidpad.core.courses import Roads
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import AdasDriver, Function, ReferenceDriver, Roads, RunSpec
+from skidpad.core.run import AdasDriver, Function, ReferenceDriver, RunSpec
 from skidpad.core.settings.stack import StackSettings
 from skidpad.core.vocabulary import Outcome, SensorLevel, TrafficStart
 from skidpad.physics.presets import find_weather

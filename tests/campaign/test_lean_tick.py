@@ -7,9 +7,10 @@ import pytest
 
 from skidpad.campaign.driving import quick_kernel
 from skidpad.campaign.runs.run import run
+from skidpad.core.kernels.jit import hold
 from skidpad.recording.run import ticks
 from skidpad.sensors.object_level import objects
-from skidpad.simulation import recovery
+from skidpad.simulation import recovery, standing
 from skidpad.simulation.world import feel, step
 from skidpad.stack import road, think
 from skidpad.stack.perception import hsv, lights
@@ -50,12 +51,12 @@ def test_kernels_in_which_arrays_are_made_count() -> None:
 
 def test_the_supervisors_kernel_counts_nothing() -> None:
     states = step.ActorStates.empty(3)
-    assert not recovery.has_actor_ahead(recovery.hold(states), 0.0, 0.0, 0.0, 0.0)
-    assert not counts_references(recovery.has_actor_ahead)
+    assert not standing.has_actor_ahead(hold(states), 0.0, 0.0, 0.0, 0.0)
+    assert not counts_references(standing.has_actor_ahead)
 
 
 def test_the_kernel_that_asks_why_the_ego_stands_counts_nothing() -> None:
     run(
         adas_run(2, duration=12.0, vehicles=0)
     )  # its machine code is looked up with that of the others
-    assert not counts_references(recovery.has_reason)
+    assert not counts_references(standing.has_reason)

@@ -22,7 +22,8 @@ from skidpad.recording.run.log_files import log_hash
 from skidpad.recording.run.ticks import copy_actors
 from skidpad.scenarios.playing.table_kernel import play_tick
 from skidpad.sensors.object_level.objects import sense
-from skidpad.simulation.recovery import RecoverySettings, Supervisor, find_ego, has_reason
+from skidpad.simulation.recovery import RecoverySettings, Supervisor, find_ego
+from skidpad.simulation.standing import has_reason
 from skidpad.simulation.world.feel import feel_motion
 from skidpad.simulation.world.step import advance
 from skidpad.stack.perception.lights import heed_light

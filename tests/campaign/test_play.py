@@ -7,8 +7,9 @@ import pytest
 
 from skidpad.campaign.runs.play import run_to
 from skidpad.campaign.runs.run import run
+from skidpad.core.courses import ActorMode, Scenario
 from skidpad.core.errors import OutputError
-from skidpad.core.run import ActorMode, AgentDriver, Scenario
+from skidpad.core.run import AgentDriver
 from skidpad.core.vocabulary import GripModel, Outcome, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.recording.run.log_files import log_hash, read_log

@@ -18,9 +18,10 @@ from skidpad.campaign.driving.loop import Arrival, Moment, Sink, Timer, Unsuperv
 from skidpad.campaign.driving.quick_kernel import drive_ticks
 from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.campaign.runs.run import OpenRun, Run
+from skidpad.core.courses import Roads
 from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.inputs import Outside
-from skidpad.core.run import Function, Roads, RunSpec
+from skidpad.core.run import Function, RunSpec
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import Govern, Outcome, RelocationReason, SensorLevel, TrafficStart
@@ -33,7 +34,8 @@ from skidpad.scenarios.playing.table_kernel import play_tick
 from skidpad.scenarios.shipped import NAMES
 from skidpad.sensors.object_level.objects import sense
 from skidpad.simulation.embedded.engine import EmbeddedBackend
-from skidpad.simulation.recovery import RecoverySettings, Supervisor, find_ego, has_reason
+from skidpad.simulation.recovery import RecoverySettings, Supervisor, find_ego
+from skidpad.simulation.standing import has_reason
 from skidpad.simulation.world.feel import feel_motion
 from skidpad.simulation.world.step import advance
 from skidpad.stack.perception.lights import heed_light

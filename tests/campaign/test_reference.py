@@ -7,7 +7,8 @@ import pytest
 
 from skidpad import drive
 from skidpad.campaign.cells.matrix import cross, matrix_drivers
-from skidpad.campaign.driving.run_setup import driver_of, stage_of
+from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.campaign.driving.stack_at_wheel import driver_of
 from skidpad.cli.options.asked import Drivers, EgoStack
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import AdasDriver, ReferenceDriver, RunSpec, run_from_plain

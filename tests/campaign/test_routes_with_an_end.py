@@ -5,10 +5,11 @@ from typer.testing import CliRunner
 
 from skidpad.campaign.driving.run_setup import journey_of
 from skidpad.campaign.recipes.matrix import drive_one, roads_of
-from skidpad.campaign.runs.run import drive
+from skidpad.campaign.runs.drive import drive
 from skidpad.cli.main import app
+from skidpad.core.courses import Roads
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import Roads, RunSpec, run_from_plain
+from skidpad.core.run import RunSpec, run_from_plain
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.evidence.drive.route import measure_route

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 import skidpad
-from skidpad.campaign.runs import run as run_module
+from skidpad.campaign.runs import drive as drive_module
 from skidpad.cli.main import app
 from skidpad.cli.options.campaigns import CampaignOptions
 from skidpad.core.run import RunSpec
@@ -45,7 +45,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[RunSpec]:
     monkeypatch.setattr(
         CampaignOptions, "__call__", lambda _, campaign, *__: found.extend(campaign.tasks)
     )
-    monkeypatch.setattr(run_module, "run", lambda spec, *_, **__: found.append(spec))
+    monkeypatch.setattr(drive_module, "run", lambda spec, *_, **__: found.append(spec))
     return found
 
 

@@ -12,9 +12,11 @@ import pytest
 
 from skidpad.campaign.channels.drive import Crew
 from skidpad.campaign.channels.world import segment_of
-from skidpad.campaign.driving.run_setup import StackAtWheel, stage_of, with_sensors
+from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.campaign.driving.stack_at_wheel import StackAtWheel, with_sensors
+from skidpad.core.courses import Roads
 from skidpad.core.geometry import Pose
-from skidpad.core.run import Roads, RunSpec, StackDriver
+from skidpad.core.run import RunSpec, StackDriver
 from skidpad.core.specs import EyesSpec, LidarSpec
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import SensorLevel, TrafficStart

@@ -28,8 +28,9 @@ from skidpad.campaign.runs.state_files import (
     read_state,
     unpack_state,
 )
+from skidpad.core.courses import Scenario
 from skidpad.core.errors import CheckpointError
-from skidpad.core.run import Friction, Scenario
+from skidpad.core.run import Friction
 from skidpad.core.settings.parts import load_profile
 from skidpad.core.simulator import BackendChoice
 from skidpad.core.vocabulary import GripModel, SensorLevel

@@ -22,14 +22,13 @@ from skidpad.campaign.runs.stored import read_run, read_segment
 from skidpad.campaign.studies.arms import speed_and_dropout
 from skidpad.campaign.workers.worker import Finished, Job
 from skidpad.cli.main import app
+from skidpad.core.courses import ActorMode, Scenario
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.run import (
-    ActorMode,
     AgentDriver,
     ChannelCrew,
     Passenger,
     RunSpec,
-    Scenario,
     StackDriver,
     run_from_plain,
 )

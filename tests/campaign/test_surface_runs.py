@@ -14,10 +14,11 @@ from typer.testing import CliRunner
 from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.campaign.runs.run import run
 from skidpad.cli.main import app
+from skidpad.core.courses import Scenario
 from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import ConfigError
 from skidpad.core.inputs import Outside
-from skidpad.core.run import RunSpec, Scenario, run_from_plain
+from skidpad.core.run import RunSpec, run_from_plain
 from skidpad.core.settings.parts import load_profile
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.states import VehicleCommand

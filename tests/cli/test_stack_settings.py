@@ -8,12 +8,14 @@ import pytest
 from typer.testing import CliRunner
 
 import skidpad
-from skidpad.campaign.driving.run_setup import driver_of, stage_of
+from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.campaign.driving.stack_at_wheel import driver_of
 from skidpad.campaign.runs.stored import read_run
 from skidpad.cli.main import app
 from skidpad.cli.options.asked import Drivers, EgoStack, read_stack_settings
+from skidpad.core.courses import Roads, Scenario
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import Roads, RunSpec, Scenario, StackDriver
+from skidpad.core.run import RunSpec, StackDriver
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.scenarios.shipped import FOLDER

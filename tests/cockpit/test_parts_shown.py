@@ -9,8 +9,9 @@ import pytest
 
 from skidpad.cockpit.about import About
 from skidpad.cockpit.parts import list_parts
+from skidpad.core.courses import Roads, Scenario
 from skidpad.core.objects.registry import Source
-from skidpad.core.run import AdasDriver, Function, Roads, RunSpec, Scenario, StackDriver
+from skidpad.core.run import AdasDriver, Function, RunSpec, StackDriver
 from skidpad.core.simulator import BACKENDS, BackendChoice
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import WEATHERS, preset

@@ -55,9 +55,10 @@ def test_a_new_setting_appears_in_help_files_python_and_docs(tmp_path: Path) -> 
     assert answer.stdout == "slush must be between 0 and 2, got 3.0\n"
 
 
-RUN_PATH = ("core/run.py", "core/settings/parts.py", "campaign/runs/run.py", "campaign/driving/run_setup.py",
-            "campaign/recipes/matrix.py", "campaign/cells/matrix.py", "campaign/stepping.py",
-            "cli/options/asked.py")  # fmt: skip
+RUN_PATH = ("core/run.py", "core/courses.py", "core/settings/parts.py", "campaign/runs/run.py",
+            "campaign/runs/drive.py", "campaign/driving/run_setup.py", "campaign/driving/stack_at_wheel.py",
+            "campaign/driving/course_file.py", "campaign/recipes/matrix.py", "campaign/cells/matrix.py",
+            "campaign/stepping.py", "cli/options/asked.py")  # fmt: skip
 
 
 def test_settings_are_typed_on_the_way_from_a_command_to_a_run() -> None:

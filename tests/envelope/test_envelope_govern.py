@@ -8,27 +8,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from skidpad.campaign.driving.governing import choose_envelope
-from skidpad.campaign.runs.run import drive
+from skidpad.campaign.runs.drive import drive
 from skidpad.campaign.runs.run import run as drive_run
+from skidpad.core.courses import Roads, Scenario
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import EgoEstimate, RadarPoints, SensorFrame
 from skidpad.core.geometry import Pose
-from skidpad.core.run import Passenger, Roads, RunSpec, Scenario
+from skidpad.core.run import Passenger, RunSpec
 from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.specs import RadarSpec
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import Govern, GripModel, Outcome, RangeModel, SensorLevel
 from skidpad.core.weather import Weather
-from skidpad.envelope.govern import (
-    AIR_ID,
-    RAIN_ID,
-    SENSORS,
-    Envelope,
-    EnvelopeSettings,
-    GovernedStack,
-    govern,
-    with_pedals,
-)
+from skidpad.envelope.envelope import AIR_ID, RAIN_ID, SENSORS, Envelope, EnvelopeSettings
+from skidpad.envelope.govern import GovernedStack, govern, with_pedals
 from skidpad.envelope.govern_kernel import (
     PULSE_BRAKE,
     PULSE_TIME,

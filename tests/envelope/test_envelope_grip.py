@@ -159,7 +159,7 @@ def test_false_alarms_and_ways_on_the_prior_are_counted_apart():
 
 @pytest.mark.parametrize(("weather", "low", "high"), [("icy_100", 0.09, 0.15), ("snow", 0.2, 0.45)])
 def test_a_drive_on_a_slippery_road_finds_its_grip(weather, low, high):
-    from skidpad.campaign.runs.run import drive
+    from skidpad.campaign.runs.drive import drive
 
     run = drive(5, weather=weather, sensors="objects", duration=25.0, seed=900_001)
     rows = run.readings.table
@@ -173,9 +173,11 @@ def test_what_only_the_truth_knows_of_the_weather_changes_no_limit():
     from msgspec import structs
 
     from skidpad.campaign.driving.loop import Sink
-    from skidpad.campaign.driving.run_setup import driver_of, stage_of
+    from skidpad.campaign.driving.run_setup import stage_of
+    from skidpad.campaign.driving.stack_at_wheel import driver_of
     from skidpad.campaign.runs.run import run as drive_run
-    from skidpad.core.run import Roads, RunSpec
+    from skidpad.core.courses import Roads
+    from skidpad.core.run import RunSpec
     from skidpad.core.vocabulary import SensorLevel
     from skidpad.physics.presets import preset
     from skidpad.stack.configurations import numbered_driver

@@ -11,8 +11,9 @@ from msgspec import structs
 import skidpad
 from skidpad.campaign.driving.governing import choose_envelope
 from skidpad.campaign.runs.run import run as drive_run
+from skidpad.core.courses import Roads, Scenario
 from skidpad.core.geometry import Pose
-from skidpad.core.run import Roads, RunSpec, Scenario, StackDriver
+from skidpad.core.run import RunSpec, StackDriver
 from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import Govern, SensorLevel

@@ -12,25 +12,21 @@ from scipy import stats
 from skidpad.core.maths.randomness import stream
 from skidpad.evidence.limits import count_limits
 from skidpad.evidence.statistics import (
-    Interval,
     clopper_pearson,
     compare_pairs,
     dispersion_index,
     event_rate,
     holm,
-    interval_text,
     linear_ratio_limits,
     mcnemar,
     mean_limits,
     median_time,
-    p_text,
     pairs_needed,
     poisson_interval,
-    rate_text,
     seeds_for_verdict,
     share_bound,
-    share_text,
 )
+from skidpad.evidence.statistics_text import interval_text, p_text
 
 
 def poisson_cdf(k: int, mean: float) -> float:
@@ -93,24 +89,6 @@ def test_count_limits_are_exact_limits_of_clumps() -> None:
     clumps = total / phi
     assert stats.gamma.sf(low / phi, clumps - 0.75) == pytest.approx(0.985)
     assert stats.gamma.cdf(high / phi, clumps + 1.0) == pytest.approx(0.985)
-
-
-@pytest.mark.req("T-6")
-def test_a_rate_without_limits_says_how_many_runs_had_an_event() -> None:
-    assert (
-        rate_text(event_rate([0] * 10))
-        == "0.00 per run; none of 10 runs had one, at most 26 % do (95 %)"
-    )
-    assert rate_text(event_rate([7] + [0] * 9), "seed").endswith(
-        "1 of 10 seeds had one, at most 39 % do (95 %)"
-    )
-    assert rate_text(event_rate([3])) == "3.00 per run; 1 run says nothing of others"
-    assert rate_text(event_rate([3, 3, 3])) == "3.00 per run; 3 of 3 runs had one"
-    assert rate_text(event_rate([0, 40] * 5)).endswith("variance/mean 22, above the assumed 10")
-    assert (
-        rate_text(event_rate([1, 1] * 5), per="h")
-        == "1.00 per h, 95 % 0.355 to 2.03 if variance/mean is at most 10"
-    )
 
 
 @pytest.mark.req("T-6")
@@ -220,10 +198,6 @@ def test_holm_rejects_what_the_step_down_rule_rejects(p: list[float]) -> None:
     assert all(adjusted[a] <= adjusted[b] for a, b in pairwise(order))
 
 
-def test_words() -> None:
-    assert (p_text(0.2539), p_text(2e-6)) == ("p = 0.25", "p < 0.001")
-
-
 @pytest.mark.req("R-7")
 @pytest.mark.parametrize("n", [6, 7, 12, 25])
 @pytest.mark.parametrize("end", [2.0, 0.4, 10.0])
@@ -249,8 +223,3 @@ def test_the_least_seeds_are_those_with_which_a_claim_can_be_shown():
     for claims in range(1, 60):
         n = seeds_for_verdict(claims)
         assert 2.0 ** (1 - n) < 0.05 / claims <= 2.0 ** (2 - n)
-
-
-def test_a_share_and_its_interval_are_told_in_one_unit() -> None:
-    assert share_text(0.05, Interval(0.001, 0.1456)) == "5.00 %, 95 % 0.1 to 14.6 %"
-    assert interval_text(Interval(-0.0, 0.25)) == "95 % 0 to 0.25"

@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 from msgspec import structs
 
 from skidpad.campaign.runs.folder import fresh_folder
+from skidpad.core.courses import Scenario
 from skidpad.core.errors import ConfigError
 from skidpad.core.files.names import LONGEST, inside, path_part, slug
-from skidpad.core.run import Scenario, StackDriver
+from skidpad.core.run import StackDriver
 from skidpad.core.weather import Weather
 from skidpad.recording.campaign.folder import RUNS, CampaignFolder
 from skidpad.recording.campaign.grip import read_series

@@ -9,7 +9,7 @@ import pytest
 from skidpad.core.errors import FileError
 from skidpad.core.geometry import wrap_angle
 from skidpad.roads.opendrive.bake import bake
-from skidpad.roads.opendrive.document import id_number
+from skidpad.roads.opendrive.reader import id_number
 from skidpad.roads.queries import RoadMap
 
 LANE = '<lane id="{}" type="driving"><link/><width sOffset="0" a="3" b="0" c="0" d="0"/></lane>'

@@ -13,7 +13,8 @@ from scipy.integrate import solve_ivp
 
 from skidpad.core.geometry import wrap_angle
 from skidpad.roads.opendrive.bake import bake
-from skidpad.roads.opendrive.document import Reader, _element
+from skidpad.roads.opendrive.document import _element
+from skidpad.roads.opendrive.reader import Reader
 from skidpad.roads.opendrive.reference_line import Clothoid, Element, Parametric, ReferenceLine
 from skidpad.roads.queries import RoadMap
 from support.examples import examples

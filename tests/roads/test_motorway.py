@@ -7,7 +7,7 @@ from math import atan
 import numpy as np
 import pytest
 
-from skidpad.campaign.runs.run import drive
+from skidpad.campaign.runs.drive import drive
 from skidpad.evidence.grip.scores import npc_contact_row
 from skidpad.roads.bundled import load_map
 from skidpad.roads.lanes import LaneKind

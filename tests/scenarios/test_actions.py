@@ -6,7 +6,7 @@ from math import cos, hypot, radians, sin, sqrt
 
 import pytest
 
-from skidpad.core.run import ActorMode
+from skidpad.core.courses import ActorMode
 from skidpad.roads.bundled import load_map
 from skidpad.scenarios.movement.network import network_of
 from skidpad.scenarios.places.routes import random_roads

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 import skidpad
-from skidpad.campaign.driving.run_setup import check_scenario
+from skidpad.campaign.driving.course_file import check_scenario
+from skidpad.core.courses import Scenario
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import Scenario
 from skidpad.core.states import VehicleCommand
 from skidpad.scenarios.registry import REGISTERED, Names
 from skidpad.scenarios.scenario import check

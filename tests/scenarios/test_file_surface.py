@@ -9,18 +9,19 @@ import pytest
 from msgspec import structs
 from typer.testing import CliRunner
 
+from skidpad.campaign.driving.course_file import check_scenario
 from skidpad.campaign.driving.loop import Sink
 from skidpad.campaign.driving.outdoors import NO_SURFACE, FileChanges
-from skidpad.campaign.driving.run_setup import check_scenario, stage_of
+from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.campaign.runs.rerun import last_ticks
 from skidpad.campaign.runs.run import OpenRun
 from skidpad.campaign.runs.run import run as drive
 from skidpad.campaign.runs.state_files import StateFiles, read_state
 from skidpad.campaign.runs.stored import read_run
 from skidpad.cli.main import app
+from skidpad.core.courses import Scenario
 from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import FileError
-from skidpad.core.run import Scenario
 from skidpad.core.simulator import BackendKind
 from skidpad.recording.run.log_files import log_hash, read_log
 from skidpad.recording.run.surfaces import read_laid_surfaces, read_run_surface, read_surfaces

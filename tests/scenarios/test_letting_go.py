@@ -2,8 +2,8 @@
 
 import pytest
 
+from skidpad.core.courses import ActorMode
 from skidpad.core.geometry import Pose
-from skidpad.core.run import ActorMode
 from skidpad.core.setup import DT, ActorCommand
 from skidpad.scenarios.movement.motion import Guide
 from skidpad.scenarios.playing.player import Player

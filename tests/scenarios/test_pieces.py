@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from skidpad.campaign.runs.run import run
-from skidpad.core.run import ActorMode, Passenger, Scenario
+from skidpad.core.courses import ActorMode, Scenario
+from skidpad.core.run import Passenger
 from skidpad.core.vocabulary import Outcome, SemanticClass
 from skidpad.scenarios.export.hazard_export import export_hazard, road_under
 from skidpad.scenarios.export.tracks import Track, tracks

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from skidpad.campaign.runs.run import run
+from skidpad.core.courses import ActorMode, Scenario
 from skidpad.core.errors import FileError
-from skidpad.core.run import ActorMode, Passenger, Scenario, StackDriver
+from skidpad.core.run import Passenger, StackDriver
 from skidpad.core.vocabulary import Outcome
 from skidpad.evidence.grip.scores import npc_contact_row
 from skidpad.physics.presets import preset

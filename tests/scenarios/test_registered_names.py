@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from skidpad.campaign.driving.run_setup import load_scenario
+from skidpad.campaign.driving.course_file import load_scenario
 from skidpad.cli.main import app
+from skidpad.core.courses import Scenario
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import RunSpec, Scenario
+from skidpad.core.run import RunSpec
 from skidpad.scenarios.playing.stage import play_ideal
 from skidpad.scenarios.reading.findings import ScenarioError
 from skidpad.scenarios.registry import Acc, Names

@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 
 from skidpad.campaign.runs.play import run_to
 from skidpad.cli.main import app
-from skidpad.core.run import Passenger, Roads
+from skidpad.core.courses import Roads
+from skidpad.core.run import Passenger
 from skidpad.recording.run.log_files import read_log
 from skidpad.scenarios.export.run_export import log_tracks, road_of
 from skidpad.scenarios.playing.stage import play_ideal

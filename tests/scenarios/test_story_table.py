@@ -11,7 +11,7 @@ from scenario_catalogue import SCENARIOS, file_name
 from skidpad.campaign.cells.grip import template
 from skidpad.campaign.driving.backends import make_backend
 from skidpad.campaign.driving.run_setup import stage_of
-from skidpad.core.run import ActorMode, Scenario
+from skidpad.core.courses import ActorMode, Scenario
 from skidpad.core.states import VehicleCommand
 from skidpad.scenarios.export.version import OscVersion
 from skidpad.scenarios.playing.player import Player

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
-from skidpad.core.run import ActorMode
+from skidpad.core.courses import ActorMode
 from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.log_files import read_log
 from skidpad.scenarios.playing.player import Player

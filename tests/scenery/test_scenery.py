@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 import shapely
 
+from skidpad.core.courses import Roads
 from skidpad.core.geometry import Pose, footprint
-from skidpad.core.run import Roads, RunSpec, run_from_plain
+from skidpad.core.run import RunSpec, run_from_plain
 from skidpad.core.setup import ActorSetup
 from skidpad.core.traffic.paints import PAINT_SHARES, PALETTE, draw_paint
 from skidpad.core.vocabulary import Scenery, SemanticClass

@@ -71,8 +71,9 @@ def _fields(trial):
 
 def test_what_cannot_be_driven_is_no_harmless_neighbour():
     """Halving stops where neither side of the border is known; before, such a run counted as harmless."""
+    from skidpad.core.courses import Scenario
     from skidpad.core.maths.space import Space, Uniform, Variable
-    from skidpad.core.run import RunSpec, Scenario
+    from skidpad.core.run import RunSpec
     from skidpad.recording.campaign.searches import Group, Search, Trial
     from skidpad.search import failures
 

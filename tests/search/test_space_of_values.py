@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from skidpad.core.courses import Scenario
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.maths.space import Choice, Normal, Space, Uniform, Variable
-from skidpad.core.run import RunSpec, Scenario
+from skidpad.core.run import RunSpec
 from skidpad.search.files import read_space, write_choices
 from skidpad.search.space import apply_values, parse_space, parse_variable
 from skidpad.search.trial import Trial

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from skidpad.campaign.driving.run_setup import stage_of
-from skidpad.core.run import Roads, RunSpec
+from skidpad.core.courses import Roads
+from skidpad.core.run import RunSpec
 from skidpad.core.settings.parts import load_profile
 from skidpad.core.setup import ActorSetup
 from skidpad.core.states import VehicleCommand

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from msgspec import structs
 
+from skidpad.core.courses import Roads
 from skidpad.core.geometry import Pose
-from skidpad.core.run import AdasDriver, Roads, RunSpec, run_from_plain
+from skidpad.core.run import AdasDriver, RunSpec, run_from_plain
 from skidpad.core.specs import CameraSpec, Modality
 from skidpad.core.states import ActorTable
 from skidpad.core.vocabulary import ActorKind, Bodywork, SemanticClass

@@ -25,7 +25,7 @@ from skidpad.core.vocabulary import LightState, RelocationReason, Supervision, T
 from skidpad.roads.bundled import load_map
 from skidpad.roads.opendrive.bake import bake
 from skidpad.roads.queries import LanePoint, RoadMap
-from skidpad.simulation import recovery
+from skidpad.simulation import clear_place, recovery
 from skidpad.simulation.recovery import (
     Action,
     Clearance,
@@ -444,7 +444,7 @@ def test_settings_out_of_range_name_the_field() -> None:
         RecoverySettings(warm_up=-1.0)
 
 
-# Constants of recovery, each with the test that notices 10 % more and less (M-14).
+# Constants of recovery and of its clear place, each with the test that notices 10 % more and less (M-14).
 GUARDED = {
     "REVERSE_STEER_GAIN": test_reversing_steers_by_the_printed_formula,
     "REVERSE_STEER_MAX": test_reversing_steers_by_the_printed_formula,
@@ -465,7 +465,8 @@ def test_a_changed_constant_is_noticed(
 ) -> None:
     test: Any = GUARDED[name]
     (mark,) = (m for m in test.pytestmark if m.name == "parametrize")
-    monkeypatch.setattr(recovery, name, factor * getattr(recovery, name))
+    module = recovery if hasattr(recovery, name) else clear_place
+    monkeypatch.setattr(module, name, factor * getattr(module, name))
     noticed = 0
     for row in mark.args[1]:
         try:

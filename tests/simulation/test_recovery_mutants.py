@@ -21,9 +21,9 @@ CLEAR = f"{RECOVERY}::test_the_ego_is_put_behind_whatever_stands_ahead"
 GUARDS = (
     Guard("simulation.recovery", PHASES, "BRAKE_TIME REVERSE_TIME REVERSE_THROTTLE LIFT"),
     Guard("simulation.recovery", STEER, "REVERSE_STEER_GAIN REVERSE_STEER_MAX"),
-    Guard("simulation.recovery", CLEAR, "CLEAR_AHEAD CLEAR_ASIDE SHIFT_BACK"),
+    Guard("simulation.clear_place", CLEAR, "CLEAR_AHEAD CLEAR_ASIDE SHIFT_BACK"),
     Guard(
-        "simulation.recovery",
+        "simulation.clear_place",
         f"{RECOVERY}::test_the_search_ends_after_four_shifts_and_says_so",
         "SHIFTS",
     ),
@@ -37,7 +37,11 @@ GUARDS = (
         f"{RECOVERY}::test_more_than_120_degrees_is_wrong_way",
         "WRONG_WAY_DOT",
     ),
-    Guard("simulation.recovery", f"{RECOVERY}::test_a_car_on_the_bridge_obstructs_nobody", "LEVEL"),
+    Guard(
+        "simulation.clear_place",
+        f"{RECOVERY}::test_a_car_on_the_bridge_obstructs_nobody",
+        "LEVEL",
+    ),
     Guard(
         "simulation.recovery",
         f"{RECOVERY}::test_standing_at_a_red_light_is_no_reason_to_be_moved",
@@ -86,7 +90,7 @@ GUARDS = (
 SURVIVORS = {
     "simulation.recovery.GRACE": "a default of the settings, read when the class is made; its effect "
     "is tested by test_the_grace_puts_the_stuck_detector_off",
-    "simulation.recovery.MARGIN": "room around the ego's own box; a car that touches it is tested, the "
+    "simulation.clear_place.MARGIN": "room around the ego's own box; a car that touches it is tested, the "
     "width of the gap is ours",
     "evidence.drive.collisions.LOOK_BACK": "how much history a crash card tells",
     "evidence.drive.collisions.JUST_BEFORE": "the stretch in which bend, lead and brake are looked for",

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from skidpad.campaign.cells.matrix import describe_run
 from skidpad.campaign.driving.drivers import describe_driver
-from skidpad.core.run import Roads, RunSpec
+from skidpad.core.courses import Roads
+from skidpad.core.run import RunSpec
 from skidpad.core.settings.parts import load_profile
 from skidpad.core.vocabulary import SensorLevel, TrafficStart
 from skidpad.physics.presets import find_weather

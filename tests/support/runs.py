@@ -9,7 +9,8 @@ from msgspec import structs
 
 from skidpad.campaign.cells.grip import template
 from skidpad.campaign.channels.routes import driven_routes
-from skidpad.core.run import AdasDriver, ChannelCrew, Roads, RunSpec, Scenario
+from skidpad.core.courses import Roads, Scenario
+from skidpad.core.run import AdasDriver, ChannelCrew, RunSpec
 from skidpad.core.settings.parts import Settings, load_profile
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.core.weather import Weather

@@ -7,8 +7,9 @@ import pytest
 
 import risk_coverage as coverage
 from risk_coverage import Block, Ends, Repeated
+from skidpad.core.courses import Scenario
 from skidpad.core.maths.space import Normal, Space, Variable
-from skidpad.core.run import AdasDriver, RunSpec, Scenario
+from skidpad.core.run import AdasDriver, RunSpec
 from skidpad.recording.campaign.risks import RISK, Risk
 from skidpad.recording.files import write_json
 from skidpad.scenarios.shipped import scenario_file

@@ -9,7 +9,7 @@ from msgspec import structs
 
 import same_drives
 from skidpad.campaign.runs.run import run
-from skidpad.core.run import Roads, Scenario
+from skidpad.core.courses import Roads, Scenario
 
 ROADS = next(k for k in range(100) if isinstance(same_drives.draw_run(k).course, Roads))
 

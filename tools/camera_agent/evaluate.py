@@ -13,8 +13,9 @@ import numpy as np
 
 from skidpad.campaign.cells.grip import Cross, cross, seeds, template
 from skidpad.campaign.runs.run import Run, run
+from skidpad.core.courses import Roads
 from skidpad.core.frames import SensorFrame
-from skidpad.core.run import CameraDriver, Friction, Roads, RunSpec
+from skidpad.core.run import CameraDriver, Friction, RunSpec
 from skidpad.core.vocabulary import Outcome, SensorLevel
 from skidpad.evidence.statistics import clopper_pearson
 from skidpad.physics.presets import preset

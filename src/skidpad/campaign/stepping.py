@@ -10,24 +10,23 @@ from skidpad.campaign.cells.grip import template
 from skidpad.campaign.driving.drivers import STACK, find_driver
 from skidpad.campaign.driving.loop import Script
 from skidpad.campaign.driving.outdoors import branch_backend
-from skidpad.campaign.driving.run_setup import StackAtWheel, stage_of
+from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.campaign.driving.stack_at_wheel import StackAtWheel
 from skidpad.campaign.recipes.files import runs_of
 from skidpad.campaign.runs.checkpoints import RunCheckpoint
 from skidpad.campaign.runs.run import OpenRun, Run
+from skidpad.core.courses import ActorMode
+from skidpad.core.courses import Scenario as Course
 from skidpad.core.errors import CheckpointError, ConfigError, require_choice
 from skidpad.core.frames import SensorFrame
-from skidpad.core.run import (
-    ActorMode,
-    Friction,
-)
-from skidpad.core.run import Scenario as Course
+from skidpad.core.run import Friction
 from skidpad.core.settings.parts import load_profile
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import find_weather
-from skidpad.scenarios.scene import State
+from skidpad.scenarios.elements import State
 from skidpad.scenarios.shipped import find_scenario
 
 PLAIN = "clear-noon"  # what a file leaves open of the weather, as in `skidpad play`

@@ -11,10 +11,11 @@ from pathlib import Path
 
 from msgspec import structs
 
+from skidpad.core.courses import Edges, Roads, Route
 from skidpad.core.errors import ConfigError
 from skidpad.core.files.reading import is_file
 from skidpad.core.kernels.jit import user_cache
-from skidpad.core.run import Edges, Roads, Route, RunSpec
+from skidpad.core.run import RunSpec
 from skidpad.recording.files import write_bytes
 from skidpad.roads.bundled import KEPT, bundled_maps, kept_name, load_map, map_file
 

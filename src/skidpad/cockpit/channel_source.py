@@ -22,10 +22,10 @@ from skidpad.cockpit.marks import RADAR_MOUNT
 from skidpad.cockpit.source import Curves, Said, Seat, Source
 from skidpad.core.arrays import Floats
 from skidpad.core.channels import ChannelFrame, Context, Decision, TruthFrame
+from skidpad.core.courses import Route
 from skidpad.core.errors import FileError, InputError
 from skidpad.core.frames import RadarPoints, SensorFrame
 from skidpad.core.inputs import Outside
-from skidpad.core.run import Route
 from skidpad.core.setup import DT
 from skidpad.core.states import (
     ActorStates,

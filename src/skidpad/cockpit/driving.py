@@ -18,8 +18,9 @@ from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.screen import Screen, Shown
 from skidpad.cockpit.studio import Looks
 from skidpad.cockpit.words import Link, Live, Pace
+from skidpad.core.courses import Roads
 from skidpad.core.environment.surface import present_patches
-from skidpad.core.run import AdasDriver, Roads, RunSpec, run_from_plain
+from skidpad.core.run import AdasDriver, RunSpec, run_from_plain
 from skidpad.core.setup import DT
 from skidpad.core.states import ActorTable
 from skidpad.recording.run.surfaces import LaidSurface

@@ -8,9 +8,10 @@ from skidpad.campaign.runs.play import run_to
 from skidpad.cockpit.channel_source import ChannelSource, weather_of
 from skidpad.cockpit.replay import RecordedRun
 from skidpad.cockpit.source import Source
+from skidpad.core.courses import ActorMode, Scenario
 from skidpad.core.errors import ConfigError
 from skidpad.core.files.names import path_part
-from skidpad.core.run import ActorMode, Passenger, RunSpec, Scenario
+from skidpad.core.run import Passenger, RunSpec
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.recording.hazards.records import TEXT_FILE, HazardRecord, read_hazards
 from skidpad.recording.run.log_files import TICKS

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from skidpad.core.courses import Scenario
 from skidpad.core.objects.registry import Registry
-from skidpad.core.run import AdasDriver, RunSpec, Scenario
+from skidpad.core.run import AdasDriver, RunSpec
 from skidpad.core.simulator import BACKENDS
 from skidpad.physics.presets import WEATHERS
 from skidpad.roads.map_files import MAPS

@@ -10,8 +10,9 @@ import numpy as np
 from msgspec import structs
 
 from skidpad.campaign.cells.matrix import describe_run
+from skidpad.core.courses import Roads
 from skidpad.core.errors import ConfigError, require_choice
-from skidpad.core.run import Roads, RunSpec, StackDriver
+from skidpad.core.run import RunSpec, StackDriver
 from skidpad.core.settings.parts import load_profile
 from skidpad.core.vocabulary import GripModel, SensorLevel, TrafficStart
 from skidpad.core.weather import Weather

@@ -25,9 +25,9 @@ from skidpad.evidence.statistics import (
     Comparison,
     compare_pairs,
     holm,
-    p_text,
     sign_tests,
 )
+from skidpad.evidence.statistics_text import p_text
 from skidpad.recording.campaign.matrix import Metrics
 from skidpad.recording.campaign.results import definitions_of
 

@@ -18,12 +18,8 @@ from numpy.typing import ArrayLike
 
 from skidpad.core.text.wording import list_text
 from skidpad.core.vocabulary import Outcome
-from skidpad.evidence.statistics import (
-    Interval,
-    compare_pairs,
-    no_limits_text,
-    pairs_needed,
-)
+from skidpad.evidence.statistics import Interval, compare_pairs, pairs_needed
+from skidpad.evidence.statistics_text import no_limits_text
 from skidpad.recording.campaign.quantities import heading_of
 
 NOT_RUN = frozenset(  # leave every denominator (L-7)

@@ -9,7 +9,8 @@ import polars as pl
 from scipy import stats
 
 from skidpad.evidence.contrasts import Amount, Contrast, Criterion, distinct, has_columns
-from skidpad.evidence.statistics import NO_LIMITS, Interval, Rate, event_rate, runs_with_text
+from skidpad.evidence.statistics import Interval, Rate, event_rate
+from skidpad.evidence.statistics_text import NO_LIMITS, runs_with_text
 
 RUNS_WITHOUT_EVENT = 3.7  # / limit: runs without an event that bound a rate, -ln(0.025)
 

@@ -18,7 +18,8 @@ import polars as pl
 
 from skidpad.core.text.wording import count_text
 from skidpad.evidence.contrasts import Contrast, Criterion, drop_unfinished
-from skidpad.evidence.statistics import EVER_SIGNIFICANT, holm, interval_text, p_text
+from skidpad.evidence.statistics import EVER_SIGNIFICANT, holm
+from skidpad.evidence.statistics_text import interval_text, p_text
 
 ALPHA = 0.05
 

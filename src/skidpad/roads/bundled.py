@@ -37,7 +37,7 @@ def kept_map(folder: Path, name: str, content_hash: str) -> RoadMap:
 def bake_file(path: Path) -> BakedMap:
     """Returns the baked map of an OpenDRIVE file; the name is the file's. FileError for a faulty one."""
     from skidpad.roads.opendrive.bake import bake  # lxml and scipy are needed for baking only
-    from skidpad.roads.opendrive.document import SIZE_MAX
+    from skidpad.roads.opendrive.reader import SIZE_MAX
 
     return bake(read_bytes(path, "map", SIZE_MAX), path.stem, str(path))
 

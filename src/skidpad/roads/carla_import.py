@@ -20,7 +20,7 @@ from typing import IO, Any, NamedTuple, cast
 
 from skidpad.core.errors import FileError
 from skidpad.core.files.reading import decode_json
-from skidpad.roads.opendrive.document import SIZE_MAX
+from skidpad.roads.opendrive.reader import SIZE_MAX
 
 SUFFIX, PREFERRED = ".xodr", "OpenDrive"
 ZIPPED, MANIFEST = ".zip", "manifest.json"

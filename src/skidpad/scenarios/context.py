@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from skidpad.roads.opendrive.document import id_number
+from skidpad.roads.opendrive.reader import id_number
 from skidpad.scenarios.movement.network import Network
 from skidpad.scenarios.reading.catalogs import Catalogs
 from skidpad.scenarios.reading.document import Node

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from enum import Enum
 from math import hypot, sqrt
 from typing import Any, Protocol
 
+from skidpad.core.courses import ActorMode
 from skidpad.core.geometry import Pose
-from skidpad.core.run import ActorMode
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import LightState
 from skidpad.recording.run.lamps import LampChange
 from skidpad.recording.run.tilts import Tilted
-from skidpad.scenarios.movement.measures import Point, between, corners, overlap
+from skidpad.scenarios.elements import Happening, Move, Path, State
+from skidpad.scenarios.movement.measures import Point, between, corners
 from skidpad.scenarios.movement.motion import Guide
 from skidpad.scenarios.movement.network import Network, Place
 from skidpad.scenarios.movement.steering import LaneSteering
@@ -27,34 +27,6 @@ from skidpad.simulation.scripted import ActorDriver, Motion
 STANDING = 0.05, 1e-3  # m/s, of what drives on tyres, and of what is where the file says
 JUST = 1e-9  # s, what has begun to last
 PHYSICAL = ActorMode.PHYSICAL  # asked in every step
-TOUCHING = 0.05  # m, bodies that the physics keeps apart are this near
-Path = tuple[str, ...]
-
-
-class State(str, Enum):
-    """Life of a storyboard element."""
-
-    STANDBY = "standbyState"
-    RUNNING = "runningState"
-    COMPLETE = "completeState"
-
-
-class Move(str, Enum):
-    """How a storyboard element changes its state."""
-
-    START = "startTransition"
-    END = "endTransition"
-    STOP = "stopTransition"
-    SKIP = "skipTransition"
-
-
-@dataclass(frozen=True, slots=True)
-class Happening:
-    """Something of the storyboard that happened at t, s: a transition, or what a condition says."""
-
-    t: float
-    path: Path
-    what: str
 
 
 class Running(Protocol):
@@ -396,31 +368,6 @@ class Scene:
         """Returns where b lies as seen from a: m forward, m left."""
         to = self.actors[b].pose
         return between(self.actors[a].pose, to.x, to.y)
-
-    def touch(self, a: str, b: str) -> bool:
-        """Returns whether two entities are in contact now; never one that is absent or a ghost."""
-        if (a == self.ego and b in self.contacts) or (b == self.ego and a in self.contacts):
-            return True
-        one, other = self.actors[a], self.actors[b]
-        if not (one.present and other.present) or one.entity.is_ghost or other.entity.is_ghost:
-            return False
-        away = hypot(one.pose.x - other.pose.x, one.pose.y - other.pose.y)
-        if away > one.nearness(other):
-            return False
-        reach = 0.0 if one.placed_by_file and other.placed_by_file else TOUCHING
-        if overlap(one.outline(), other.outline()) > reach:
-            return False
-        (low, body), (high, _) = sorted((self._stands(a), self._stands(b)))
-        return high - low < body
-
-    def _stands(self, name: str) -> tuple[float, float]:
-        """Returns the height of the road under an entity, and of its body; m.
-
-        The road's, because a place without z means the ground and is read as z = 0.
-        """
-        actor = self.actors[name]
-        lane = self.network.place_of(actor.pose).lane
-        return actor.pose.z if lane is None else lane.z, actor.entity.box.height
 
     def tell_time(self, environment: Environment) -> None:
         """Sets the clock, where an environment says a time of day."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from skidpad.core.vocabulary import LightState
-from skidpad.roads.opendrive.document import id_number
+from skidpad.roads.opendrive.reader import id_number
 from skidpad.scenarios.reading.document import Node
 from skidpad.scenarios.scene import Scene
 

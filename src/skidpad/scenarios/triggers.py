@@ -13,9 +13,10 @@ from skidpad.scenarios.conditions.by_entity import BY_ENTITY
 from skidpad.scenarios.conditions.by_value import BY_VALUE, ElementMove, Never
 from skidpad.scenarios.conditions.distances import DISTANCES
 from skidpad.scenarios.context import Context
+from skidpad.scenarios.elements import Happening, Path
 from skidpad.scenarios.reading.document import Node
 from skidpad.scenarios.reading.outline import describe_element
-from skidpad.scenarios.scene import Happening, Path, Scene
+from skidpad.scenarios.scene import Scene
 
 ENTITY_CONDITIONS = {**BY_ENTITY, **DISTANCES}
 

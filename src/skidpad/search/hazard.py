@@ -17,10 +17,11 @@ from xml.etree import ElementTree
 from msgspec import structs
 
 from skidpad.campaign.runs.run import run
+from skidpad.core.courses import Scenario
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.files.reading import read_bytes
 from skidpad.core.maths.space import Choice, Space, Variable
-from skidpad.core.run import Passenger, RunSpec, Scenario
+from skidpad.core.run import Passenger, RunSpec
 from skidpad.core.text.told import on_a_line
 from skidpad.recording.campaign.searches import Group, Hazard, Search, Trial
 from skidpad.recording.files import write_bytes

@@ -9,9 +9,10 @@ from math import ceil
 
 from msgspec import structs
 
+from skidpad.core.courses import Scenario
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.maths.space import Choice, Law, Normal, Space, Uniform, Value, Variable
-from skidpad.core.run import RunSpec, Scenario
+from skidpad.core.run import RunSpec
 from skidpad.core.text.told import describe_value
 from skidpad.core.traffic.disturbance import (
     KNOT_S,

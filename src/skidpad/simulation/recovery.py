@@ -7,31 +7,19 @@ nothing of how the backend works, and the stack knows nothing of the truth.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import cos, hypot, sin
-from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from skidpad.core.arrays import Floats
 from skidpad.core.errors import require_range
 from skidpad.core.geometry import Pose, mps_from_kmh
 from skidpad.core.kernels.jit import Held, hold, kernel
 from skidpad.core.objects.slots import fill_slots
 from skidpad.core.states import ActorStates, StackReport, VehicleCommand, WorldTruth
-from skidpad.core.vocabulary import (
-    ActorKind,
-    Clearance,
-    LightState,
-    RelocationReason,
-    Supervision,
-    Tier,
-)
+from skidpad.core.vocabulary import Clearance, RelocationReason, Supervision, Tier
 from skidpad.roads.kernels import LaneArrays, project_point
-from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import LanePoint, RoadMap
+from skidpad.simulation.clear_place import find_clear_place
+from skidpad.simulation.standing import has_reason, is_slow, stops_of
 
 BRAKE_TIME = 0.5  # s, A-181
 REVERSE_TIME = 2.0  # s, A-182
@@ -39,22 +27,15 @@ REVERSE_THROTTLE = 0.4
 REVERSE_STEER_GAIN = 0.5
 REVERSE_STEER_MAX = 0.3
 LIFT = 0.5  # m above the road, so that no wheel begins inside it (A-183)
-CLEAR_AHEAD = 15.0  # m, A-184
-CLEAR_ASIDE = 2.5  # m
-SHIFT_BACK = 8.0  # m
-SHIFTS = 4
 COOL_DOWN = 3.0  # s, A-185
 GRACE = 8.0  # s without the stuck detector after a relocation, A-188
 WRONG_WAY_DOT = -0.5  # cosine of 120 deg, A-196
-LEVEL = 4.0  # m: whatever is farther above or below is on another road (decision M-12)
 LIGHT_REACH = 30.0  # m to a stop line that explains standing
 OFF_ROAD_TIME = 1.0  # s with all wheels off every lane (decision R-6)
 OFF_ROAD_LIMIT = 3.0  # m that the car's middle lies beyond the road's edge
-MARGIN = 0.3  # m around the ego's own box where it is put
 
 # by the stack; a member that is looked up in its class takes longer than the test
 DRIVEN = Supervision.NONE
-RED, YELLOW = int(LightState.RED), int(LightState.YELLOW)
 FULL_STOP = VehicleCommand(brake=1.0, handbrake=True)
 HELD = VehicleCommand(brake=1.0)
 ROLLING = VehicleCommand()
@@ -111,28 +92,6 @@ class Action:
     command: VehicleCommand
     relocate: Relocate | None = None
     notice: str = ""
-
-
-class Stops(NamedTuple):
-    """Where lights of a map stop whom they govern, by lane."""
-
-    id: NDArray[np.int64]  # of the signal
-    lane: NDArray[np.int64]
-    s: Floats  # m along it
-
-    def show(self, lights: Mapping[int, LightState]) -> NDArray[np.uint8]:
-        """Returns the LightState at each of them; lights: by signal id, a missing one is UNKNOWN."""
-        return np.array(
-            [lights.get(i, LightState.UNKNOWN) for i in self.id.tolist()], dtype=np.uint8
-        )
-
-
-def stops_of(map: RoadMap) -> Stops:
-    """Returns the stops of a map's lights."""
-    signals = map.signals
-    chosen = signals.kind == SignalKind.LIGHT
-    ids, lanes = (np.asarray(c[chosen], dtype=np.int64) for c in (signals.id, signals.lane))
-    return Stops(ids, lanes, np.asarray(signals.s[chosen], dtype=np.float64))
 
 
 class Supervisor:
@@ -268,7 +227,9 @@ class Supervisor:
             nearest = None if self._last is None else self.map.at(*self._last)
         if nearest is None:
             return Action(FULL_STOP, notice="no driving lane near the ego, relocation is retried")
-        place, shift, clear = self._clear_place(nearest)
+        place, shift, clear = find_clear_place(
+            self.map, nearest, self.truth, self.settings.clearance
+        )
         new = replace(place.pose, z=place.z + LIFT)
         self.over = False
         moved = Moved(self.reason, shift, states.pose(0), new, clear)
@@ -288,47 +249,6 @@ class Supervisor:
         yaw = float(states.yaw[0]) if place is None else place.heading
         pose = replace(states.pose(0), yaw=yaw)
         return Action(ROLLING, Relocate(pose, self.settings.release_speed))
-
-    def _clear_place(self, nearest: LanePoint) -> tuple[LanePoint, float, bool]:
-        """Returns the place, the m moved back to it, and whether it is clear (A-184, D-080).
-
-        Where none is, the last one looked at.
-        """
-        place, shift = nearest, 0.0
-        if self.settings.clearance is Clearance.NONE:
-            return place, shift, self._is_clear(place)
-        for candidate in self._candidates(nearest):
-            place, shift = candidate
-            if self._is_clear(place):
-                return place, shift, True
-        return place, shift, False
-
-    def _candidates(self, nearest: LanePoint) -> Iterator[tuple[LanePoint, float]]:
-        """Yields (lane point, shift back in m) from the nearest point on, while the lane goes back."""
-        yield nearest, 0.0
-        place = nearest
-        for k in range(1, SHIFTS + 1):
-            behind = self.map.behind(place, SHIFT_BACK)
-            if behind is None:
-                return
-            place = behind
-            yield place, k * SHIFT_BACK
-
-    def _is_clear(self, place: LanePoint) -> bool:
-        """Returns whether no other vehicle is in the box ahead of the place, nor where the ego would be."""
-        assert self.truth is not None
-        states, table = self.truth.states, self.truth.table
-        vehicle = states.present & (table.kind <= ActorKind.MOTORCYCLE)
-        vehicle &= np.abs(states.z - place.z) < LEVEL
-        dx, dy = states.x - place.x, states.y - place.y
-        forward = dx * cos(place.heading) + dy * sin(place.heading)
-        aside = np.abs(dy * cos(place.heading) - dx * sin(place.heading))
-        blocking = vehicle & (forward > 0.0) & (forward < CLEAR_AHEAD) & (aside < CLEAR_ASIDE)
-        if self.settings.clearance is Clearance.LISTING:
-            return not bool(blocking.any())
-        touching = vehicle & (np.abs(forward) < 0.5 * (table.length + table.length[0]) + MARGIN)
-        touching &= aside < 0.5 * (table.width + table.width[0]) + MARGIN
-        return not bool((blocking | touching)[1:].any())
 
     def _astray(self, truth: WorldTruth) -> RelocationReason | None:
         """Returns why the ego is put back although it touched nothing, None where it is not.
@@ -426,51 +346,3 @@ def find_ego(
     if lane < 0:
         return -1, s, offset, 1.0, False
     return lane, s, offset, cos(heading - states.yaw[0]), hypot(x - px, y - py) < 0.5 * width
-
-
-@kernel
-def is_slow(held: Held[ActorStates], v: float) -> bool:
-    """Returns whether the ego is slower than v m/s over ground."""
-    s = held.value
-    return bool(s.vx[0] * s.vx[0] + s.vy[0] * s.vy[0] < v * v)
-
-
-@kernel
-def has_actor_ahead(held: Held[ActorStates], x: float, y: float, z: float, heading: float) -> bool:
-    """Returns whether the centre of an actor besides the ego is in the box ahead of a place.
-
-    The box is CLEAR_ASIDE m to both sides and CLEAR_AHEAD m long, and LEVEL m up and down; heading:
-    rad. Absent actors do not count.
-    """
-    s = held.value
-    c, sn = cos(heading), sin(heading)
-    for i in range(1, len(s.x)):
-        dx, dy = s.x[i] - x, s.y[i] - y
-        forward, aside = dx * c + dy * sn, abs(dy * c - dx * sn)
-        near = 0.0 < forward < CLEAR_AHEAD and aside < CLEAR_ASIDE and abs(s.z[i] - z) < LEVEL
-        if near and s.present[i]:
-            return True
-    return False
-
-
-@kernel
-def has_reason(
-    map: Held[LaneArrays], held: Held[ActorStates], lanes: NDArray[np.int64], s: Floats,
-    shown: NDArray[np.uint8], reach: float,
-) -> bool:  # fmt: skip
-    """Returns whether an actor is ahead, or a red or yellow light within `reach` m along the lane.
-
-    lanes, s, shown: where lights stop the traffic, and what they show; False off every lane.
-    """
-    states = held.value
-    x, y, z = states.x[0], states.y[0], states.z[0]
-    lane, here, _, _, _, _, heading, _, _ = project_point(map.value, x, y, z, True)
-    if lane < 0:
-        return False
-    if has_actor_ahead(held, x, y, z, heading):
-        return True
-    for k in range(len(lanes)):
-        stops = shown[k] == RED or shown[k] == YELLOW
-        if lanes[k] == lane and 0.0 < s[k] - here < reach and stops:
-            return True
-    return False

@@ -17,6 +17,7 @@ from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.protocol.streams import StreamHub
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.vehicles.falling import ground_below
+from skidpad.simulation.world.interventions import hold_velocity
 
 CAR, WALKER = "vehicle.tesla.model3", "walker.pedestrian.0001"
 DT = 0.05
@@ -102,13 +103,13 @@ def test_a_car_driven_off_a_bridge_lands_on_the_road_below(tmp_path):
         episode.landscape.toggle([wall.id], False)  # no rail holds it
     episode.relandscape()
     assert height(served, car) == pytest.approx(top.z, abs=0.5)
-    episode.moving.hold_velocity(car.body, (0.0, 12.0))  # sideways
+    hold_velocity(episode.moving, car.body, (0.0, 12.0))  # sideways
     heights = []
     for _ in range(200):
         served.tick()
         heights.append(height(served, car))
         if heights[-1] < top.z - 1.0:
-            episode.moving.hold_velocity(car.body, None)
+            hold_velocity(episode.moving, car.body, None)
     assert min(heights) < top.z - 6.0
     pose = episode.actors.pose(car)
     assert pose.z == pytest.approx(ground_below(roads, pose.x, pose.y, pose.z), abs=0.3)

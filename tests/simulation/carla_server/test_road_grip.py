@@ -52,7 +52,7 @@ def let_wear(episode: Episode, vehicle: Vehicle, friction: np.ndarray) -> None:
 def effective(served: Served) -> np.ndarray:
     """(n, 4) what the tyres get."""
     moving = served.episode.moving
-    moving.grip = served.episode.sky.grip
+    moving.wheel_grip.set_for_all(served.episode.sky.grip)
     moving.feel_grip()
     return moving.on_wheels.road_mu * moving.fleet.tire_friction / TIRE_FRICTION_REFERENCE
 

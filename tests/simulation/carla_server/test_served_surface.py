@@ -95,11 +95,11 @@ def test_deposits_of_a_clients_weather_fill_the_puddles_of_the_surface(tmp_path)
 
 def test_a_surface_lies_on_the_first_map_alone(tmp_path):
     served, _ = serve(surface=write(tmp_path, "ice_mm: 3, road: 1"), map="straight")
-    assert served.episode.moving.patches is not None
+    assert served.episode.moving.wheel_grip.patches is not None
     served.load("figure8", reset_settings=True)
-    assert served.episode.moving.patches is None
+    assert served.episode.moving.wheel_grip.patches is None
     served.load("straight", reset_settings=True)
-    assert served.episode.moving.patches is not None
+    assert served.episode.moving.wheel_grip.patches is not None
 
 
 def test_a_surface_that_does_not_fit_is_refused_with_its_file(tmp_path):

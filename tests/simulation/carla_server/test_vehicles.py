@@ -14,8 +14,9 @@ from skidpad.roads.bundled import load_map
 from skidpad.simulation.carla_server.actors.catalogue import load_catalogue
 from skidpad.simulation.carla_server.vehicles.control import Control
 from skidpad.simulation.carla_server.vehicles.vehicles import LEAN_SHARE, STICKY_SPEED, Vehicles
+from skidpad.simulation.world.conditions import Conditions
 from skidpad.simulation.world.lights import Lights
-from skidpad.simulation.world.world import Conditions, World
+from skidpad.simulation.world.world import World
 
 CAR = 7
 DT = 0.05  # s

@@ -21,6 +21,7 @@ from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
 from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.simulation.embedded.engine import EmbeddedBackend
+from skidpad.simulation.world.interventions import set_grounded
 
 MAP = load_map("figure8")
 assert MAP.ego_start is not None
@@ -163,7 +164,7 @@ def test_cars_that_cross_on_two_levels_do_not_touch() -> None:
     backend.reset(replace(ALONE, ego=replace(EGO, speed=15.0), actors=(lead_at(20.0),)), 0)
     above = backend.truth().states.pose(1)
     hold = ActorCommand("lead", place=replace(above, z=above.z + 8.0), speed=0.0)
-    backend.world.set_grounded(1, False)  # the car above keeps its height without a bridge
+    set_grounded(backend.world, 1, False)  # the car above keeps its height without a bridge
     for _ in range(60):
         backend.world.states.z[1] = above.z + 8.0
         frame = backend.step(VehicleCommand(), [hold])

@@ -25,8 +25,9 @@ from skidpad.simulation.world.placed import places_for
 from skidpad.simulation.world.traffic import care as care_
 from skidpad.simulation.world.traffic.care import Care, care_of, careless
 from skidpad.simulation.world.traffic.idm import A_CURVE, Character
-from skidpad.simulation.world.traffic.manager import network_of, room
+from skidpad.simulation.world.traffic.manager import room
 from skidpad.simulation.world.traffic.occupancy import NOBODY, add, find_behind, occupancy
+from skidpad.simulation.world.traffic.streets import network_of
 
 MAP = load_map("figure8")
 assert MAP.ego_start is not None

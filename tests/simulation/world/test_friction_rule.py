@@ -16,6 +16,7 @@ from skidpad.core.weather import Weather
 from skidpad.physics.grip import RoadSurface, physical_params, ratio_at, road_surface
 from skidpad.roads.bundled import FOLDER
 from skidpad.roads.opendrive.materials import read_materials
+from skidpad.simulation.world.interventions import set_tyres
 from skidpad.simulation.world.patches import FrictionZone
 from skidpad.simulation.world.stage import build_world
 from support.friction_rule import FRICTION_RULE
@@ -57,9 +58,9 @@ def felt(road, words):
     )  # fmt: skip
     world = build_world(setup, 1)
     if WHEEL in words:
-        world.set_tyres(0, [CONTROL] * 4)
+        set_tyres(world, 0, [CONTROL] * 4)
     if ZONE in words:
-        world.zones = [FrictionZone(Pose(300.0, 0.0), (500.0, 50.0, 5.0), TRIGGER)]
+        world.wheel_grip.zones = [FrictionZone(Pose(300.0, 0.0), (500.0, 50.0, 5.0), TRIGGER)]
     world.feel_grip()
     return world.fleet.mu[0]
 
@@ -97,7 +98,7 @@ def test_what_is_recorded_before_the_first_step_has_the_tyres_own_friction(road)
     )  # fmt: skip
     world = build_world(setup, 1)
     before = world.mu[0].copy()
-    world.set_tyres(0, [CONTROL] * 4)
+    set_tyres(world, 0, [CONTROL] * 4)
     world.feel_grip()
     assert world.mu[0] == pytest.approx(before * CONTROL / 3.5, rel=1e-9)
     assert world.mu[0] == pytest.approx(world.fleet.mu[0], rel=1e-9)

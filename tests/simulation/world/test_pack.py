@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from skidpad.core.courses import Roads
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import Roads, RunSpec
+from skidpad.core.run import RunSpec
 from skidpad.core.setup import ActorSetup, LanePosition, Setup, TrafficSetup
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.states import VehicleCommand
@@ -96,7 +97,7 @@ def test_who_leaves_enters_out_of_sight_at_speed(factor: float, least: int) -> N
             kept.append(sum(there))
     assert entered >= 2
     assert np.mean(kept) >= least
-    assert world.background == ()
+    assert world.events.background == ()
 
 
 def test_more_than_the_published_places_enter_when_there_is_room() -> None:

@@ -69,7 +69,7 @@ def test_a_surface_adds_one_compiled_call_however_many_patches_and_vehicles(off)
     icy = SurfacePatch(ice_mm=1.0, circle=(0.0, 0.0, 20.0), air_below_c=1.0)
     added = calls(TYRES, (*roads, icy)) - off
     assert added == {
-        ("skidpad.simulation.world.world", "World._feel_road"): TICKS,
+        ("skidpad.simulation.world.wheel_grip", "WheelGrip.feel"): TICKS,
         ("skidpad.simulation.world.patches", "Patches.fill"): TICKS,
     }
     assert calls({**TYRES, "sheet_flow": True}) - off == added

@@ -13,8 +13,8 @@ from skidpad.core.vocabulary import LightState
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.simulation.world.lights import Lights
-from skidpad.simulation.world.traffic.manager import priority_of
 from skidpad.simulation.world.traffic.priority import STOP, YIELD, bake_priority
+from skidpad.simulation.world.traffic.streets import priority_of
 from support.runs import segment_run
 
 TOWN = load_map("town")
@@ -124,7 +124,7 @@ def drive_town(seed: int, seconds: float, vehicles: int) -> dict[str, float]:
         v = np.hypot(world.states.vx, world.states.vy)
         still = np.where(driven & (v < 0.3), still + 0.05, 0.0)
         longest = max(longest, float(still.max()))
-        wrecks += len(world.notices)
+        wrecks += len(world.events.notices)
         halts |= {int(world.placed["lane"][i]) for i in np.flatnonzero(driven & (v < 0.5))} & stops
     backend.close()
     return {"longest": longest, "wrecks": wrecks, "halts": len(halts), "v": float(v[driven].mean())}

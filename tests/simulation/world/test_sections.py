@@ -14,7 +14,7 @@ from skidpad.campaign.bench.traffic import FIRST_SEED, background_world
 from skidpad.campaign.bench.traffic_options import TrafficBench
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
-from skidpad.simulation.world.traffic.manager import priority_of
+from skidpad.simulation.world.traffic.streets import priority_of
 
 LARGE = next(
     (
@@ -85,7 +85,7 @@ def test_nobody_waits_for_those_behind(cut: Path) -> None:
         v = np.hypot(world.states.vx, world.states.vy)
         standing = np.where(world.states.present & (v < 0.1), standing + world.dt, 0.0)
         assert standing.max() < 90.0  # two cycles of the lights
-        assert world.put_back == ()
+        assert world.events.put_back == ()
 
 
 @pytest.mark.slow
@@ -96,7 +96,7 @@ def test_a_large_town_flows_for_an_hour() -> None:
     put_back, standing, longest = 0, np.zeros(50), 0.0
     for _ in range(72_000):
         world.step()
-        put_back += len(world.put_back)
+        put_back += len(world.events.put_back)
         v = np.hypot(world.states.vx, world.states.vy)
         standing = np.where(world.states.present & (v < 0.1), standing + world.dt, 0.0)
         longest = max(longest, float(standing.max()))

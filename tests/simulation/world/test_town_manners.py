@@ -33,7 +33,7 @@ def drive(world, seconds):
     rows, contacts = [], 0
     for _ in range(round(seconds / 0.05)):
         world.step()
-        contacts += len(world.background)
+        contacts += len(world.events.background)
         rows.append(
             (np.hypot(world.states.vx, world.states.vy), world.traffic.drivers.path[:, 0].copy())
         )

@@ -151,7 +151,7 @@ def test_ordinary_dry_traffic_stays_whole_for_500_s(seed: int) -> None:
     speeds, offsets, contacts = [], [], 0
     for _ in range(10_000):
         world.step()
-        contacts += len(world.background)
+        contacts += len(world.events.background)
         driver = world.traffic.drivers.state
         changes += int((driver["change"] < last).sum())
         last = driver["change"].copy()
@@ -187,7 +187,7 @@ def contacts_among(setup: Setup, ticks: int = 2500) -> int:
     world, found = world_without_ego(1, setup), 0
     for _ in range(ticks):
         world.step()
-        found += len(world.background)
+        found += len(world.events.background)
     return found
 
 
@@ -216,7 +216,7 @@ def test_a_wreck_is_put_back_far_from_the_ego() -> None:
     for _ in range(300):
         world.states.vx[5] = world.states.vy[5] = 0.0
         world.step()
-        notes += world.notices
+        notes += world.events.notices
         if notes:
             break
     assert "traffic_05" in notes[0]

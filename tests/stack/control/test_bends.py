@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis.strategies import floats
 
 from skidpad.campaign.runs.run import run
-from skidpad.core.run import AdasDriver, Function, Roads, RunSpec
+from skidpad.core.courses import Roads
+from skidpad.core.run import AdasDriver, Function, RunSpec
 from skidpad.core.vocabulary import SensorLevel, Tier
 from skidpad.roads.bundled import load_map
 from skidpad.stack.adas import AdasStack

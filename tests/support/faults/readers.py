@@ -243,8 +243,8 @@ def beside(path: Path) -> None:
 
 
 def read_scenario(path: Path) -> object:
-    from skidpad.campaign.driving.run_setup import check_scenario
-    from skidpad.core.run import Scenario
+    from skidpad.campaign.driving.course_file import check_scenario
+    from skidpad.core.courses import Scenario
 
     beside(path)
     return check_scenario(Scenario(file=str(path))).findings

@@ -15,7 +15,8 @@ from time import process_time_ns
 from skidpad.campaign.bench.tick import Meter, Spans
 from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.campaign.runs.run import run
-from skidpad.core.run import ActorMode, Passenger, RunSpec, Scenario
+from skidpad.core.courses import ActorMode, Scenario
+from skidpad.core.run import Passenger, RunSpec
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.scenarios.playing.stage import play_ideal

@@ -16,8 +16,9 @@ import numpy as np
 from msgspec import structs
 
 from skidpad.campaign.driving.loop import Moment, Sink, loop
-from skidpad.campaign.driving.run_setup import driver_of, stage_of
-from skidpad.campaign.runs.run import log_of
+from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.campaign.driving.stack_at_wheel import driver_of
+from skidpad.campaign.runs.log_sink import log_of
 from skidpad.core.run import AdasDriver, Render, RunSpec
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.physics.presets import find_weather

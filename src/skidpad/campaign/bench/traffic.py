@@ -10,7 +10,8 @@ import numpy as np
 from skidpad.campaign.bench.traffic_options import TrafficBench
 from skidpad.campaign.bench.traffic_watch import TrafficCounts, Watch
 from skidpad.campaign.driving.run_setup import stage_of
-from skidpad.core.run import Roads, RunSpec
+from skidpad.core.courses import Roads
+from skidpad.core.run import RunSpec
 from skidpad.core.settings.parts import load_profile
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import TrafficStart
@@ -96,8 +97,11 @@ def _drive(row: TrafficRow, world: World, seconds: float, km: float, watch: Watc
         speed = np.hypot(world.states.vx, world.states.vy)[there]
         row.km += float(speed.sum()) * DT / 1000.0
         row.hours += speed.size * DT / 3600.0
-        _count(row, [c.actor for c in world.contacts] + [c.other for c in world.background])
-        row.put_back += len(world.put_back)
+        _count(
+            row,
+            [c.actor for c in world.events.contacts] + [c.other for c in world.events.background],
+        )
+        row.put_back += len(world.events.put_back)
         row.changes += int((drivers["change"] < before).sum())
         before = drivers["change"].copy()
         if row.km >= km:

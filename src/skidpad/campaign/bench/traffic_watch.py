@@ -132,7 +132,7 @@ class Watch:
 
     def _note_moves(self) -> None:
         """Counts the vehicles that were moved on, and those of them near others in time."""
-        moved = list(self.world.moved_on)
+        moved = list(self.world.events.moved_on)
         if moved:
             close = np.minimum(self._times, times_to_neighbours(self.world))[moved] < CLOSE
             self.seen.moved += len(moved)

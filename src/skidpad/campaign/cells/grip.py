@@ -11,8 +11,9 @@ from msgspec import structs
 
 from skidpad.campaign.cells.matrix import FIRST_SEED
 from skidpad.campaign.driving.drivers import STACK, find_driver
+from skidpad.core.courses import Scenario
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import Friction, RunSpec, Scenario
+from skidpad.core.run import Friction, RunSpec
 from skidpad.core.settings.parts import load_profile
 from skidpad.core.vocabulary import GripModel, SensorLevel
 from skidpad.core.weather import Weather

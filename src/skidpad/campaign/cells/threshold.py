@@ -14,17 +14,10 @@ from typing import Any, NamedTuple
 from msgspec import structs
 
 from skidpad.campaign.cells.grip import scenario_of
+from skidpad.core.courses import ActorMode, Scenario
 from skidpad.core.errors import ConfigError, require_choice, require_range
 from skidpad.core.geometry import kmh_from_mps
-from skidpad.core.run import (
-    ActorMode,
-    AdasDriver,
-    CameraDriver,
-    DriverSpec,
-    Function,
-    RunSpec,
-    Scenario,
-)
+from skidpad.core.run import AdasDriver, CameraDriver, DriverSpec, Function, RunSpec
 from skidpad.core.text.told import describe_value
 from skidpad.core.vocabulary import GripModel, SensorLevel
 from skidpad.physics.grip import statistical_ratio

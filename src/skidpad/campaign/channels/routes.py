@@ -12,9 +12,10 @@ from typing import Any
 
 from msgspec import structs
 
+from skidpad.core.courses import Route
 from skidpad.core.errors import require_choice
 from skidpad.core.files.reading import convert_plain, decode_yaml
-from skidpad.core.run import ChannelCrew, Route, RunSpec
+from skidpad.core.run import ChannelCrew, RunSpec
 from skidpad.core.vocabulary import SensorLevel, Stratum
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import preset

@@ -7,11 +7,13 @@ from math import hypot
 
 import numpy as np
 
-from skidpad.campaign.driving.run_setup import ego_model, setup_of
+from skidpad.campaign.driving.run_setup import setup_of
+from skidpad.campaign.driving.stack_at_wheel import ego_model
+from skidpad.core.courses import Route
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
 from skidpad.core.maths.randomness import stream
-from skidpad.core.run import ChannelCrew, Route, RunSpec
+from skidpad.core.run import ChannelCrew, RunSpec
 from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
 from skidpad.core.vocabulary import Control, Stratum, TrafficStart
 from skidpad.physics.types import EGO_TYPE, traffic_types, vehicle_type

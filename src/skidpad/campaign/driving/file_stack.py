@@ -25,7 +25,8 @@ from skidpad.core.states import ActorStates, ActorTable, EgoEstimate, VehicleCom
 from skidpad.core.text.told import describe_value
 from skidpad.core.vocabulary import RangeModel
 from skidpad.core.weather import Weather
-from skidpad.envelope.govern import EnvelopeSettings, govern
+from skidpad.envelope.envelope import EnvelopeSettings
+from skidpad.envelope.govern import govern
 from skidpad.physics.presets import find_weather
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.queries import RoadMap

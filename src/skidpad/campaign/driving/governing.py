@@ -10,7 +10,8 @@ from skidpad.core.run import AdasDriver, RunSpec
 from skidpad.core.setup import Setup
 from skidpad.core.vocabulary import Govern, RangeModel
 from skidpad.core.weather import Weather
-from skidpad.envelope.govern import EnvelopeSettings, govern
+from skidpad.envelope.envelope import EnvelopeSettings
+from skidpad.envelope.govern import govern
 from skidpad.envelope.govern_kernel import ORACLE_STEP, TABLE_KMH
 from skidpad.envelope.limits import Binding
 from skidpad.physics.grip import mu_at, road_of

@@ -9,12 +9,13 @@ from math import asin, atan2, cos, degrees, log, pi, radians, sin
 
 from msgspec import structs
 
+from skidpad.core.courses import Scenario
 from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import CheckpointError, FileError
 from skidpad.core.frames import Frame
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Outside
-from skidpad.core.run import RunSpec, Scenario
+from skidpad.core.run import RunSpec
 from skidpad.core.setup import ActorCommand, Setup
 from skidpad.core.simulator import BackendKind
 from skidpad.core.states import VehicleCommand, WorldTruth

@@ -4,19 +4,18 @@
 and truth are those of the last one. Its frame, the reports of driver and stack, and the supervisor's truth
 stay those of the last tick that the stepper drove. Contacts, crossed markings, changes of lights,
 departures, an ego that stands without a reason, and vehicles that are put elsewhere end the call; the
-stepper then drives that tick. `find_parts` says which runs have no quick way.
+stepper then drives that tick. `find_parts` of `quick_parts` says which runs have no quick way.
 """
 
 from __future__ import annotations
 
 from collections.abc import Generator, Sequence
-from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from skidpad.campaign.driving.loop import Arrival, Stepper, Timer, Unsupervised
-from skidpad.campaign.driving.outdoors import ChangedBackend, FileChanges
+from skidpad.campaign.driving.loop import Stepper
+from skidpad.campaign.driving.outdoors import FileChanges
 from skidpad.campaign.driving.quick_kernel import (
     ARRIVED,
     DONE,
@@ -33,44 +32,29 @@ from skidpad.campaign.driving.quick_kernel import (
     Tables,
     drive_ticks,
 )
-from skidpad.campaign.driving.run_setup import StackAtWheel
+from skidpad.campaign.driving.quick_parts import QuickParts, find_parts, make_rules
 from skidpad.core.errors import StackError
 from skidpad.core.kernels.calls import find_address
 from skidpad.core.kernels.jit import Held, hold
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import LightState, Supervision
-from skidpad.envelope.belief import COLD_C
-from skidpad.envelope.govern import GovernedStack
 from skidpad.envelope.govern_kernel import NOTHING_TOLD, find_limits, keep_inside
 from skidpad.envelope.sight import Motion
 from skidpad.recording.run.ticks import TickArrays, TickLog, copy_actors
 from skidpad.scenarios.playing.table import hold_no_story
 from skidpad.scenarios.playing.table_kernel import Table, play_tick
-from skidpad.sensors.object_level.objects import ObjectSuite, sense
-from skidpad.simulation.embedded.engine import EmbeddedBackend
-from skidpad.simulation.recovery import (
-    HOLDING,
-    LIGHT_REACH,
-    Action,
-    Supervisor,
-    find_ego,
-    has_reason,
-    stops_of,
-)
-from skidpad.simulation.sensing import Objects
+from skidpad.sensors.object_level.objects import sense
+from skidpad.simulation.recovery import Action, find_ego
+from skidpad.simulation.standing import has_reason, stops_of
 from skidpad.simulation.world.feel import feel_motion
-from skidpad.simulation.world.step import DECIDE, MOVE, advance
+from skidpad.simulation.world.step import advance
 from skidpad.simulation.world.touch import EGO
-from skidpad.simulation.world.world import World
-from skidpad.stack.adas import AdasStack
-from skidpad.stack.loading import GuardedStack
 from skidpad.stack.perception.lights import heed_light
 from skidpad.stack.road import read_road
 from skidpad.stack.think import think
 
 NO_WAY = np.zeros((0, 3))
-ANOTHER_SIMULATOR = "another simulator drives"
 STILL = Motion(*(0.0,) * 9, (0.0,) * 4)  # of the type that the envelope's kernels take
 
 Returned = tuple[int, int, int, int, float, float, float, bool, int, float, float, int]
@@ -101,76 +85,6 @@ def make_calls(calls: Calls) -> int:
             call = calls.send(drive_ticks(*call[:-1], *call.last))
     except StopIteration as end:
         return int(end.value)
-
-
-class QuickParts(NamedTuple):
-    """What of a run takes part in its quick way.
-
-    timer: counts the ticks of a run whose world a kernel steps; None: it is stepped here, as a story is asked
-    or patches, wind or roll-over are looked at in each tick; while a table holds the story, in a kernel, too.
-    way: of a run that ends with it.
-    changed: the backend of one with a script, and the file's changes.
-    """
-
-    backend: EmbeddedBackend
-    world: World
-    suite: ObjectSuite
-    guard: GuardedStack
-    stack: AdasStack
-    governed: GovernedStack | None  # what keeps the stack inside an envelope
-    supervisor: Supervisor | None
-    timer: Timer | None
-    way: Arrival | None
-    changed: tuple[ChangedBackend, FileChanges] | None
-
-
-def find_parts(stepper: Stepper, changes: FileChanges | None = None) -> QuickParts | str:
-    """Returns the parts of a run that has begun; else the first reason for which it has no quick way.
-
-    changes: of a file that is played.
-    """
-    driver, script = stepper.driver, stepper.script
-    backend: object = stepper.backend
-    changed: tuple[ChangedBackend, FileChanges] | None = None
-    if isinstance(backend, ChangedBackend) and changes is not None and script is changes.player:
-        changed = backend, changes
-        backend = backend.inner
-    if isinstance(backend, ChangedBackend):
-        return "the world is changed from outside"
-    if type(backend) is not EmbeddedBackend:
-        return ANOTHER_SIMULATOR
-    sensing, supervisor = backend.sensing, stepper.supervisor
-    if type(sensing) is not Objects:
-        return "its sensors are pixels, or a radar with noise"
-    if type(driver) is not StackAtWheel:
-        return "another driver is at the wheel"
-    outer, suite, timer, way = driver.stack.stack, sensing.suite, None, None
-    governed = outer if isinstance(outer, GovernedStack) else None
-    stack = outer if governed is None else governed.inner
-    if type(stack) is not AdasStack:
-        return "another stack drives"
-    if stack.config.dt != backend.world.dt:
-        return "the steps of its stack have another length"
-    if reason := stack.why_not_quick() or (governed and governed.why_not_quick()):
-        return reason
-    if not backend.has_common_frames or suite.hold_common(backend.world.states) is None:
-        return "it has other sensors than the common ones, or its localisation is noisy"
-    if type(supervisor) not in (Supervisor, Unsupervised):
-        return "another supervisor looks on, or a person is at the controls"
-    supervising = supervisor if isinstance(supervisor, Supervisor) else None
-    if changed is None:
-        ending = script.script if type(script) is Timer else script
-        if type(script) is not Timer or not (ending is None or type(ending) is Arrival):
-            return "a script is followed in each tick"
-        if backend.steps_alone:
-            timer, way = script, ending
-    for sink in stepper.sinks:
-        if sink.sees_all:
-            return f"{type(sink).__name__} is shown each tick"
-    world = backend.world
-    return QuickParts(
-        backend, world, suite, driver.stack, stack, governed, supervising, timer, way, changed
-    )
 
 
 class QuickDrive:
@@ -241,7 +155,7 @@ class QuickDrive:
         while driven < min(most, arrays.left) and not script.ended:
             assert stepper.action is not None
             begun = begun or self._make_step(stepper.action.command, stepper.words)
-            if not (begun and world.is_quiet and world.lights.by_id is shown):
+            if not (begun and world.events.is_empty and world.lights.by_id is shown):
                 stepper.next_frame = inner.read_frame()
                 break
             story, n = self._story_ahead(min(most, arrays.left) - driven)
@@ -292,7 +206,7 @@ class QuickDrive:
             last, driven = stop.request, driven + stop.ticks
             if stop.why in (MOVED, STEPPED):
                 world.finish_step(stop.touches, stop.crossed, settled=stop.why == STEPPED)
-                begun = world.is_quiet and lights.by_id is shown
+                begun = world.events.is_empty and lights.by_id is shown
                 if begun:
                     continue
             if stop.why == REFUSED:
@@ -381,37 +295,10 @@ class QuickDrive:
         except StackError as failure:
             self.stepper.failure = failure
 
-    def _rules(self, arrays: TickArrays) -> Rules:
-        """Returns what holds in all ticks of a call."""
-        world, stack, supervisor = self.parts.world, self.parts.stack, self.parts.supervisor
-        far, stuck = (inf, inf) if world.traffic is None else world.traffic.limits()
-        governed = self.parts.governed
-        governs = governed is not None and governed.envelope.rules.acts  # and tells it anew
-        stage, air_c = (0, 0.0) if governed is None else self.parts.backend.read_air()
-        return Rules(
-            dt=world.dt,
-            substeps=world.fleet.steps,
-            moving=MOVE if self.parts.timer is None else DECIDE | MOVE,
-            weather=arrays.weather,
-            bumper_first=self.parts.suite.camera_ids[0] == stack.cameras.bumper.depth_id,
-            supervised=supervisor is not None,
-            stuck_speed=0.0 if supervisor is None else supervisor.settings.stuck_speed,
-            stuck_time=inf if supervisor is None else supervisor.settings.stuck_time,
-            holding=sum(1 << tier for tier in HOLDING),
-            reach=LIGHT_REACH,
-            v_told=inf if governs else stack.v_told,
-            far=far,
-            stuck=stuck,
-            assists=stack.assists,
-            hsv_required=stack.lock.hsv_required,
-            stage=stage,
-            is_cold=air_c < COLD_C,
-        )
-
     def _join(self, arrays: TickArrays) -> Held[Joined]:
         """Returns what the kernel is given; it is held anew when a part of it is another object."""
         world, suite, stack = self.parts.world, self.parts.suite, self.parts.stack
-        road, lights, rules = stack.road, world.lights, self._rules(arrays)
+        road, lights, rules = stack.road, world.lights, make_rules(self.parts, arrays.weather)
         places = NO_WAY if self.parts.way is None else self.parts.way.journey.places
         common = suite.hold_common(world.states)
         assert common is not None, "find_parts has asked for it"

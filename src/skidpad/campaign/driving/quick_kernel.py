@@ -31,7 +31,8 @@ from skidpad.roads.journeys import come_by
 from skidpad.roads.kernels import LaneArrays
 from skidpad.scenarios.playing.table_kernel import Table, play_tick
 from skidpad.sensors.object_level.objects import Common, sense
-from skidpad.simulation.recovery import WRONG_WAY_DOT, find_ego, has_reason, is_slow
+from skidpad.simulation.recovery import WRONG_WAY_DOT, find_ego
+from skidpad.simulation.standing import has_reason, is_slow
 from skidpad.simulation.world.feel import Felt, feel_motion
 from skidpad.simulation.world.lights import ROUNDING
 from skidpad.simulation.world.step import SETTLE, Arena, advance

@@ -2,49 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from copy import deepcopy
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from math import isfinite, nan, radians
-from pathlib import Path
-from typing import Any
 
-from msgspec import structs
-from msgspec.json import encode
-
-from skidpad.campaign.driving.file_drivers import FILE_DRIVERS
-from skidpad.campaign.driving.file_stack import NAME as STACK_NAME
-from skidpad.campaign.driving.file_stack import PilotConditions, PilotMaker
-from skidpad.campaign.driving.governing import apply_envelope
+from skidpad.campaign.driving.course_file import load_scenario
+from skidpad.campaign.driving.file_stack import PilotConditions
 from skidpad.campaign.driving.loop import Arrival, Script, Supervising, Timer, Unsupervised
 from skidpad.campaign.driving.outdoors import lay_beside
-from skidpad.campaign.driving.sharing import find_shared
 from skidpad.campaign.driving.starts import start_of
 from skidpad.campaign.user_files import road_file
+from skidpad.core.courses import ActorMode, Roads, Scenario
 from skidpad.core.environment.lidar_effects import LidarEffects
-from skidpad.core.errors import ConfigError, FileError, StackError
-from skidpad.core.frames import SensorFrame
+from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.geometry import Pose, kmh_from_mps
-from skidpad.core.run import (
-    ActorMode,
-    AdasDriver,
-    AgentDriver,
-    CameraDriver,
-    Passenger,
-    ReferenceDriver,
-    Render,
-    Roads,
-    RunSpec,
-    Scenario,
-    StackDriver,
-)
+from skidpad.core.run import AgentDriver, Passenger, Render, RunSpec, StackDriver
 from skidpad.core.settings.parts import NightRain, Relocation, TrafficSettings
 from skidpad.core.setup import ActorSetup, CameraOptics, Setup, TrafficSetup, Wind
 from skidpad.core.simulator import BackendKind
-from skidpad.core.states import ActorTable, StackReport, VehicleCommand
 from skidpad.core.text.told import describe_value
 from skidpad.core.vocabulary import Control, Outcome
-from skidpad.physics.types import EGO_TYPE, vehicle_type
+from skidpad.physics.types import EGO_TYPE
 from skidpad.physics.wind import wind_of_intensity
 from skidpad.roads.bundled import load_map
 from skidpad.roads.journeys import Journey
@@ -52,59 +29,11 @@ from skidpad.roads.queries import RoadMap
 from skidpad.scenarios import scenario as scenarios
 from skidpad.scenarios.playing.disturbing import Disturbances, read_disturbances
 from skidpad.scenarios.playing.player import Player, setups
-from skidpad.scenarios.registry import Names
-from skidpad.scenarios.shipped import NAMES, scenario_file
-from skidpad.sensors.pictures.overlay import Lens
 from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.simulation.recovery import RecoverySettings, Supervisor
-from skidpad.stack.adas import AdasStack
-from skidpad.stack.agents import load_agent
-from skidpad.stack.channels.settings import CarModel
-from skidpad.stack.interface import Stack
-from skidpad.stack.loading import GuardedStack, import_class, load_stack
 
 CRUISE = "cruise_speed"  # property of a scenario's ego, m/s
 ROUTE_LENGTH = "route_length"  # another one, m
-
-
-class StackAtWheel:
-    """A stack that drives: it is given frames, and never the truth."""
-
-    def __init__(self, stack: GuardedStack, lens: Lens | None = None) -> None:
-        """lens: with rain drops on it, before all cameras (B-160)."""
-        self.stack, self.lens = stack, lens
-
-    @property
-    def report(self) -> StackReport:
-        """Returns what the stack reports of its last tick."""
-        return self.stack.report
-
-    @property
-    def mode(self) -> str:
-        """Returns the stack's mode in its own words."""
-        return self.stack.mode
-
-    def begin(self, table: ActorTable) -> None:
-        """Does nothing: a stack does not know the other actors."""
-
-    def act(self, frame: SensorFrame) -> VehicleCommand:
-        """Returns the stack's answer to the frame."""
-        if self.lens is not None:
-            images, extra = self.lens.add_drops(frame.images), self.lens.add_drops(frame.extra)
-            frame = replace(frame, images=images, extra=extra)
-        return self.stack.tick(frame)
-
-
-class Seated:
-    """Drives nothing: the scenario moves the ego."""
-
-    def __init__(self, specs: object, map: object, settings: object) -> None:
-        del specs, map, settings
-
-    def tick(self, frame: SensorFrame) -> VehicleCommand:
-        """Returns a command with no pedal pressed."""
-        del frame
-        return VehicleCommand()
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,67 +185,6 @@ def _pilot_conditions(spec: RunSpec) -> PilotConditions:
     )
 
 
-def load_scenario(
-    course: Scenario, conditions: Callable[[], PilotConditions] = PilotConditions
-) -> scenarios.Scenario:
-    """Returns the compiled file of a course; ScenarioError lists all that keeps it from being played.
-
-    conditions: gives those in which stacks of other actors drive. Within `share_setups` runs share a file
-    that names no code.
-    """
-
-    def compile_file() -> tuple[scenarios.Scenario, bool]:
-        names = _names_of(course, conditions())
-        found = check_scenario(course, names=names).playable()
-        read_disturbances(course.disturb, found)  # what is wrong in them is said here
-        return found, not names.asked and not course.register
-
-    file = file_of(course)
-    changed = file.stat().st_mtime_ns if file.is_file() else 0
-    key = encode(structs.replace(course, draws={}), order="deterministic"), file, changed
-    return find_shared(key, compile_file)
-
-
-def file_of(course: Scenario) -> Path:
-    """Returns the file of a course: one of the catalogue by its name, else by its path."""
-    return scenario_file(course.file) if course.file in NAMES else Path(course.file)
-
-
-def check_scenario(course: Scenario, names: Names | None = None) -> scenarios.Compiled:
-    """Returns the check of a course's file, with everything that was found, playable or not.
-
-    names: that the file may use; None: those that the course says.
-    """
-    return scenarios.check(
-        file_of(course),
-        course.parameters,
-        course.ego,
-        maps=[Path(folder) for folder in course.maps],
-        ignore_unsupported=course.ignore_unsupported,
-        lenient=course.lenient,
-        names=_names_of(course, PilotConditions()) if names is None else names,
-    )
-
-
-def _names_of(course: Scenario, conditions: PilotConditions) -> Names:
-    """Returns the names that a course's file may use."""
-    own = {**FILE_DRIVERS, STACK_NAME: PilotMaker(conditions)}
-    return Names({**own, **_load_registered(course.register)}, strict=course.strict)
-
-
-def _load_registered(texts: Sequence[str]) -> dict[str, type[Any]]:
-    """Returns the classes that a user gives names, of texts NAME=module:Class; ConfigError otherwise."""
-    found = {}
-    for text in texts:
-        name, equals, where = text.partition("=")
-        if not equals or not name:
-            raise ConfigError(
-                f"--register takes NAME=module:Class, got {describe_value(text, 200)}"
-            )
-        found[name] = import_class(where, "class")
-    return found
-
-
 def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
     """Returns the set-up that the run's settings and weather ask for, without actors and traffic."""
     world, sensors = spec.settings.world, spec.settings.sensors
@@ -395,81 +263,3 @@ def recovery_settings(s: TrafficSettings) -> RecoverySettings:
     if s.relocation is Relocation.STANDING:
         return RecoverySettings(warm_up=1.5, release_speed=0.0, clearance=s.clearance)
     return RecoverySettings(clearance=s.clearance)
-
-
-def driver_of(spec: RunSpec, stage: Stage, kind: type[Stack] | None = None) -> StackAtWheel:
-    """Returns the driver of a run, built; StackError when it cannot be. kind: its class, if loaded."""
-    found, settings = _class_of(spec, stage, kind)
-    # our own stack gives the map's arrays to kernels, which know one type of array
-    chosen = kind or found
-    map = stage.map if chosen is AdasStack else stage.map.read_only()
-    chosen = apply_envelope(chosen, spec, stage.setup)
-    common = tuple(spec for spec in stage.setup.specs if spec.id not in stage.setup.asked)
-    stack = GuardedStack(chosen, common, map, settings)
-    return StackAtWheel(stack, Lens(spec.weather, spec.seed) if spec.overlay else None)
-
-
-def _class_of(
-    spec: RunSpec, stage: Stage, kind: type[Stack] | None
-) -> tuple[type[Stack], Mapping[str, object]]:
-    """Returns the driver's class and its settings; ConfigError for channels, which need a route.
-
-    kind: the class, if loaded, as a user's file runs once.
-    """
-    driver = spec.driver
-    cruise = {} if stage.cruise_kmh is None else {"cruise_kmh": stage.cruise_kmh}
-    match driver:
-        case StackDriver():
-            # a copy: whatever it does to them
-            return kind or load_stack(driver.where), {**cruise, **deepcopy(driver.options)}
-        case AgentDriver():
-            return load_agent(driver.where), {}
-        case Passenger():
-            return Seated, {}
-        case CameraDriver():
-            from skidpad.stack.camera import driver as camera  # its network is read with it
-
-            return camera.CameraDriver, cruise
-        case ReferenceDriver():
-            from skidpad.stack.reference.driver import ReferenceStack
-
-            return ReferenceStack, {"seed": spec.seed, "car": asdict(ego_model()), **cruise}
-        case AdasDriver():
-            if driver.cruise_kmh is not None:
-                cruise = {"cruise_kmh": driver.cruise_kmh}
-            return AdasStack, {
-                "functions": [*sorted(f.value for f in driver.functions), *driver.added],
-                "profile": spec.settings.profile,
-                "set": spec.settings.stack.to_plain(),
-                **cruise,
-            }
-    raise ConfigError(f"{driver.label} needs a route to drive")
-
-
-def ego_model() -> CarModel:
-    """Returns what a driver knows of the ego's car."""
-    t = vehicle_type(EGO_TYPE)
-    return CarModel(
-        length=t.length,
-        width=t.width,
-        wheelbase=t.wheelbase,
-        steer_max=t.steer_max,
-        a_drive=t.a_drive,
-        a_brake=t.a_brake,
-    )
-
-
-def with_sensors(setup: Setup, stack: GuardedStack) -> Setup:
-    """Returns the set-up with the further sensors that the stack asks for (L-3).
-
-    A sensor that is there already as another stack asked for it is shared; StackError for a name
-    that stands for another one.
-    """
-    there = {spec.id: spec for spec in setup.specs}
-    wanted = stack.sensors()
-    for spec in wanted:
-        if there.get(spec.id, spec) != spec:
-            raise StackError(f"{stack.name}.sensors(): {spec.id!r} is another sensor already")
-    more = tuple(spec for spec in wanted if spec.id not in there)
-    asked = setup.asked | {spec.id for spec in wanted}
-    return replace(setup, specs=(*setup.specs, *more), asked=asked)

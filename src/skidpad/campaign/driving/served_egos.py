@@ -15,7 +15,8 @@ from skidpad.core.geometry import Pose
 from skidpad.core.specs import RadarSpec
 from skidpad.core.states import EgoEstimate, VehicleCommand
 from skidpad.core.vocabulary import Govern
-from skidpad.envelope.govern import AIR_ID, RAIN_ID, GovernedStack
+from skidpad.envelope.envelope import AIR_ID, RAIN_ID
+from skidpad.envelope.govern import GovernedStack
 from skidpad.physics.grip import rain_rate
 from skidpad.sensors.outside import read_thermometer, thermometer_error, wiper_stage
 from skidpad.sensors.ranging.beam import beam_of

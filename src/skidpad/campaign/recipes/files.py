@@ -13,12 +13,13 @@ from pathlib import Path
 from msgspec import structs
 
 from skidpad.campaign.cells.grip import scenario_of
+from skidpad.campaign.driving.course_file import load_scenario
 from skidpad.campaign.driving.outdoors import in_weather_of_file
-from skidpad.campaign.driving.run_setup import load_scenario
 from skidpad.campaign.recipes.grip import recipe
 from skidpad.campaign.recipes.recipe import nothing_else
+from skidpad.core.courses import Scenario
 from skidpad.core.errors import FileError
-from skidpad.core.run import Friction, RunSpec, Scenario
+from skidpad.core.run import Friction, RunSpec
 from skidpad.core.weather import Weather
 from skidpad.scenarios.reading.distributions import choices, is_distribution
 from skidpad.scenarios.reading.document import holds

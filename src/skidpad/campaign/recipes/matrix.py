@@ -11,8 +11,9 @@ from skidpad.campaign.driving.pace import Pace
 from skidpad.campaign.recipes.recipe import Driven, Recipe, find_reason
 from skidpad.campaign.runs.folder import Stopwatch, fresh_folder, last_line, write_config, write_run
 from skidpad.campaign.user_files import road_file, with_kept_map
+from skidpad.core.courses import Roads
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import AdasDriver, Function, Roads, RunSpec
+from skidpad.core.run import AdasDriver, Function, RunSpec
 from skidpad.core.settings.parts import LaneTruth
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Outcome, SensorLevel
@@ -28,7 +29,7 @@ TIMES_OF_DAY = ("sunrise", "noon", "night")
 
 def warm_up() -> None:
     """Compiles every kernel that a run may need, by driving a moment of each kind."""
-    from skidpad.campaign.runs.run import drive
+    from skidpad.campaign.runs.drive import drive
     from skidpad.evidence.drive.metrics import run_metrics
     from skidpad.roads.bundled import load_map
 

@@ -24,8 +24,8 @@ from skidpad.campaign.recipes.grip import drive_and_judge
 from skidpad.campaign.recipes.recipe import Driven, Recipe, find_reason
 from skidpad.campaign.runs.folder import last_line
 from skidpad.campaign.workers.worker import Job, Runner
+from skidpad.core.courses import ActorMode
 from skidpad.core.geometry import kmh_from_mps
-from skidpad.core.run import ActorMode
 from skidpad.core.vocabulary import Outcome
 from skidpad.recording.campaign.folder import RUNS
 from skidpad.recording.campaign.grip import GripMetrics

@@ -7,8 +7,9 @@ from functools import partial
 from typing import Any, TypeVar, overload
 
 from skidpad.campaign.driving.sharing import share_setups
+from skidpad.campaign.runs.drive import describe, drive
 from skidpad.campaign.runs.folder import last_line
-from skidpad.campaign.runs.run import Run, describe, drive, run
+from skidpad.campaign.runs.run import Run, run
 from skidpad.campaign.runs.together import drive_together
 from skidpad.campaign.workers.pool import run_jobs
 from skidpad.campaign.workers.worker import Job

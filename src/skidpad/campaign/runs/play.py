@@ -6,14 +6,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from skidpad.campaign.driving.backends import WATCHDOG, keep_server, make_backend
-from skidpad.campaign.driving.run_setup import load_scenario
+from skidpad.campaign.driving.course_file import load_scenario
 from skidpad.campaign.runs.folder import write_drive
 from skidpad.campaign.runs.run import Run, run
 from skidpad.campaign.user_files import keep_road
 from skidpad.campaign.workers.pool import run_jobs
 from skidpad.campaign.workers.worker import Job
+from skidpad.core.courses import Scenario
 from skidpad.core.errors import BackendError
-from skidpad.core.run import RunSpec, Scenario
+from skidpad.core.run import RunSpec
 from skidpad.core.simulator import BackendKind
 from skidpad.recording.files import require_free
 

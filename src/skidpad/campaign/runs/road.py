@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from skidpad.campaign.driving.run_setup import load_scenario
+from skidpad.campaign.driving.course_file import load_scenario
 from skidpad.campaign.runs.stored import read_run
+from skidpad.core.courses import Roads, Scenario
 from skidpad.core.errors import FileError, InputError
-from skidpad.core.run import Roads, Scenario
 from skidpad.recording.run.log import LogHeader
 from skidpad.roads.bundled import KEPT, bundled_maps, load_map
 from skidpad.roads.queries import RoadMap

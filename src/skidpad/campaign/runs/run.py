@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -12,59 +12,34 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.campaign.cells.matrix import describe_run
 from skidpad.campaign.driving.backends import make_backend
-from skidpad.campaign.driving.drivers import describe_driver
 from skidpad.campaign.driving.loop import Driver, Moment, Sink, Stepper
 from skidpad.campaign.driving.outdoors import ChangedBackend, FileChanges, branch_backend
-from skidpad.campaign.driving.quick import (
-    ANOTHER_SIMULATOR,
-    Calls,
-    QuickDrive,
-    find_parts,
-    make_calls,
-)
+from skidpad.campaign.driving.quick import Calls, QuickDrive, make_calls
+from skidpad.campaign.driving.quick_parts import ANOTHER_SIMULATOR, find_parts
 from skidpad.campaign.driving.readings import ReadingsRecorder
-from skidpad.campaign.driving.run_setup import (
-    StackAtWheel,
-    Stage,
-    driver_of,
-    stage_of,
-    with_sensors,
-)
+from skidpad.campaign.driving.run_setup import Stage, stage_of
 from skidpad.campaign.driving.snapshots import Snapshots
+from skidpad.campaign.driving.stack_at_wheel import StackAtWheel, driver_of, with_sensors
 from skidpad.campaign.runs.checkpoints import RunCheckpoint
+from skidpad.campaign.runs.log_sink import log_of
 from skidpad.campaign.runs.state_files import CheckpointWriter
 from skidpad.campaign.takeover.desk import Desk, DeskBackend, DeskDriver, DeskScript, DeskSupervisor
-from skidpad.core.environment.surface import SurfacePatch, present_patches
-from skidpad.core.errors import CheckpointError, StackError, require_choice
-from skidpad.core.run import (
-    DriverSpec,
-    Roads,
-    RunSpec,
-    StackDriver,
-)
-from skidpad.core.settings.parts import load_profile
-from skidpad.core.settings.setting import Plain
-from skidpad.core.simulator import BackendChoice, BackendKind
-from skidpad.core.states import ActorTable
+from skidpad.core.environment.surface import SurfacePatch
+from skidpad.core.errors import CheckpointError, StackError
+from skidpad.core.run import RunSpec
+from skidpad.core.simulator import BackendKind
 from skidpad.core.text.told import clean
-from skidpad.core.vocabulary import Outcome, SensorLevel, TrafficStart
-from skidpad.core.weather import Weather
-from skidpad.evidence.drive.background import UNSEEN
-from skidpad.physics.presets import find_weather
-from skidpad.recording.run.events import NoticeSource, Relocation
-from skidpad.recording.run.log import LogHeader, RunLog
+from skidpad.core.vocabulary import Outcome
+from skidpad.recording.run.events import NoticeSource
+from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.readings import SensorReadings
 from skidpad.recording.run.surfaces import LaidSurface
-from skidpad.recording.run.ticks import TickLog
 from skidpad.roads.queries import RoadMap
 from skidpad.scenarios.playing.player import Played
 from skidpad.simulation.backend import Backend
 from skidpad.stack.interface import Stack
-from skidpad.stack.loading import load_stack
 
-DESK_ROOM = 12_000  # ticks of a log at first, as nobody knows how long a person drives
 LONGEST_STORY = 20_000  # characters of a traceback
 
 
@@ -111,178 +86,6 @@ class Run:
             f"<Run of {about.get('config', 'a driver')}: {self.outcome.value} after "
             f"{len(log) * log.header.dt:g} s on {where}; {len(log.contacts)} contacts of the ego>"
         )
-
-
-def drive(
-    stack: type[Stack] | str | int,
-    *,
-    map: str | Path = "figure8",
-    weather: str | Weather = "clear-noon",
-    seed: int = 1,
-    duration: float = 500.0,
-    traffic: str = "fixed",
-    vehicles: int = 20,
-    route_km: float = 0.0,
-    sensors: str = "pixels",
-    profile: str = "recommended",
-    settings: Mapping[str, Plain] | None = None,
-    stack_settings: Mapping[str, object] | None = None,
-    out: str | Path | None = None,
-    backend: BackendChoice | None = None,
-) -> Run:
-    """Drive a stack on a map with traffic; the defaults are those of `skidpad adas`.
-
-    Args:
-        stack: a class with the stack interface, or what `--stack` takes: 0 to 4 for a published
-            configuration, "reference", "camera", "module:Class", "FILE.py:Class".
-        map: a bundled map's name, or an OpenDRIVE file.
-        weather: a preset's name, a weather file (.yaml), or a weather.
-        seed: of traffic and noise; the same seed gives the same log.
-        duration: simulated seconds. 500 s take minutes with pixels, and seconds with objects.
-        traffic: "fixed", "random" or "pack": where background vehicles begin and stay.
-        vehicles: how many there are, 0 to 80.
-        route_km: the run ends after so many km along the road, as `--route-km`; 0: no end.
-        sensors: "pixels" for real images, or "objects", which is much faster.
-        profile: "recommended", "thesis_text", "thesis_listing" or "preliminary".
-        settings: single settings over the profile, as `--set`; `skidpad profiles` lists them.
-        stack_settings: what your own class is given as its settings, as `--stack-set`.
-        out: a folder for pictures of collisions; None keeps everything in memory.
-        backend: the simulator; None is the embedded one.
-
-    Returns:
-        The log, how the drive ended, and what it left behind. A stack that fails is an outcome.
-
-    Raises:
-        ConfigError: a value is out of its range, or is no name that exists.
-        FileError: a map, weather or stack file is not there, or cannot be read.
-
-    Example:
-        >>> run = drive("examples/follow_lane.py:FollowLane", weather="rain-night",
-        ...             duration=60, sensors="objects", stack_settings={"cruise_kmh": 60})
-        >>> run.outcome.value, len(run.log.contacts)
-    """
-    spec, kind = describe(
-        stack,
-        map=map,
-        weather=weather,
-        seed=seed,
-        duration=duration,
-        traffic=traffic,
-        vehicles=vehicles,
-        route_km=route_km,
-        sensors=sensors,
-        profile=profile,
-        settings=settings,
-        stack_settings=stack_settings,
-        backend=backend,
-    )
-    return run(spec, kind, folder=None if out is None else Path(out))
-
-
-def describe(
-    stack: type[Stack] | str | int,
-    *,
-    map: str | Path,
-    weather: str | Weather,
-    seed: int,
-    duration: float,
-    traffic: str,
-    vehicles: int,
-    route_km: float,
-    sensors: str,
-    profile: str,
-    settings: Mapping[str, Plain] | None,
-    stack_settings: Mapping[str, object] | None,
-    backend: BackendChoice | None,
-) -> tuple[RunSpec, type[Stack] | None]:
-    """Returns the run that `drive` drives for these arguments, and its stack's class; None: one of ours."""
-    driver, kind = _name_driver(stack, dict(stack_settings or {}))
-    words = [v.value for v in SensorLevel], [v.value for v in TrafficStart]
-    template = RunSpec(
-        course=Roads(
-            map=str(map),
-            traffic=TrafficStart(require_choice("traffic", traffic, words[1])),
-            vehicles=vehicles,
-            route_km=route_km,
-        ),
-        duration=duration,
-        settings=load_profile(profile, settings),
-        sensors=SensorLevel(require_choice("sensors", sensors, words[0])),
-        backend=BackendChoice() if backend is None else backend,
-    )
-    outside = find_weather(weather) if isinstance(weather, str) else weather
-    return describe_run(driver, outside, seed, template), kind
-
-
-def _name_driver(
-    stack: type[Stack] | str | int, options: dict[str, Any]
-) -> tuple[DriverSpec, type[Stack] | None]:
-    """Returns the driver of a stack by class, name or number, and its class; None for one of ours."""
-    if isinstance(stack, (str, int)):
-        driver = describe_driver(stack, options)
-        return driver, load_stack(driver.where) if isinstance(driver, StackDriver) else None
-    return StackDriver(f"{stack.__module__}:{stack.__qualname__}", options), stack
-
-
-class Log(Sink):
-    """The tick log of a run as a sink. changes: of a file that may change the weather."""
-
-    changes: FileChanges | None = None
-    sees_all = False
-
-    def __init__(self, header: LogHeader, weather: str, ticks: int) -> None:
-        self.header, self.weather, self.ticks = header, weather, ticks
-        self.laid: list[LaidSurface] = []  # by events of a file
-
-    def begin(self, table: ActorTable) -> None:
-        """Makes room for as many ticks as the run may have."""
-        self.log = TickLog(table, self.header, self.weather, self.ticks)
-
-    def see(self, moment: Moment) -> None:
-        """Appends the moment and the notices, relocation and weather that came with it (A-194)."""
-        frame, truth, action = moment.frame, moment.truth, moment.action
-        if self.changes is not None and self.changes.done:
-            self.log.set_weather(self.changes.weather.name)
-            self._note_surface(truth.tick, self.changes)
-        self.log.append(truth, frame, moment.command, moment.report, frame.supervision)
-        for text in truth.notices:
-            self.log.notice(truth.tick, NoticeSource.TRAFFIC, text)
-        for text in () if self.changes is None else self.changes.new_notices():
-            self.log.notice(truth.tick, NoticeSource.SCENARIO, text)
-        if action.notice:
-            self.log.notice(truth.tick, NoticeSource.SUPERVISOR, action.notice)
-        if action.relocate is not None and action.relocate.moved is not None:
-            m = action.relocate.moved
-            self.log.relocated(Relocation(truth.tick, m.reason, m.shift, m.old, m.new))
-
-    def pass_ticks(self, ticks: int) -> None:
-        """Takes in rows that a kernel has written."""
-        self.log.add(ticks)
-
-    def _note_surface(self, tick: int, changes: FileChanges) -> None:
-        """Notes what the events of a file have laid on the road since the tick before."""
-        patches, last = changes.outside.patches, self.laid[-1].surface if self.laid else None
-        if not changes.serves_surface or patches is None:
-            return
-        there = present_patches(patches, changes.weather.air_temperature_c)
-        if there != last:
-            self.laid.append(LaidSurface(tick, there))
-
-
-class DeskLog(Log):
-    """A log whose weather a person may change."""
-
-    sees_all = True
-
-    def __init__(self, header: LogHeader, weather: str, ticks: int, desk: Desk) -> None:
-        super().__init__(header, weather, ticks)
-        self.desk = desk
-
-    def see(self, moment: Moment) -> None:
-        """Writes down the moment; a change of weather counts from the next moment on."""
-        super().see(moment)
-        if self.desk.changed:
-            self.log.set_weather(self.desk.outside.weather.name)
 
 
 def run(
@@ -534,25 +337,6 @@ class OpenRun:
         """Keeps the stack's failure and notes it in the log at the present tick."""
         self.failure = failure
         self.log.log.notice(self.tick, NoticeSource.STACK, str(failure))
-
-
-def log_of(spec: RunSpec, stage: Stage, desk: Desk | None = None) -> Log:
-    """Returns an empty log with what holds for the whole run."""
-    about = {
-        "config": spec.driver.label,
-        "weather": spec.weather.name,
-        "seed": str(spec.seed),
-        "profile": spec.settings.profile,
-        "sensors": spec.sensors.value,
-    }
-    if spec.backend.backend == BackendKind.CARLA:  # it tells contacts of the ego alone
-        about["traffic"] = UNSEEN
-    dt = stage.setup.dt
-    header = LogHeader(map=stage.map.name, map_hash=stage.map.content_hash, dt=dt, about=about)
-    room = round(spec.duration / dt) + 1
-    if desk is None:
-        return Log(header, spec.weather.name, room)
-    return DeskLog(header, spec.weather.name, min(room, DESK_ROOM), desk)
 
 
 def outcome_of(stage: Stage, log: RunLog) -> Outcome:

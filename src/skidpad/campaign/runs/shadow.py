@@ -10,7 +10,8 @@ from msgspec import structs
 
 from skidpad.campaign.driving.backends import keep_server
 from skidpad.campaign.driving.loop import Moment, Sink
-from skidpad.campaign.driving.run_setup import StackAtWheel, driver_of, stage_of, with_sensors
+from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.campaign.driving.stack_at_wheel import StackAtWheel, driver_of, with_sensors
 from skidpad.campaign.runs.rerun import desk_of
 from skidpad.campaign.runs.run import run as drive_again
 from skidpad.campaign.runs.stored import read_run
@@ -18,14 +19,7 @@ from skidpad.campaign.user_files import with_kept_map
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import ChannelCrew, DriverSpec, Passenger
 from skidpad.core.vocabulary import Supervision
-from skidpad.evidence.shadow import (
-    Foresight,
-    Parting,
-    Pedals,
-    foresight,
-    partings,
-    share_apart,
-)
+from skidpad.evidence.shadow import Foresight, Parting, Pedals, foresight, partings, share_apart
 from skidpad.recording.run.log_files import log_hash, read_log
 
 

@@ -15,10 +15,11 @@ from typing import Any, NamedTuple, Protocol
 import msgspec
 
 from skidpad.campaign.runs.checkpoints import FIXED
+from skidpad.core.courses import Scenario
 from skidpad.core.errors import CheckpointError
 from skidpad.core.files.reading import read_bytes
 from skidpad.core.objects.statefile import Ground
-from skidpad.core.run import RunSpec, Scenario
+from skidpad.core.run import RunSpec
 from skidpad.core.simulator import BackendKind
 from skidpad.recording.files import write_bytes
 from skidpad.recording.fingerprint import fingerprint

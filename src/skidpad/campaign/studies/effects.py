@@ -14,8 +14,9 @@ from skidpad.campaign.recipes.matrix import roads_of
 from skidpad.campaign.runs.run import run
 from skidpad.campaign.studies.study import drive_all
 from skidpad.campaign.workers.worker import Job
+from skidpad.core.courses import Roads
 from skidpad.core.environment.surface import SurfacePatch
-from skidpad.core.run import CameraDriver, Roads, RunSpec
+from skidpad.core.run import CameraDriver, RunSpec
 from skidpad.core.settings.parts import load_profile
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.evidence.drive.metrics import run_metrics

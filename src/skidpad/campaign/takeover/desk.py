@@ -14,7 +14,8 @@ import numpy as np
 
 from skidpad.campaign.driving.loop import Script, Supervising
 from skidpad.campaign.driving.outdoors import ChangedBackend
-from skidpad.campaign.driving.run_setup import StackAtWheel
+from skidpad.campaign.driving.stack_at_wheel import StackAtWheel
+from skidpad.core.courses import Roads
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import SensorFrame
 from skidpad.core.inputs import (
@@ -31,7 +32,7 @@ from skidpad.core.inputs import (
     Timed,
     Wheel,
 )
-from skidpad.core.run import Function, Roads, RunSpec
+from skidpad.core.run import Function, RunSpec
 from skidpad.core.setup import DT, RESERVE_NAME, ActorCommand
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import Supervision

@@ -14,7 +14,8 @@ from msgspec import structs
 from skidpad.cli.options.asked import Climate, Drivers, Tuned
 from skidpad.cli.options.campaigns import Checkpoints, FirstSeed, How, Seeds
 from skidpad.cli.options.spread import spread_fields
-from skidpad.core.run import Roads, RunSpec
+from skidpad.core.courses import Roads
+from skidpad.core.run import RunSpec
 from skidpad.core.simulator import BackendChoice, BackendKind
 
 

@@ -67,7 +67,8 @@ def effects(
 
 def difference_text(found: object) -> str:
     """Returns the mean difference with two digits and its interval, if it has one, as text."""
-    from skidpad.evidence.statistics import Comparison, range_text
+    from skidpad.evidence.statistics import Comparison
+    from skidpad.evidence.statistics_text import range_text
 
     assert isinstance(found, Comparison)
     limits = "" if found.interval is None else f" ({range_text(found.interval)})"

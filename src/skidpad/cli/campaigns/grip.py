@@ -12,8 +12,9 @@ from msgspec import structs
 from skidpad.cli.options.asked import MAPS, EgoStack, GripCross, MapAsked, Tuned
 from skidpad.cli.options.campaigns import Checkpoints, FirstSeed, How
 from skidpad.cli.options.spread import spread_fields
+from skidpad.core.courses import Scenario
 from skidpad.core.errors import ConfigError, require_choice
-from skidpad.core.run import Friction, RunSpec, Scenario
+from skidpad.core.run import Friction, RunSpec
 from skidpad.core.simulator import BackendChoice
 from skidpad.core.vocabulary import ENDED, Outcome, SensorLevel
 

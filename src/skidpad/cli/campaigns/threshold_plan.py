@@ -18,8 +18,9 @@ from skidpad.campaign.cells.threshold import (
 )
 from skidpad.cli.campaigns.grip_plan import split_words
 from skidpad.cli.options.asked import MAPS, EgoStack, GripCross, MapAsked
+from skidpad.core.courses import ActorMode
 from skidpad.core.errors import ConfigError, require_choice
-from skidpad.core.run import ActorMode, RunSpec
+from skidpad.core.run import RunSpec
 from skidpad.physics.presets import find_weather
 
 REPEATS = 20  # of every level; a median's interval needs six

@@ -136,7 +136,7 @@ def outcomes(
         )
     from skidpad.core.text.wording import count_text
     from skidpad.evidence.channels.redundancy import compare_drivers
-    from skidpad.evidence.statistics import rate_text
+    from skidpad.evidence.statistics_text import rate_text
 
     for row in compare_drivers(driven):
         typer.echo(

@@ -9,14 +9,10 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
+from skidpad.core.courses import Roads
 from skidpad.core.environment.surface import SurfacePatch
 from skidpad.core.errors import ConfigError, require_choice
-from skidpad.core.run import (
-    DriverSpec,
-    Friction,
-    Roads,
-    RunSpec,
-)
+from skidpad.core.run import DriverSpec, Friction, RunSpec
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 

@@ -11,8 +11,9 @@ from msgspec import Meta, Struct, structs
 
 from skidpad.cli.options.asked import Climate, Drivers, Tuned
 from skidpad.cli.options.spread import spread_fields
+from skidpad.core.courses import Roads, Scenario
 from skidpad.core.errors import ConfigError, FileError
-from skidpad.core.run import Roads, RunSpec, Scenario
+from skidpad.core.run import RunSpec
 from skidpad.core.setup import VEHICLES_MAX
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.vocabulary import Bodywork, Quality, Scenery, TrafficStart
@@ -164,7 +165,7 @@ def require_place(spec: RunSpec) -> None:
 
     A CARLA server's map is not checked.
     """
-    from skidpad.campaign.driving.run_setup import load_scenario
+    from skidpad.campaign.driving.course_file import load_scenario
     from skidpad.campaign.user_files import road_file
     from skidpad.roads.bundled import load_map
 

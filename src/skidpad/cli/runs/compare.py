@@ -205,7 +205,8 @@ def _print(changes: list[Change]) -> None:
     from rich.table import Table
 
     from skidpad.cli.output.tables import table_console
-    from skidpad.evidence.statistics import holm, no_limits_text, p_text, range_text
+    from skidpad.evidence.statistics import holm
+    from skidpad.evidence.statistics_text import no_limits_text, p_text, range_text
 
     tested = [c.comparison.p for c in changes]
     adjusted = holm([p for p in tested if p is not None])

@@ -10,7 +10,8 @@ from msgspec import structs
 
 from skidpad.cli.options.asked import EgoStack, Tuned
 from skidpad.cli.options.spread import spread_fields
-from skidpad.core.run import Roads, RunSpec
+from skidpad.core.courses import Roads
+from skidpad.core.run import RunSpec
 
 COURSES = "road"
 

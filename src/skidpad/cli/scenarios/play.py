@@ -13,7 +13,8 @@ from skidpad.cli.options.asked import OF_FILE, EgoStack, PlayCross, Tuned
 from skidpad.cli.options.campaigns import CampaignOptions, Checkpoints, Driving, How, Seeds
 from skidpad.cli.options.spread import spread_fields
 from skidpad.cli.scenarios.expected import Expected, exit_by_verdicts, played_report
-from skidpad.core.run import RunSpec, Scenario
+from skidpad.core.courses import Scenario
+from skidpad.core.run import RunSpec
 from skidpad.core.simulator import BackendChoice
 from skidpad.core.vocabulary import SensorLevel
 
@@ -205,7 +206,7 @@ def play_runs(
 def _hindrance(file: Path, template: RunSpec) -> str:
     """Returns what keeps a file from being played, and prints it; "" where nothing does."""
     from skidpad.campaign.cells.grip import scenario_of
-    from skidpad.campaign.driving.run_setup import load_scenario
+    from skidpad.campaign.driving.course_file import load_scenario
     from skidpad.campaign.recipes.files import courses_of
     from skidpad.core.errors import InputError
 
@@ -236,7 +237,7 @@ def _is_clean(file: Path, course: Scenario, tree: bool) -> bool:
 
     tree: each storyboard among the choices is printed too, once.
     """
-    from skidpad.campaign.driving.run_setup import check_scenario
+    from skidpad.campaign.driving.course_file import check_scenario
     from skidpad.campaign.recipes.files import courses_of
     from skidpad.core.errors import FileError
     from skidpad.scenarios.tree import storyboard_tree

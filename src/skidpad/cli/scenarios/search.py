@@ -12,7 +12,8 @@ from msgspec import Meta, Struct
 from skidpad.cli.options.asked import EgoStack, PlayCross, Tuned
 from skidpad.cli.scenarios.play import play_template
 from skidpad.cli.scenarios.varied import Batches, Vary, scenario_options, vary_scenario
-from skidpad.core.run import RunSpec, Scenario
+from skidpad.core.courses import Scenario
+from skidpad.core.run import RunSpec
 from skidpad.core.simulator import BackendChoice
 
 if TYPE_CHECKING:

@@ -124,7 +124,7 @@ def _read_varied(file: Path) -> tuple[Path, tuple[Variable, ...]]:
 def _require_parameters(template: RunSpec, space: Space) -> None:
     """Raises FileError where the file cannot be played or declares no parameter of a varied name."""
     from skidpad.campaign.cells.grip import scenario_of
-    from skidpad.campaign.driving.run_setup import load_scenario
+    from skidpad.campaign.driving.course_file import load_scenario
     from skidpad.search.space import apply_values
 
     load_scenario(scenario_of(template))

@@ -23,9 +23,17 @@ from typing import Any, Protocol, runtime_checkable
 
 import msgspec
 import numpy as np
-from numpy.lib.format import descr_to_dtype, dtype_to_descr
+from numpy.lib.format import dtype_to_descr
 
 from skidpad.core.errors import CheckpointError
+from skidpad.core.objects.array_data import (
+    Plain,
+    describe_array,
+    find_dtype,
+    make_array,
+    pack_numbers,
+    put_numbers,
+)
 from skidpad.core.objects.checkpoint import (
     Copier,
     Copiers,
@@ -39,7 +47,6 @@ from skidpad.core.objects.checkpoint import (
     slots_of,
 )
 
-Plain = Any  # what msgpack holds: None, numbers, texts, bytes, lists of them
 PACKAGE = __name__.partition(".")[0]
 SCALARS = (bool, float, str, bytes, type(None))
 VALUES = (int, *SCALARS, Enum, np.generic)  # that are not numbered
@@ -163,7 +170,7 @@ class _Writer:
         """Returns the contents of an object as a checkpoint keeps them; None where they cannot change."""
         if isinstance(found, np.ndarray):
             fixed = not (found.flags.writeable or found.dtype.hasobject)
-            return None if fixed else _write_array(found)
+            return None if fixed else pack_numbers(found)
         if isinstance(found, dict):
             return [[self.value(key), self.value(value)] for key, value in found.items()]
         if isinstance(found, (list, set, deque, bytearray)):
@@ -190,7 +197,7 @@ class _Writer:
         if type(state) in (list, tuple):
             return [type(state).__name__, [self._write_copy(item) for item in state]]
         if type(state) is np.ndarray:
-            return ["array", *_about_array(state), _write_array(state)]
+            return ["array", *describe_array(state), pack_numbers(state)]
         return self.value(state)
 
     def value(self, value: Any) -> Plain:
@@ -233,7 +240,7 @@ class _Writer:
         elif kind is deque:
             about = ["deque", found.maxlen]
         elif kind is np.ndarray:
-            return [self._place_of(found), _write_array(found)]
+            return [self._place_of(found), pack_numbers(found)]
         elif kind is np.random.Generator:
             about = ["generator"]
         else:
@@ -248,7 +255,7 @@ class _Writer:
         while isinstance(base.base, np.ndarray):
             base = base.base
         if base is array or id(base) not in self.ground.number:
-            return ["array", *_about_array(array)]
+            return ["array", *describe_array(array)]
         first, begin = (a.__array_interface__["data"][0] for a in (array, base))
         where = [self.ground.number[id(base)], first - begin, list(array.strides)]
         return ["view", dtype_to_descr(array.dtype), list(array.shape), *where]
@@ -285,11 +292,11 @@ class _Reader:
         if kind == "generator":
             return np.random.Generator(np.random.PCG64())
         if kind == "array":
-            return _make_array(*about)
+            return make_array(*about)
         if kind == "view":
             descr, shape, number, offset, strides = about
             base: Any = self.ground.objects[number]
-            return np.ndarray(tuple(shape), _dtype(descr), base, offset, tuple(strides))
+            return np.ndarray(tuple(shape), find_dtype(descr), base, offset, tuple(strides))
         found: Any = self.ground.find_class(about[0])
         if kind != "object" or found.__new__ is not object.__new__:
             raise ValueError(f"unknown kind {kind} {about}")
@@ -301,7 +308,7 @@ class _Reader:
         assert copier is not None
         put_back = copier(found)[0]
         if isinstance(found, np.ndarray):
-            _read_array(found, state)
+            put_numbers(found, state)
         elif put_back is put_list or (put_back is put_items and not isinstance(found, dict)):
             put_back(found, [self.value(item) for item in state])
         elif put_back is put_items:
@@ -338,7 +345,7 @@ class _Reader:
         return self._class(name, Enum)[member]
 
     def _read_number(self, descr: Plain, data: bytes) -> object:
-        return np.frombuffer(data, _dtype(descr))[0]
+        return np.frombuffer(data, find_dtype(descr))[0]
 
     def _read_path(self, text: str) -> PurePath:
         return Path(text)
@@ -356,8 +363,8 @@ class _Reader:
         return {self.value(key): self.value(value) for key, value in pairs}
 
     def _read_array(self, descr: Plain, shape: list[int], how: str, data: bytes) -> np.ndarray:
-        found = _make_array(descr, shape, how)
-        _read_array(found, data)
+        found = make_array(descr, shape, how)
+        put_numbers(found, data)
         return found
 
     def _read_named(self, name: str, items: list[Plain]) -> object:
@@ -379,42 +386,3 @@ def attributes_of(found: Any) -> dict[str, Any]:
     kind: Any = type(found)
     slots = {name: getattr(found, name) for name in slots_of(kind) if hasattr(found, name)}
     return slots | getattr(found, "__dict__", {})
-
-
-def _about_array(array: np.ndarray) -> list[Plain]:
-    """Returns an array's type, shape, and how it lies in memory: kernels know types of arrays by it."""
-    order = "F" if array.flags.f_contiguous and not array.flags.c_contiguous else "C"
-    if array.dtype.hasobject:
-        raise CheckpointError("an array of objects cannot be written, as it is no data")
-    return [dtype_to_descr(array.dtype), list(array.shape), order]
-
-
-def _make_array(descr: Plain, shape: list[int], order: Any) -> np.ndarray:
-    """Returns an array of zeros."""
-    return np.zeros(tuple(shape), _dtype(descr), order)
-
-
-def _write_array(array: np.ndarray) -> bytes:
-    """Returns the numbers of an array."""
-    if array.dtype.hasobject:
-        raise CheckpointError("an array of objects cannot be written, as it is no data")
-    return array.tobytes()
-
-
-def _read_array(array: np.ndarray, data: bytes) -> None:
-    """Puts numbers into an array."""
-    array[...] = np.frombuffer(data, array.dtype).reshape(array.shape)
-
-
-def _dtype(descr: Plain) -> np.dtype[Any]:
-    """Returns the type of an array's items."""
-    if isinstance(descr, str):
-        return np.dtype(descr)
-    return descr_to_dtype(
-        [(name, _descr(kind), *map(tuple, shape)) for name, kind, *shape in descr]
-    )
-
-
-def _descr(kind: Plain) -> Any:
-    """Returns a field's type with tuples where msgpack has lists."""
-    return kind if isinstance(kind, str) else [(n, _descr(k), *map(tuple, s)) for n, k, *s in kind]

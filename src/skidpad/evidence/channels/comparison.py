@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import polars as pl
 
 from skidpad.core.errors import InputError
-from skidpad.evidence.statistics import interval_text, ratio_limits
+from skidpad.evidence.statistics import ratio_limits
+from skidpad.evidence.statistics_text import interval_text
 
 BLOCK = 100  # cycles that are resampled together, since neighbours are not independent
 

@@ -11,7 +11,7 @@ from typing import Any
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 
-from skidpad.evidence.statistics import interval_text, share_text
+from skidpad.evidence.statistics_text import interval_text, share_text
 from skidpad.fleet.insight.trends import AlarmRate, Trend, alarm_rates, trends
 from skidpad.fleet.insight.worklist import Work, rank_work
 from skidpad.fleet.patterns.analysis import newest_clusters

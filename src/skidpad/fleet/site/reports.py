@@ -8,7 +8,7 @@ from typing import Any
 
 from sqlalchemy import select
 
-from skidpad.evidence.statistics import share_text
+from skidpad.evidence.statistics_text import share_text
 from skidpad.fleet.insight.places import PlaceRow, places
 from skidpad.fleet.insight.research import CELL, HOUR, K, export
 from skidpad.fleet.insight.safety import Claim, claims

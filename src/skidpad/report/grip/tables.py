@@ -23,7 +23,8 @@ from skidpad.evidence.grip.study import (
     completion_p,
     mean_interval,
 )
-from skidpad.evidence.statistics import Comparison, Interval, compare_pairs, p_text
+from skidpad.evidence.statistics import Comparison, Interval, compare_pairs
+from skidpad.evidence.statistics_text import p_text
 from skidpad.report.elements.page import Block, Cell
 from skidpad.report.elements.tables import Column, Format, Quantity, table
 from skidpad.report.grip.data import GripCampaign

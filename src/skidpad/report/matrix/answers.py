@@ -7,15 +7,11 @@ from collections.abc import Iterable, Sequence
 import polars as pl
 
 from skidpad.core.text.wording import capitalize_first, count_text, list_text
-from skidpad.evidence.statistics import UNITS_FROM, Interval, Rate, p_text, seeds_for_verdict
+from skidpad.evidence.statistics import UNITS_FROM, Interval, Rate, seeds_for_verdict
+from skidpad.evidence.statistics_text import p_text
 from skidpad.evidence.verdicts import Judgement
 from skidpad.report.crashes.cards import Found
-from skidpad.report.elements.figures import (
-    POINTS_REACH,
-    Series,
-    cut_note,
-    points_with_intervals,
-)
+from skidpad.report.elements.figures import POINTS_REACH, Series, cut_note, points_with_intervals
 from skidpad.report.elements.page import Answer, Answers, Figure
 from skidpad.report.matrix.comparisons.contrasts import Contrast, by_configuration, by_weather
 from skidpad.report.matrix.crashes import Cell

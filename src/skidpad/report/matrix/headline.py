@@ -8,7 +8,8 @@ from functools import partial
 import numpy as np
 
 from skidpad.core.text.wording import count_text
-from skidpad.evidence.statistics import ASSUMED, Interval, Rate, median_time
+from skidpad.evidence.statistics import Interval, Rate, median_time
+from skidpad.evidence.statistics_text import ASSUMED
 from skidpad.recording.campaign.quantities import name_of
 from skidpad.report.elements.page import Block, Cell, Number, Numbers, Table, Text
 from skidpad.report.elements.tables import Column, Format, Quantity, table
@@ -22,13 +23,7 @@ from skidpad.report.matrix.data import (
     config_title,
     rate_by_seed,
 )
-from skidpad.report.matrix.tables import (
-    RATE,
-    few_seeds_note,
-    rate_hint,
-    rate_quantity,
-    remark_on,
-)
+from skidpad.report.matrix.tables import RATE, few_seeds_note, rate_hint, rate_quantity, remark_on
 
 SERIOUS = (
     "serious_contacts",

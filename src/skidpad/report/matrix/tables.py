@@ -10,16 +10,8 @@ import polars as pl
 
 from skidpad.core.text.wording import count_text
 from skidpad.evidence.contrasts import per_seed
-from skidpad.evidence.statistics import (
-    ASSUMED,
-    UNITS_FROM,
-    Interval,
-    Rate,
-    mean_limits,
-    no_limits_text,
-    poisson_interval,
-    rate_remark,
-)
+from skidpad.evidence.statistics import UNITS_FROM, Interval, Rate, mean_limits, poisson_interval
+from skidpad.evidence.statistics_text import ASSUMED, no_limits_text, rate_remark
 from skidpad.recording.campaign.matrix import Metrics
 from skidpad.recording.campaign.quantities import name_of
 from skidpad.report.elements.campaign import Metric, metrics_of

@@ -10,9 +10,10 @@ from typing import Any
 import polars as pl
 import yaml
 
+from skidpad.core.courses import Scenario
 from skidpad.core.errors import FileError
 from skidpad.core.geometry import kmh_from_mps
-from skidpad.core.run import Scenario, run_from_plain
+from skidpad.core.run import run_from_plain
 from skidpad.evidence.drive.file_criteria import judge_criteria
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.evidence.expectations import Expectation, parse_expectation, run_values

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from skidpad.core.errors import FileError
 from skidpad.core.files.reading import read_bytes
 from skidpad.roads.map_files import map_file
-from skidpad.roads.opendrive.document import SIZE_MAX, Node, Reader, parse_root
+from skidpad.roads.opendrive.reader import SIZE_MAX, Node, Reader, parse_root
 
 FRICTION_MOST = 3.0  # as of `mu_ref`
 

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from skidpad.core.arrays import Floats
 from skidpad.roads.edge import ROAD, RoadEdge
 from skidpad.roads.opendrive.bake import bake
-from skidpad.roads.opendrive.document import Document, Node, RoadRecord, id_number, parse
+from skidpad.roads.opendrive.document import Document, RoadRecord, parse
 from skidpad.roads.opendrive.lane_shapes import LaneShape, lane_shapes
+from skidpad.roads.opendrive.reader import Node, id_number
 
 ASIDE = 0.3  # m from the edge to the rail, as on the bundled maps
 FREE = 0.2  # m that a rail keeps from every road: in mouths and merges there is none

@@ -12,8 +12,9 @@ import shapely
 from skidpad.core.arrays import Floats
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.lanes import SignalTable
-from skidpad.roads.opendrive.document import Document, Node, Reader, RoadRecord
+from skidpad.roads.opendrive.document import Document, RoadRecord
 from skidpad.roads.opendrive.lane_shapes import LaneShape
+from skidpad.roads.opendrive.reader import Node, Reader
 from skidpad.roads.opendrive.signals import node_place, road_place, signal_heads, valid_lanes
 from skidpad.roads.roadside import (
     UNPAINTED,

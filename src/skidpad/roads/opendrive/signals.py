@@ -11,9 +11,10 @@ from skidpad.core.geometry import wrap_angle
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.checked import kinds
 from skidpad.roads.lanes import SignalKind, SignalTable
-from skidpad.roads.opendrive.document import Document, Node, Reader, RoadRecord
+from skidpad.roads.opendrive.document import Document, RoadRecord
 from skidpad.roads.opendrive.lane_shapes import LaneKey, LaneShape
 from skidpad.roads.opendrive.links import DRIVABLE
+from skidpad.roads.opendrive.reader import Node, Reader
 from skidpad.roads.roadside import Box, SignalHead
 
 LIGHTS = {"1000001", "1000007", "1000008", "1000009", "1000010", "1000011"}  # vehicle lights

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from math import pi
 from types import MappingProxyType
 
-from skidpad.core.run import ActorMode
+from skidpad.core.courses import ActorMode
 from skidpad.scenarios.actions.base import NoEffect, PrivateAction
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.reading.document import Node

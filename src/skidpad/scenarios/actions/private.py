@@ -18,7 +18,8 @@ from skidpad.scenarios.actions.routing import (
     compile_random_route,
     compile_teleport,
 )
-from skidpad.scenarios.actions.speed import compile_profile, compile_speed
+from skidpad.scenarios.actions.speed import compile_speed
+from skidpad.scenarios.actions.speed_profile import compile_profile
 from skidpad.scenarios.actions.trailers import compile_trailer
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.reading.document import Node

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from math import ceil, inf
 
-from skidpad.roads.opendrive.document import id_number
+from skidpad.roads.opendrive.reader import id_number
 from skidpad.scenarios.actions.base import GlobalAction
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.places.positions import position

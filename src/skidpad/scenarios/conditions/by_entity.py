@@ -10,6 +10,7 @@ from math import hypot, inf, nan
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.roads.queries import LanePoint
 from skidpad.scenarios.conditions.base import EntityCondition, Rule, rule
+from skidpad.scenarios.conditions.contact import are_in_contact
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.movement.measures import Axes, along_road, between
 from skidpad.scenarios.movement.network import Network, next_lane_id
@@ -136,7 +137,9 @@ class Collision:
 
     def holds(self, scene: Scene, actor: str) -> bool:
         """Returns whether the actor touches one of the others now."""
-        return any(other != actor and scene.touch(actor, other) for other in self.names(scene))
+        return any(
+            other != actor and are_in_contact(scene, actor, other) for other in self.names(scene)
+        )
 
     def names(self, scene: Scene) -> tuple[str, ...]:
         """Returns the entities whose touch counts."""

@@ -6,15 +6,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from skidpad.roads.opendrive.document import id_number
+from skidpad.roads.opendrive.reader import id_number
 from skidpad.scenarios.conditions.base import Condition, Probe, Rule, rule, rule_name
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.criteria import is_criterion
+from skidpad.scenarios.elements import Move, Path, State
 from skidpad.scenarios.reading.document import Node
 from skidpad.scenarios.reading.environment import moment_of
 from skidpad.scenarios.reading.findings import Kind
 from skidpad.scenarios.reading.parameters import holds_between
-from skidpad.scenarios.scene import Move, Path, Scene, State
+from skidpad.scenarios.scene import Scene
 from skidpad.scenarios.signals import read_signal_state
 
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import cos, sin
 
+from skidpad.core.courses import ActorMode
 from skidpad.core.geometry import Pose
-from skidpad.core.run import ActorMode
 from skidpad.core.setup import DT, ActorCommand, ActorSetup
 from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import Control
@@ -15,6 +15,7 @@ from skidpad.recording.run.lamps import LampChange
 from skidpad.recording.run.staging import Staging
 from skidpad.recording.run.tilts import Tilted
 from skidpad.scenarios.actions.routing import go_on_after_track
+from skidpad.scenarios.elements import Happening
 from skidpad.scenarios.movement.motion import Guide
 from skidpad.scenarios.movement.network import Place
 from skidpad.scenarios.movement.tracking import track_demand
@@ -24,7 +25,7 @@ from skidpad.scenarios.playing.table import NoTable, StoryTable, TableUse, tabul
 from skidpad.scenarios.playing.telling import Telling
 from skidpad.scenarios.reading.entities import TYRES, Box
 from skidpad.scenarios.scenario import Scenario
-from skidpad.scenarios.scene import Actor, Controlling, Happening, Running, Scene
+from skidpad.scenarios.scene import Actor, Controlling, Running, Scene
 from skidpad.scenarios.signals import SignalPlan
 from skidpad.scenarios.traffic import drive
 from skidpad.scenarios.trailers import connect_at_begin, tow_command, tractors_first

@@ -11,10 +11,10 @@ from skidpad.recording.run.lamps import write_lamps
 from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.staging import write_staging
 from skidpad.recording.run.tilts import write_tilts
+from skidpad.scenarios.elements import Happening
 from skidpad.scenarios.playing.player import Played
 from skidpad.scenarios.playing.stage import Row, rows_csv
 from skidpad.scenarios.reading.entities import Box
-from skidpad.scenarios.scene import Happening
 
 TRAJECTORIES, STORY = "trajectories.csv", "storyboard.csv"
 STORY_COLUMNS = {

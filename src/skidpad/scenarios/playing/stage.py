@@ -12,8 +12,8 @@ from math import copysign, cos, hypot, sin
 
 import numpy as np
 
+from skidpad.core.courses import ActorMode
 from skidpad.core.geometry import Pose
-from skidpad.core.run import ActorMode
 from skidpad.core.setup import DT, ActorCommand
 from skidpad.core.states import ActorStates, ActorTable, WorldTruth
 from skidpad.core.vocabulary import ActorKind

@@ -12,10 +12,11 @@ from skidpad.scenarios.actions.speed import Speed
 from skidpad.scenarios.actions.world import SetValue
 from skidpad.scenarios.conditions.by_entity import Collision
 from skidpad.scenarios.conditions.by_value import Value
+from skidpad.scenarios.elements import Happening, Move
 from skidpad.scenarios.movement.lines import Line
 from skidpad.scenarios.movement.tracking import PacedTrack, TimedTrack
 from skidpad.scenarios.scenario import Scenario
-from skidpad.scenarios.scene import Actor, Happening, Move
+from skidpad.scenarios.scene import Actor
 from skidpad.scenarios.storyboard import Event, Group
 from skidpad.scenarios.triggers import AnyEntity, Trigger
 

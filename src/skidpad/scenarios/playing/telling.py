@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from skidpad.scenarios.scene import Move, Path, Running, Scene, State
+from skidpad.scenarios.elements import Move, Path, State
+from skidpad.scenarios.scene import Running, Scene
 from skidpad.scenarios.storyboard import (
     Act,
     Event,

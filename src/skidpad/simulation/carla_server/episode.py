@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import Any
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
@@ -32,10 +31,10 @@ from skidpad.simulation.carla_server.actors.posts import Posts, posts_of
 from skidpad.simulation.carla_server.actors.registry import SOLID, Actor, ActorTable, Attachment
 from skidpad.simulation.carla_server.actors.walkers import WalkerControl
 from skidpad.simulation.carla_server.clock import Clock
+from skidpad.simulation.carla_server.debug_shapes import DebugShapes
 from skidpad.simulation.carla_server.maps.landscape import ALL_LAYERS, Landscape
 from skidpad.simulation.carla_server.maps.maps import ServedMap
 from skidpad.simulation.carla_server.options import ServerOptions
-from skidpad.simulation.carla_server.protocol import wire
 from skidpad.simulation.carla_server.protocol.rpc import CallError
 from skidpad.simulation.carla_server.protocol.streams import StreamHub
 from skidpad.simulation.carla_server.sensing.producers import PRODUCERS
@@ -46,15 +45,20 @@ from skidpad.simulation.carla_server.vehicles.falling import DROP, Falling, grou
 from skidpad.simulation.carla_server.vehicles.giving_way import GivingWay
 from skidpad.simulation.carla_server.vehicles.vehicles import Vehicles
 from skidpad.simulation.carla_server.weather import Sky
+from skidpad.simulation.world.conditions import Conditions
 from skidpad.simulation.world.ground import ground_height
+from skidpad.simulation.world.interventions import (
+    set_collides,
+    set_grounded,
+    set_simulated,
+    teleport,
+)
 from skidpad.simulation.world.lights import Lights
 from skidpad.simulation.world.obstacles import obstacles
 from skidpad.simulation.world.patches import FrictionZone, Patches
 from skidpad.simulation.world.surface_files import read_surface
-from skidpad.simulation.world.world import Conditions, World
+from skidpad.simulation.world.world import World
 
-KINDS = ("point", "line", "arrow", "box", "text", "hud point", "hud line", "hud arrow", "hud box")
-MOST = 10_000
 COLLISION = "Spawn failed because of collision at spawn position"
 NO_STREAM = ("sensor.other.lane_invasion",)  # computed in the client
 
@@ -121,7 +125,7 @@ class Episode:
             seed=seed, dt=clock.step, grip=self.sky.grip, road_noise=0.0, all_lanes=True
         )
         self.moving = World(map.roads, Lights(map.roads, arms=True), conditions)
-        self.moving.lay_patches(stock.patches_on(map.roads, self.sky.road))
+        self.moving.wheel_grip.lay_patches(stock.patches_on(map.roads, self.sky.road))
         self.actors = ActorTable(self.moving, stock.ids)
         self.rows = Rows()
         self.vehicles = Vehicles(self.moving)
@@ -255,10 +259,10 @@ class Episode:
             return
         (body,) = self.moving.enter([shapes.body_of(actor)])
         actor.body = body
-        self.moving.set_grounded(body, actor.family is Family.WALKER)
-        self.moving.set_collides(body, not shapes.is_flat(actor))
+        set_grounded(self.moving, body, actor.family is Family.WALKER)
+        set_collides(self.moving, body, not shapes.is_flat(actor))
         self.moving.put(self.moving.row(body), feet, 0.0)
-        self.moving.teleport(body, feet)
+        teleport(self.moving, body, feet)
         self.moving.settle()
 
     def _enlist(self, actor: Actor) -> None:
@@ -283,7 +287,7 @@ class Episode:
 
     def _mark_zones(self) -> None:
         """Friction triggers act on every tyre inside, where they are now."""
-        self.moving.zones = [
+        self.moving.wheel_grip.zones = [
             FrictionZone(t.pose, t.half, float(t.attributes["friction"]))
             for t in self.actors.of(Family.TRIGGER)
         ]
@@ -299,14 +303,14 @@ class Episode:
             if actor.family is Family.TRIGGER:
                 self._mark_zones()
         else:
-            self.moving.teleport(actor.body, replace(pose, z=pose.z - actor.lift))
+            teleport(self.moving, actor.body, replace(pose, z=pose.z - actor.lift))
             self.falling.start_fall(actor)
 
     def simulate(self, actor: Actor, on: bool) -> None:
         """Switches an actor's physics; off, it stays where clients put it."""
         if actor.body is not None and actor.family is not Family.PROP:
-            self.moving.set_simulated(actor.body, on)
-            self.moving.set_grounded(actor.body, on)
+            set_simulated(self.moving, actor.body, on)
+            set_grounded(self.moving, actor.body, on)
             self.falling.start_fall(actor)
 
     def relandscape(self) -> None:
@@ -325,9 +329,10 @@ class Episode:
 
     def _feel_weather(self) -> None:
         """Lets the weather act on the road, and on what the server's surface lays there."""
-        if self.moving.patches is None:
-            self.moving.grip = self.sky.grip
-        elif self.moving.road is not self.sky.road:
+        grip = self.moving.wheel_grip
+        if grip.patches is None:
+            grip.set_for_all(self.sky.grip)
+        elif grip.road is not self.sky.road:
             self.moving.lay(self.sky.road)
 
     def follow(self) -> None:
@@ -351,52 +356,3 @@ class Episode:
                 filling.fill_actor(self.rows, self.actors, actor)
         for id, control in self.walkers.items():
             filling.fill_walker(self.rows, self.actors, self.actors.alive[id], control, dt)
-
-
-# Debug shapes that clients draw: kept while they live, for views; nothing renders them yet.
-
-
-@dataclass(slots=True)
-class Shape:
-    """One shape as it came, in CARLA's axes."""
-
-    kind: str
-    body: Any
-    colour: Any
-    left: float | None  # s still to live; None: for good
-
-
-class DebugShapes:
-    """The newest shapes, at most 10 000."""
-
-    def __init__(self) -> None:
-        self.shapes: list[Shape] = []
-
-    def draw(self, value: Any) -> None:
-        """Adds one debug shape from a call, for its life time in s or for ever; the oldest beyond MOST go.
-
-        For ever: a negative time, or 0 and persistent. WireError for another shape.
-        """
-        primitive, colour, life, persistent = wire.items(value, "debug shape", 4)
-        index, body = wire.items(primitive, "debug shape.primitive", 2)
-        kind = KINDS[wire.integer(index, "debug shape.primitive", 0, len(KINDS) - 1)]
-        seconds = wire.number(life, "debug shape.life_time")
-        forever = seconds < 0.0 or (seconds == 0.0 and bool(persistent))
-        self.shapes.append(Shape(kind, body, colour, None if forever else seconds))
-        del self.shapes[:-MOST]
-
-    def age(self, dt: float) -> None:
-        """Lets shapes grow older by dt s and removes those whose time is over."""
-        if not self.shapes:
-            return
-        for shape in self.shapes:
-            if shape.left is not None:
-                shape.left -= dt
-        self.shapes = [s for s in self.shapes if s.left is None or s.left > 0.0]
-
-    def clear(self, texts: bool | None = None) -> None:
-        """Removes all shapes; only the texts (True), or all but the texts (False)."""
-        if texts is None:
-            self.shapes = []
-        else:
-            self.shapes = [s for s in self.shapes if (s.kind == "text") != texts]

@@ -95,21 +95,22 @@ class EmbeddedBackend:
     @property
     def steps_alone(self) -> bool:
         """Whether a kernel can make the steps of this world: no patches, wind or roll-over, but traffic."""
-        w = self.world
-        is_looked_at = w.patches is not None or w.zones or w.gusts is not None
+        w, grip = self.world, self.world.wheel_grip
+        is_looked_at = grip.patches is not None or grip.zones or w.gusts is not None
         return not (is_looked_at or w.conditions.roll_over or w.traffic is None)
 
     def truth(self) -> WorldTruth:
         """Returns the ground truth of the present tick."""
-        w = self.world
+        w, e = self.world, self.world.events
         return WorldTruth(  # by position, as names take as long as all the rest
-            w.tick, w.table, w.states, w.mu, w.commands, w.lights.by_id, w.contacts, w.invasions,
-            w.background, w.put_back, w.moved_on, w.rolled, w.notices,
+            w.tick, w.table, w.states, w.mu, w.commands, w.lights.by_id, e.contacts, e.invasions,
+            e.background, e.put_back, e.moved_on, e.rolled, e.notices,
         )  # fmt: skip
 
     def relocate(self, pose: Pose, v: float) -> None:
         """Put the ego at `pose` with speed v along it; its height follows from the road."""
-        self.world.relocate(pose, v)
+        self.world.put(EGO, pose, v)
+        self.world.settle()
 
     def change(self, outside: Outside) -> None:
         """All of it is as told from the next step on.
@@ -128,7 +129,7 @@ class EmbeddedBackend:
         )
         road = road_of(changed)
         if changed.patches != self._setup.patches:
-            self.world.lay_patches(patches_of(self.map, changed, road))
+            self.world.wheel_grip.lay_patches(patches_of(self.map, changed, road))
         self.world.lay(road)
         if outside.wind is not None:
             self.world.blow(*outside.wind)
@@ -178,7 +179,7 @@ class EmbeddedBackend:
         extra = {} if asked is None else asked.read(w.tick, states, seen.images, lights, braking)
         return SensorFrame(
             w.tick, self._estimate(), seen.images, seen.segments, seen.radar,
-            MappingProxyType(lights), w.contacts, w.invasions, Supervision.NONE, extra,
+            MappingProxyType(lights), w.events.contacts, w.events.invasions, Supervision.NONE, extra,
             seen.radar_objects, seen.radar_tracks,
         )  # fmt: skip
 

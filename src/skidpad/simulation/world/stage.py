@@ -10,13 +10,15 @@ from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
 from skidpad.scenery.dressing import dress_map
 from skidpad.simulation.world.actors import Role, cast_of, place_of
+from skidpad.simulation.world.conditions import Conditions
+from skidpad.simulation.world.interventions import set_collides
 from skidpad.simulation.world.lights import Lights
 from skidpad.simulation.world.patches import LaneFrictions, Patches
 from skidpad.simulation.world.sheet_flow import SheetFlow
 from skidpad.simulation.world.touch import EGO, ContactBook
 from skidpad.simulation.world.traffic.care import care_of
 from skidpad.simulation.world.traffic.manager import Traffic
-from skidpad.simulation.world.world import Conditions, World
+from skidpad.simulation.world.world import World
 
 
 def build_world(setup: Setup, seed: int) -> World:
@@ -43,14 +45,14 @@ def build_world(setup: Setup, seed: int) -> World:
     traffic = setup.traffic or TrafficSetup(vehicles=0)
     drivers = Traffic(map, traffic, seed, care_of(setup, traffic.slow_in_weather))
     world.let_drive(drivers)
-    world.patches = patches_of(map, setup, road)
+    world.wheel_grip.patches = patches_of(map, setup, road)
     drawn = setup.scenery is Scenery.FULL or setup.bodywork is Bodywork.SHAPED
     paints = seed if drawn else None
     ids = world.enter([role.newcomer(i, paints) for i, role in enumerate(roles)])
     world.lay(road)
     world.book = ContactBook(world.obstacles.names, setup.dt)
     for id, role in zip(ids, roles, strict=True):
-        world.set_collides(id, role.actor.collides)
+        set_collides(world, id, role.actor.collides)
         if role.late:
             drivers.await_room(id, role.factor)
         elif role.reserve:

@@ -7,8 +7,8 @@ Everything random comes from named streams of the seed.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from math import atan2, cos, isfinite, sin
+from dataclasses import replace
+from math import cos, isfinite, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,26 +16,20 @@ from numpy.typing import NDArray
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.core.kernels.jit import hold
-from skidpad.core.setup import DT, ActorCommand, Wind
-from skidpad.core.states import LaneInvasion, VehicleCommand
+from skidpad.core.setup import ActorCommand
+from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import AntiLock, StabilityControl
 from skidpad.physics.contact import CONTACT_LAW, Contacts
 from skidpad.physics.fleet import Fleet
-from skidpad.physics.grip import GripParams, Road
+from skidpad.physics.grip import Road
 from skidpad.physics.types import TIRE_FRICTION_REFERENCE, VehicleType
-from skidpad.physics.wakes import displacing
 from skidpad.physics.wind import Gusts
 from skidpad.roads.queries import RoadMap
-from skidpad.simulation.world.ground import ROAD_NOISE, RoadSigns, read_signs
+from skidpad.simulation.world.conditions import Conditions
+from skidpad.simulation.world.events import StepEvents
+from skidpad.simulation.world.ground import RoadSigns, read_signs
 from skidpad.simulation.world.lights import Lights
 from skidpad.simulation.world.obstacles import Obstacles, obstacles
-from skidpad.simulation.world.patches import (
-    NO_PATCH,
-    FrictionZone,
-    Patches,
-    wheel_places,
-    zoned_tyres,
-)
 from skidpad.simulation.world.rows import Member, Newcomer, Rows, bodies_of, table_of
 from skidpad.simulation.world.step import (
     DECIDE,
@@ -43,36 +37,20 @@ from skidpad.simulation.world.step import (
     SETTLE,
     Arena,
     Rules,
-    Wheeled,
     advance,
     advance_undriven,
     feel_grip,
 )
 from skidpad.simulation.world.touch import EGO, ContactBook, Touches, forget, invasions, markings_of
 from skidpad.simulation.world.traffic.care import careless
-from skidpad.simulation.world.traffic.manager import CHECK_PERIOD, Reason, Traffic, no_streets
+from skidpad.simulation.world.traffic.manager import CHECK_PERIOD, Reason, Traffic
 from skidpad.simulation.world.traffic.occupancy import occupancy
 from skidpad.simulation.world.traffic.state import drivers
+from skidpad.simulation.world.traffic.streets import no_streets
+from skidpad.simulation.world.wheel_grip import WheelGrip
 
 CARELESS = careless()
 BRAKING = 0.05  # pedal at which the brake lamps light up
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Conditions:
-    """What holds for all actors of a world."""
-
-    seed: int = 0
-    dt: float = DT
-    grip: GripParams
-    stability: bool = False  # vehicles have stability and traction control
-    anti_lock: AntiLock = AntiLock.IDEAL  # of vehicles that have them
-    stability_control: StabilityControl = StabilityControl.IDEAL
-    roll_over: bool = False  # vehicles can tip over their outer wheels
-    wind: Wind | None = None  # None: no air moves
-    wakes: bool = False  # lorries, buses and vans push air aside
-    road_noise: float = ROAD_NOISE  # rad of cross slope, decision M-11
-    all_lanes: bool = False  # actors stand on sidewalks and shoulders too
 
 
 class World:
@@ -81,23 +59,15 @@ class World:
 
     def __init__(self, map: RoadMap, lights: Lights, conditions: Conditions) -> None:
         self.map, self.lights, self.conditions = map, lights, conditions
-        self.dt, self.tick, self._grip = conditions.dt, 0, conditions.grip
-        self._road: Road | None = None
+        self.dt, self.tick = conditions.dt, 0
+        self.wheel_grip = WheelGrip(conditions.grip)
         self.obstacles = obstacles(map)
-        self.zones: Sequence[FrictionZone] = ()
-        self._zoned = False  # some were in force in the last step
         self.touching = Contacts.room()
         self.touches = 0  # contacts of this tick: rows of `touching`
         self.traffic: Traffic | None = None
-        self.patches: Patches | None = None
         self.book: ContactBook | None = None
         self.markings = markings_of(map)
-        self.contacts, self.background = Touches()
-        self.put_back: tuple[int, ...] = ()
-        self.moved_on: tuple[int, ...] = ()
-        self.rolled: tuple[int, ...] = ()
-        self.invasions: tuple[LaneInvasion, ...] = ()
-        self.notices: tuple[str, ...] = ()
+        self.events = StepEvents()
         self.gusts = None if conditions.wind is None else Gusts(conditions.wind, conditions.seed)
         self.air = (0.0, 0.0)  # m/s of the air in world axes
         self._next_id = 0
@@ -156,12 +126,13 @@ class World:
             sensed=self.conditions.stability_control is StabilityControl.WHEEL_SPEEDS,
             roll_over=self.conditions.roll_over,
         )
-        self.tyres = self.fleet.tire_friction.copy()  # (wheeled, 4) outside friction zones
+        self.wheel_grip.begin(self.fleet)
         self.bodies = bodies_of(members)
 
     def _arrange(self, members: Sequence[Member]) -> None:
         """Makes new rows for these actors; those that were there go on from their old rows."""
-        old, fleet, tyres, was = self.rows, self.fleet, self.tyres, self._rows_by_id
+        old, fleet, tyres = self.rows, self.fleet, self.wheel_grip.tyres
+        was = self._rows_by_id
         self._begin(sorted(members, key=lambda m: not m.is_wheeled))
         kept = [(i, was[m.id]) for i, m in enumerate(self.members) if m.id in was]
         to, source = np.array(kept, dtype=np.intp).reshape(-1, 2).T
@@ -169,38 +140,20 @@ class World:
         to, source = to[to < self.wheeled], source[to < self.wheeled]
         for column, before in zip(self.fleet.wheels, fleet.wheels, strict=True):
             column[to] = before[source]
-        for column, before in ((self.fleet.mu, fleet.mu), (self.tyres, tyres)):
-            column[to] = before[source]
-        self.fleet.tire_friction[:] = self.tyres
-        self._weigh()
+        self.fleet.mu[to] = fleet.mu[source]
+        self.wheel_grip.carry(tyres, to, source)
+        self.weigh()
         if self.traffic is not None:
             self.traffic.arrange(self.members, dict(kept))
-        if self.patches is not None:
-            self.patches.set_vehicles(self.fleet.types)
         if self.book is not None:
             self.book.arrange({before: now for now, before in kept})
         self._outfit()
 
     def _outfit(self) -> None:
         """Makes the arrays of a step for the present actors."""
-        n, w, traffic = len(self.members), self.wheeled, self.traffic
+        n, traffic = len(self.members), self.traffic
         self.moved = np.zeros(n, dtype=np.bool_)
-        self.patched = np.ones((w, 4))
-        self.on_wheels = Wheeled(
-            self.fleet.wheels,
-            self.fleet.params,
-            self.fleet.tire_friction,
-            self.patched,
-            np.zeros((w, 4)),
-            np.zeros((w, len(GripParams._fields))),
-            np.full((w, 4), NO_PATCH),
-            np.full((w, 4), NO_PATCH),
-            self.fleet.feel,
-            displacing(self.fleet.types, self.conditions.wakes),
-            np.zeros((w, 2)),
-            np.zeros(w, dtype=np.bool_),
-        )
-        self._fill_grips()
+        self.on_wheels = self.wheel_grip.make_arrays(self.conditions.wakes)
         arena = Arena(
             self.rows,
             self.moved,
@@ -238,52 +191,17 @@ class World:
         if self.traffic is not None:
             self.traffic.change_streams(seed)
 
-    @property
-    def grip(self) -> GripParams:
-        """The grip of vehicles whose tyres are those of the run, outside of patches."""
-        return self._grip
-
-    @grip.setter
-    def grip(self, grip: GripParams) -> None:
-        """Sets one grip for all vehicles in place of that of the road."""
-        if grip is not self._grip:
-            self._grip, self._road = grip, None
-            self._fill_grips()
-
-    @property
-    def road(self) -> Road | None:
-        """What was laid last; None: one grip was set for all vehicles."""
-        return self._road
-
     def lay(self, road: Road) -> None:
         """Sets what the weather does to the road from now on, in patches too."""
-        self._grip, self._road = road.params(), road
-        self._fill_grips()
-        if self.patches is not None:
-            self.patches.lay(road)
+        self.wheel_grip.lay(road)
         if self.traffic is not None and self.traffic.sees_patches:
-            n = len(self.map.samples.x)
-            shares = np.ones(n) if self.patches is None else self.patches.lane_shares()
-            self.traffic.see_patches(shares)
-
-    def lay_patches(self, patches: Patches | None) -> None:
-        """Sets other patches from now on, None for none; drivers see them when the road is laid next."""
-        self.patches, w = patches, self.on_wheels
-        w.patched[:], w.patch_stiffness[:], w.patch_film[:] = 1.0, NO_PATCH, NO_PATCH
-        if patches is not None:
-            patches.set_vehicles(self.fleet.types)
+            n, patches = len(self.map.samples.x), self.wheel_grip.patches
+            self.traffic.see_patches(np.ones(n) if patches is None else patches.lane_shares())
 
     def blow(self, speed: float, towards: float) -> None:
         """Sets the mean wind, in m/s and rad, from now on; nothing changes where wind pushes no vehicles."""
         if self.gusts is not None:
             self.gusts.wind = replace(self.gusts.wind, speed=speed, towards=towards)
-
-    def _fill_grips(self) -> None:
-        """Gives each vehicle the grip of its own tyres on the road, or else the common grip."""
-        road = self._road
-        for i, body in enumerate(self.fleet.types):
-            own = None if road is None or not body.tyres else road.params(body.tyres)
-            self.on_wheels.grips[i] = self._grip if own is None else own
 
     def stand_among(self, found: Obstacles) -> None:
         """Sets what stands beside the road from now on."""
@@ -308,70 +226,12 @@ class World:
         if i == EGO:
             forget(self.markings)
 
-    def teleport(self, id: int, pose: Pose) -> None:
-        """Puts an actor elsewhere; its velocity is kept. Call `settle` afterwards."""
-        s, i = self.states, self.row(id)
-        s.x[i], s.y[i], s.z[i] = pose.x, pose.y, pose.z
-        s.yaw[i], s.pitch[i], s.roll[i] = wrap_angle(pose.yaw), pose.pitch, pose.roll
-        self.placed["lane"][i] = -1
-
-    def set_velocity(self, id: int, vx: float, vy: float) -> None:
-        """Sets an actor's velocity, m/s in world axes; wheels roll with it."""
-        s, i = self.states, self.row(id)
-        s.vx[i], s.vy[i] = vx, vy
-        if i < self.wheeled:
-            along = vx * cos(s.yaw[i]) + vy * sin(s.yaw[i])
-            self.fleet.wheels.omega[i] = along / self.fleet.params.wheel_radius[i]
-
-    def walk(self, id: int, vx: float, vy: float) -> None:
-        """Lets a body without wheels move with this velocity from now on, looking where it goes."""
-        self.set_velocity(id, vx, vy)
-        if vx or vy:
-            self.states.yaw[self.row(id)] = atan2(vy, vx)
-
-    def push(
-        self, id: int, impulse: tuple[float, float], point: tuple[float, float] | None = None
-    ) -> None:
-        """Applies N s to a vehicle at a point of the world, None: its centre of gravity."""
-        s, i = self.states, self.row(id)
-        if point is None:
-            x_cog = self.fleet.params.x_cog[i]
-            point = (s.x[i] + x_cog * cos(s.yaw[i]), s.y[i] + x_cog * sin(s.yaw[i]))
-        self.fleet.apply_impulse(i, impulse, point)
-
-    def twist(self, id: int, moment: float) -> None:
-        """Applies an angular impulse about the vertical in N m s to a vehicle."""
-        i = self.row(id)
-        self.states.yaw_rate[i] += moment / self.fleet.params.yaw_inertia[i]
-
-    def hold_velocity(self, id: int, velocity: tuple[float, float] | None) -> None:
-        """Holds forward and left speed of a vehicle against all forces; None: physics again."""
-        self.rows.held[self.row(id)] = np.nan if velocity is None else velocity
-
-    def set_simulated(self, id: int, on: bool) -> None:
-        """Switches an actor's physics; off, it stays where it is put, and nothing pushes it."""
-        self.rows.simulated[self.row(id)] = on
-        self._weigh()
-
-    def _weigh(self) -> None:
+    def weigh(self) -> None:
         """Sets the inverse masses of the bodies; what is not simulated cannot be pushed."""
         for column, original in zip(self.bodies, bodies_of(self.members), strict=True):
             column[:] = original
         self.bodies.inverse_mass[~self.rows.simulated] = 0.0
         self.bodies.inverse_inertia[~self.rows.simulated] = 0.0
-
-    def set_collides(self, id: int, on: bool) -> None:
-        """Switches an actor's contacts; off, it passes through everything."""
-        self.rows.collides[self.row(id)] = on
-
-    def set_grounded(self, id: int, on: bool) -> None:
-        """Switches whether an actor's height follows the road."""
-        self.rows.grounded[self.row(id)] = on
-
-    def set_tyres(self, id: int, friction: Sequence[float]) -> None:
-        """Sets tire_friction of a vehicle at FL, FR, RL, RR outside friction zones."""
-        i = self.row(id)
-        self.tyres[i] = self.fleet.tire_friction[i] = friction
 
     def set_step(self, dt: float) -> None:
         """Sets the s by which one step advances from now on."""
@@ -396,11 +256,12 @@ class World:
             stages &= ~DECIDE
             for word in words:
                 self._obey(word)
-        if self.patches is not None or self.zones or self._zoned:
-            self._feel_road()
+        grip = self.wheel_grip
+        if grip.patches is not None or grip.zones or grip.was_zoned:
+            grip.feel(self.states, self.placed)
         if self.gusts is not None:
             self.air = self.gusts.advance(self.dt)
-        self.notices, self.put_back, self.moved_on = (), (), ()
+        self.events = StepEvents()
         lay = self.fleet.on_side() if self.conditions.roll_over else None
         if self.traffic is not None and self.tick % CHECK_PERIOD == 0:
             self._advance(stages & ~SETTLE)
@@ -408,7 +269,7 @@ class World:
             stages = SETTLE
         self._advance(stages)
         if lay is not None:
-            self.rolled = tuple(np.flatnonzero(self.fleet.on_side() & ~lay).tolist())
+            self.events.rolled = tuple(np.flatnonzero(self.fleet.on_side() & ~lay).tolist())
         if words:
             self.moved[:] = False
         self._end_step()
@@ -418,14 +279,13 @@ class World:
         if self.book is not None:
             book, touching, count = self.book, self.touching, self.touches
             found = book.update(self.tick, touching, count) if count else Touches()
-            self.contacts, self.background = found
+            self.events.contacts, self.events.background = found
         self.lights.advance(self.dt)
 
     def pass_ticks(self, ticks: int) -> None:
         """Takes in that a kernel has made so many whole steps, lights included, in which nothing happened."""
         self.tick += ticks
-        self.notices, self.put_back, self.moved_on, self.invasions = (), (), (), ()
-        self.contacts, self.background = Touches()
+        self.events = StepEvents()
         self.touches = 0
 
     def finish_step(self, touches: int, crossed: int, settled: bool) -> None:
@@ -446,55 +306,23 @@ class World:
         """Whether any vehicle of the traffic drives itself."""
         return self.traffic is not None and bool(self.traffic.drivers.state["active"].any())
 
-    @property
-    def is_quiet(self) -> bool:
-        """Whether nothing happened in the last step of which a log or a driver's supervisor is told."""
-        return not (
-            self.contacts
-            or self.background
-            or self.invasions
-            or self.put_back
-            or self.moved_on
-            or self.rolled
-            or self.notices
-        )
-
     def _advance(self, stages: int) -> None:
         """Runs the given stages of a step and stores their contacts and lane invasions."""
         step = advance_undriven if self.traffic is None else advance
-        self._note_events(
-            stages,
-            *step(self.arena, stages, self.tick, self.dt, self.fleet.steps, *self.air),
-        )
+        found = step(self.arena, stages, self.tick, self.dt, self.fleet.steps, *self.air)
+        self._note_events(stages, *found)
 
     def _note_events(self, stages: int, touches: int, crossed: int) -> None:
         """Stores what the given stages of a step have found."""
         if stages & MOVE:
             self.touches = touches
         if stages & SETTLE:
-            self.invasions = (
-                invasions(self.markings, self.map, self.placed, self.tick, crossed)
-                if crossed
-                else ()
-            )
-
-    def _feel_road(self) -> None:
-        """Writes what patches under the wheels do, and the tyres' friction in zones."""
-        if self.patches is not None:
-            w = self.on_wheels
-            self.patches.fill(self.states, self.placed, w.patched, w.patch_stiffness, w.patch_film)
-        if self.zones or self._zoned:
-            self.fleet.tire_friction[:] = self.tyres
-            if self.zones:
-                wheels = wheel_places(self.fleet.types)
-                self.fleet.tire_friction[:] = zoned_tyres(
-                    self.zones, self.tyres, wheels, self.fleet.states
-                )
-        self._zoned = bool(self.zones)
+            where = self.markings, self.map, self.placed
+            self.events.invasions = invasions(*where, self.tick, crossed) if crossed else ()
 
     def feel_grip(self) -> None:
         """Writes the road's friction where all actors stand into `mu`, before the first step."""
-        self._feel_road()
+        self.wheel_grip.feel(self.states, self.placed)
         feel_grip(self.rows, self.on_wheels)
         w = self.on_wheels
         self.mu[: self.wheeled] = w.road_mu * (w.tire_friction / TIRE_FRICTION_REFERENCE)
@@ -502,12 +330,7 @@ class World:
     def settle(self) -> None:
         """Finds the road under every actor, after some were moved between steps; that is no lane invasion."""
         self._advance(SETTLE)
-        self.invasions = ()
-
-    def relocate(self, pose: Pose, v: float) -> None:
-        """Puts the ego somewhere else between two steps, v in m/s along `pose`."""
-        self.put(EGO, pose, v)
-        self.settle()
+        self.events.invasions = ()
 
     # --- questions
 
@@ -562,15 +385,13 @@ class World:
 
     def _put_vehicles(self, traffic: Traffic) -> None:
         """Puts traffic that enters, is respawned, or is put back as a wreck (decision M-7), and notes it."""
-        notes, back, onward = [], [], []
+        events = self.events
         for move in traffic.moves(self.states, self.placed, self.tick):
             self.put(move.actor, move.pose, move.v)
             if move.reason is Reason.FAR:
-                onward.append(move.actor)
+                events.moved_on += (move.actor,)
             elif move.reason is Reason.WRECK:
-                back.append(move.actor)
-                notes.append(
-                    f"{self.table.names[move.actor]} stood without a cause or off its lane and was "
-                    f"put back at ({move.pose.x:.1f}, {move.pose.y:.1f})"
-                )
-        self.notices, self.put_back, self.moved_on = tuple(notes), tuple(back), tuple(onward)
+                events.put_back += (move.actor,)
+                where = f"({move.pose.x:.1f}, {move.pose.y:.1f})"
+                what = "stood without a cause or off its lane and was put back at"
+                events.notices += (f"{self.table.names[move.actor]} {what} {where}",)

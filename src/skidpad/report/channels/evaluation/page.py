@@ -22,7 +22,7 @@ from skidpad.evidence.channels.redundancy import (
     compare_drivers,
     differences,
 )
-from skidpad.evidence.statistics import interval_text, p_text, rate_text
+from skidpad.evidence.statistics_text import interval_text, p_text, rate_text
 from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.recording.channels.drives import read_outcomes
 from skidpad.report.channels.evaluation import scores

@@ -7,7 +7,8 @@ from functools import partial
 import polars as pl
 
 from skidpad.evidence.contrasts import paired_runs, per_seed
-from skidpad.evidence.statistics import UNITS_FROM, compare_pairs, no_limits_text
+from skidpad.evidence.statistics import UNITS_FROM, compare_pairs
+from skidpad.evidence.statistics_text import no_limits_text
 from skidpad.report.elements.campaign import Metric
 from skidpad.report.elements.figures import Series, grouped_bars
 from skidpad.report.elements.page import Block, Cell, Figure

@@ -9,7 +9,8 @@ import polars as pl
 
 from skidpad.core.text.wording import count_text
 from skidpad.evidence.contrasts import paired_runs, per_seed
-from skidpad.evidence.statistics import EVER_SIGNIFICANT, compare_pairs, holm, p_text
+from skidpad.evidence.statistics import EVER_SIGNIFICANT, compare_pairs, holm
+from skidpad.evidence.statistics_text import p_text
 from skidpad.report.elements.page import Block, Cell, Text
 from skidpad.report.elements.tables import Column, Format, Quantity, table
 from skidpad.report.matrix.comparisons.contrasts import ALPHA, BY_RUN

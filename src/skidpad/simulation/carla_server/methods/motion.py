@@ -13,6 +13,7 @@ from skidpad.simulation.carla_server.protocol import wire
 from skidpad.simulation.carla_server.protocol.rpc import CallError, Shape, Table
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.vehicles.vehicles import Vehicle
+from skidpad.simulation.world.interventions import hold_velocity, set_collides, set_velocity
 
 TABLE = Table("motion")
 BELONGS_TO_MAP = (Family.TRAFFIC_LIGHT, Family.TRAFFIC_SIGN)
@@ -54,7 +55,7 @@ def set_walker_state(served: Served, id: Any, transform: Any, speed: Any) -> Non
     pose, v = wire.pose(transform, "transform"), wire.number(speed, "speed")
     place_actor(served, actor, pose.moved(up=actor.lift))
     if actor.body is not None:
-        served.episode.moving.set_velocity(actor.body, v * cos(pose.yaw), v * sin(pose.yaw))
+        set_velocity(served.episode.moving, actor.body, v * cos(pose.yaw), v * sin(pose.yaw))
 
 
 @TABLE.method("set_actor_target_velocity", Shape.VOID)
@@ -84,7 +85,7 @@ def enable_actor_constant_velocity(served: Served, id: Any, velocity: Any) -> No
     v = wire.iso_vector(velocity, "velocity")
     vehicle = _vehicle(served, id)
     if vehicle is not None:
-        served.episode.moving.hold_velocity(vehicle.body, v[:2])
+        hold_velocity(served.episode.moving, vehicle.body, v[:2])
 
 
 @TABLE.method("disable_actor_constant_velocity", Shape.VOID)
@@ -92,7 +93,7 @@ def disable_actor_constant_velocity(served: Served, id: Any) -> None:
     """Hands a vehicle's velocity back to physics."""
     vehicle = _vehicle(served, id)
     if vehicle is not None:
-        served.episode.moving.hold_velocity(vehicle.body, None)
+        hold_velocity(served.episode.moving, vehicle.body, None)
 
 
 @TABLE.method("add_actor_impulse", Shape.VOID)
@@ -166,7 +167,7 @@ def set_actor_collisions(served: Served, id: Any, enabled: Any) -> None:
     on = wire.flag(enabled, "enabled")
     vehicle = _vehicle(served, served.episode.actors.get(id).id)
     if vehicle is not None:
-        served.episode.moving.set_collides(vehicle.body, on)
+        set_collides(served.episode.moving, vehicle.body, on)
 
 
 @TABLE.method("set_actor_enable_gravity", Shape.VOID)

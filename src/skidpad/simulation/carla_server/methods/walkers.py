@@ -11,6 +11,7 @@ from skidpad.simulation.carla_server.actors.walkers import WalkerControl
 from skidpad.simulation.carla_server.protocol import wire
 from skidpad.simulation.carla_server.protocol.rpc import CallError, Shape, Table
 from skidpad.simulation.carla_server.served import Served
+from skidpad.simulation.world.interventions import walk
 
 TABLE = Table("walkers")
 
@@ -32,7 +33,7 @@ def apply_control_to_walker(served: Served, id: Any, control: Any) -> None:
     new = parse_control(control)
     served.episode.walkers[actor.id] = new
     if actor.body is not None:
-        served.episode.moving.walk(actor.body, *new.velocity())
+        walk(served.episode.moving, actor.body, *new.velocity())
 
 
 def _skeleton(served: Served, id: Any) -> tuple[Actor, Skeleton]:

@@ -33,6 +33,7 @@ from skidpad.simulation.carla_server.recording.packets import (
     Packet,
 )
 from skidpad.simulation.carla_server.vehicles.control import Control
+from skidpad.simulation.world.interventions import set_velocity
 from skidpad.simulation.world.lights import Light
 
 PLAYED = (Family.VEHICLE, Family.WALKER, Family.PROP)
@@ -309,7 +310,7 @@ def _move(episode: Episode, actor: Actor, pose: Pose, velocity: Vector) -> None:
     if actor.id in episode.vehicles:
         episode.vehicles.set_velocity(actor.id, velocity)
     elif actor.body is not None:
-        episode.moving.set_velocity(actor.body, velocity[0], velocity[1])
+        set_velocity(episode.moving, actor.body, velocity[0], velocity[1])
 
 
 def _control(steer: float, throttle: float, brake: float, hand_brake: bool, gear: int) -> Control:

@@ -14,6 +14,7 @@ from skidpad.roads.queries import RoadMap
 from skidpad.simulation.carla_server.actors.catalogue import Family
 from skidpad.simulation.carla_server.actors.registry import Actor, ActorTable
 from skidpad.simulation.carla_server.vehicles.vehicles import Vehicles
+from skidpad.simulation.world.interventions import set_grounded, set_tyres
 from skidpad.simulation.world.world import World
 
 DROP = 0.6  # m above the ground from which something falls; lower, it stands at once
@@ -146,7 +147,7 @@ class Falling:
         """Takes a floating actor off the road, or puts one that floats no more back."""
         assert actor.body is not None
         floats = self._floats(actor)
-        self._moving.set_grounded(actor.body, self._is_simulated(actor) and not floats)
+        set_grounded(self._moving, actor.body, self._is_simulated(actor) and not floats)
         if actor.id in self._vehicles:
             friction = self._vehicles.of(actor.id).physics.tire_friction.tolist()
-            self._moving.set_tyres(actor.body, [0.0] * len(friction) if floats else friction)
+            set_tyres(self._moving, actor.body, [0.0] * len(friction) if floats else friction)

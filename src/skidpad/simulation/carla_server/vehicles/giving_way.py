@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.carla_server.vehicles.vehicles import Vehicles
 from skidpad.simulation.world.placed import Places
-from skidpad.simulation.world.traffic.manager import priority_of
 from skidpad.simulation.world.traffic.priority import STOP, YIELD
+from skidpad.simulation.world.traffic.streets import priority_of
 
 BOX = 0.9  # of a lane's width: how long the box before the line is
 STOPPED = 2.0  # s for which a stop sign shows red in any case

@@ -25,6 +25,7 @@ from skidpad.simulation.carla_server.vehicles.engine import (
     shift_speeds,
 )
 from skidpad.simulation.carla_server.vehicles.physics_control import PhysicsControl
+from skidpad.simulation.world.interventions import push, set_tyres, set_velocity, twist
 from skidpad.simulation.world.rows import Newcomer
 from skidpad.simulation.world.world import World
 
@@ -177,25 +178,25 @@ class Vehicles:
             vehicle.type = model
             self.moving.reshape(vehicle.body, model)
         vehicle.shifts = shift_speeds(physics.engine, model.wheel_radius)
-        self.moving.set_tyres(vehicle.body, physics.tire_friction.tolist())
+        set_tyres(self.moving, vehicle.body, physics.tire_friction.tolist())
 
     def set_velocity(self, actor: int, velocity: Vector) -> None:
         """Sets the velocity in world axes, m/s, and lets the wheels roll with it."""
         vehicle = self._by_actor[actor]
-        self.moving.set_velocity(vehicle.body, velocity[0], velocity[1])
+        set_velocity(self.moving, vehicle.body, velocity[0], velocity[1])
         vehicle.pushed = STICKY_TIME if any(velocity) else 0.0
 
     def push(self, actor: int, impulse: Vector, point: Vector | None = None) -> None:
         """Applies an impulse in N s at a point of the world, the centre of gravity when None."""
         vehicle = self._by_actor[actor]
         at = None if point is None else (point[0], point[1])
-        self.moving.push(vehicle.body, (impulse[0], impulse[1]), at)
+        push(self.moving, vehicle.body, (impulse[0], impulse[1]), at)
         vehicle.pushed = STICKY_TIME
 
     def twist(self, actor: int, moment: float) -> None:
         """Applies an angular impulse about the vertical in N m s."""
         vehicle = self._by_actor[actor]
-        self.moving.twist(vehicle.body, moment)
+        twist(self.moving, vehicle.body, moment)
         vehicle.pushed = STICKY_TIME
 
     def command(self, dt: float) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from functools import cache, lru_cache, partial
+from functools import cache, partial
 from math import hypot, inf
 from typing import NamedTuple
 
@@ -23,19 +23,14 @@ from skidpad.physics.types import VehicleType
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.rows import Member, Shape
-from skidpad.simulation.world.traffic.care import (
-    Care,
-    speed_to_stop_within,
-)
+from skidpad.simulation.world.traffic.care import Care, speed_to_stop_within
 from skidpad.simulation.world.traffic.idm import A_CURVE, A_MAX, T_HEADWAY
 from skidpad.simulation.world.traffic.mobil import B_SAFE, GAP_CLEAR
-from skidpad.simulation.world.traffic.network import LANE, POINT, STOP, Network, network
 from skidpad.simulation.world.traffic.occupancy import occupancy
 from skidpad.simulation.world.traffic.outlook import PREVIEW_STEP, desired_speed
 from skidpad.simulation.world.traffic.pack import RADIUS, UNSEEN, Pack
 from skidpad.simulation.world.traffic.path import PATH, begin, straight_path
-from skidpad.simulation.world.traffic.places import FreePlaces, find_candidates
-from skidpad.simulation.world.traffic.priority import CONFLICT, ENTRY, ZEBRA, bake_priority
+from skidpad.simulation.world.traffic.places import FreePlaces
 from skidpad.simulation.world.traffic.spacing import (
     LEAST_TIME,
     claims,
@@ -43,7 +38,8 @@ from skidpad.simulation.world.traffic.spacing import (
     room,
     seconds_to_others,
 )
-from skidpad.simulation.world.traffic.state import TRAIT, Streets, drivers
+from skidpad.simulation.world.traffic.state import TRAIT, drivers
+from skidpad.simulation.world.traffic.streets import candidates_of, network_of, streets_of
 from skidpad.simulation.world.traffic.variety import vary
 
 AIR_DENSITY = 1.204  # kg/m^3 at 20 C
@@ -55,45 +51,6 @@ BUBBLE = 500.0  # m, random traffic lives within this distance of the ego (A-209
 KEPT = 1.2 * BUBBLE  # m from the ego, beyond which it is moved on
 CHECK_PERIOD = 20  # ticks between two looks at wrecks and the bubble
 Claimed = Callable[[], Places]  # of `claims`, made at the first call
-
-
-@lru_cache(maxsize=8)
-def network_of(map: RoadMap) -> Network:
-    """Returns the drivers' view of a map, made once per process."""
-    return network(map.samples, map.lanes, map.signals)
-
-
-@lru_cache(maxsize=8)
-def candidates_of(map: RoadMap) -> NDArray[np.intp]:
-    """Returns the samples of a map at which vehicles can be put, found once per process."""
-    return find_candidates(map, network_of(map))
-
-
-@lru_cache(maxsize=8)
-def priority_of(
-    map: RoadMap,
-) -> tuple[NDArray[np.void], NDArray[np.void], NDArray[np.void], NDArray[np.float64]]:
-    """Returns the right of way on a map as of `bake_priority`, baked once per process."""
-    return bake_priority(map.samples, map.lanes, map.signals, map.roadside)
-
-
-def streets_of(map: RoadMap) -> Streets:
-    """Returns lanes, rights of way and zebras of a map as drivers know them, with no `walkers` yet.
-
-    `Traffic.arrange` puts the walkers in.
-    """
-    entry, conflict, zebra, zebras = priority_of(map)
-    nobody, free = np.empty(0, dtype=np.int64), np.zeros(len(zebras), dtype=np.bool_)
-    return Streets(network_of(map), entry, conflict, zebra, zebras, nobody, free)
-
-
-def no_streets() -> Streets:
-    """Returns the streets of a world without drivers: no lanes, conflicts or zebras."""
-    lanes = np.empty(0, dtype=np.int32)
-    net = Network(np.empty(0, POINT), np.empty(0, LANE), np.empty(0, STOP), lanes, lanes)
-    rows = np.empty(0, ENTRY), np.empty(0, CONFLICT), np.empty(0, ZEBRA)
-    nobody, free = np.empty(0, dtype=np.int64), np.zeros(0, dtype=np.bool_)
-    return Streets(net, *rows, np.empty((0, 5)), nobody, free)
 
 
 class Reason(Enum):

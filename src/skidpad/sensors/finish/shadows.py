@@ -342,7 +342,7 @@ def _darken(
 
 
 @inner_kernel
-def _dimmed(value: np.float32, veil: np.float32, left: np.float32) -> np.float32:
+def _dim(value: np.float32, veil: np.float32, left: np.float32) -> np.float32:
     """Returns a byte whose light, but for the veil of the air, is dimmed to a share. veil: of 255^2."""
     ground = value * value - veil
     ground = ground if ground > ZERO else ZERO
@@ -370,9 +370,9 @@ def _dim_block(
         lost = ONE - share_left(foggy + way * rain, curved)
         touched, dark = lanes[TOUCHED + x], lanes[HIDDEN + x]
         r, g, b = unpack(pixels[x])
-        r = _dimmed(r, lost * haze_r, touched * (ONE - dark * red))
-        g = _dimmed(g, lost * haze_g, touched * (ONE - dark * green))
-        b = _dimmed(b, lost * haze_b, touched * (ONE - dark * blue))
+        r = _dim(r, lost * haze_r, touched * (ONE - dark * red))
+        g = _dim(g, lost * haze_g, touched * (ONE - dark * green))
+        b = _dim(b, lost * haze_b, touched * (ONE - dark * blue))
         pixels[x] = pack(r, g, b)
 
 

@@ -11,6 +11,7 @@ from skidpad.physics.optics import fog_extinction
 from skidpad.physics.presets import preset
 from skidpad.roads.roadside import Box, Shape
 from skidpad.sensors.finish.extras import NO_EXTRAS, Extra
+from skidpad.sensors.finish.fog import fog_of
 from skidpad.sensors.finish.shadows import (
     GROUND_MASK,
     Bodies,
@@ -48,6 +49,11 @@ def seen(weather, shadows, view=ABOVE):
         images["semantic"].labels.copy(),
         suite,
     )
+
+
+def shade_in(weather):
+    light = lighting(weather, haze=True, ground=0.0)
+    return shade_of(weather, light, fog_of(weather, light))
 
 
 def test_only_the_ground_about_a_body_is_darker():
@@ -100,7 +106,7 @@ def test_fog_before_a_shadow_veils_it():
     view = camera_view(CameraSpec("rgb", Modality.RGB, 400, 400, 90.0, ABOVE), Pose(10.0, 0.0, 0.0))
     keys = np.full((400, 400), Material.GRASS, dtype=np.int32)
     inverse = np.full((400, 400), 1.0 / 20.0, dtype=np.float32)
-    shade = shade_of(fog, light)
+    shade = shade_in(fog)
 
     def darkest(ground, veil, air):
         value = round(255.0 * np.sqrt(ground + veil))
@@ -116,6 +122,15 @@ def test_fog_before_a_shadow_veils_it():
         left * 0.1 * share + veil, abs=0.01
     )
     assert veil > 0.3, "and not by 0.31 of the dark, as if the air were as dark as the ground"
+
+
+def test_the_sun_casts_no_shadow_through_deep_fog():
+    """150 m of fog of 60 m of sight keep its beam away; its light comes from all sides then."""
+    shares = [float(shade_in(Weather(fog_density=d)).sun.mean()) for d in (0.0, 10.0, 30.0, 100.0)]
+    assert shares[0] > 0.5
+    assert shares == sorted(shares, reverse=True)
+    assert shares[0] > shares[2] + 0.02
+    assert shares[-1] < 0.001
 
 
 def test_a_crown_throws_a_round_shadow_beside_its_stem_and_a_beam_over_the_road_none():
@@ -135,7 +150,7 @@ def test_a_crown_throws_a_round_shadow_beside_its_stem_and_a_beam_over_the_road_
     def dark(only):
         picture = np.full((400, 400), 0xFF808080, dtype=np.uint32)
         one = Bodies._make(field[only] for field in bodies)
-        shade = shade_of(weather, lighting(weather))
+        shade = shade_in(weather)
         cast_shadows(view, one, shade, GROUND_MASK, inverse, ground, picture)
         return (200 - np.nonzero(picture != 0xFF808080)[0]) / PX
 
@@ -158,7 +173,7 @@ def shadows_of(boxes, weather, ground_at=0.0):
     keys = np.full((400, 400), Material.GRASS, dtype=np.int32)
     inverse = np.full((400, 400), 1.0 / (40.0 - ground_at), dtype=np.float32)
     picture = np.full((400, 400), 0xFFFFFFFF, dtype=np.uint32)
-    shade = shade_of(weather, lighting(weather))
+    shade = shade_in(weather)
     cast_shadows(view, standing(boxes), shade, GROUND_MASK, inverse, keys, picture)
     return picture.view(np.uint8).reshape(400, 400, 4)[:, 200, 1] / 255.0
 

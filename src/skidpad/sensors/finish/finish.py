@@ -65,12 +65,12 @@ class Finish:
     def look_out(self, weather: Weather, light: Lighting) -> None:
         """Sets what the pictures take from the weather and its light."""
         self._light = light
-        self._shade = shade_of(weather, light)
         self._gains = gains(light)
         self._curve = curve_of(light)
         self._layer = layer_of(weather, light)
         self._stars = starlight_of(weather)
         self._fog = fog_of(weather, light)
+        self._shade = shade_of(weather, light, self._fog)
         self._sun = sun_of(weather, light, self._fog)
         self._falling = falling_in(weather, light)
         self._wet = light.wet * (1.0 - light.snow) if light.wet > LEAST_WET else 0.0

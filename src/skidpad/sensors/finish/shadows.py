@@ -21,6 +21,7 @@ from skidpad.core.weather import Weather
 from skidpad.physics.camera import share_left
 from skidpad.physics.optics import Air, sunlight
 from skidpad.roads.roadside import Box, Shape
+from skidpad.sensors.finish.fog import Fog
 from skidpad.sensors.finish.outline import MOST, spans
 from skidpad.sensors.pictures.blocks import BLOCK, ONE, ZERO
 from skidpad.sensors.pictures.height_fog import thinned_fog
@@ -124,15 +125,18 @@ def standing(boxes: Sequence[Box]) -> Bodies:
     )  # fmt: skip
 
 
-def shade_of(weather: Weather, light: Lighting) -> Shade:
+def shade_of(weather: Weather, light: Lighting, fog: Fog) -> Shade:
     """Returns where shadows fall, and how dark they are: as much as the sun adds to the light of the sky.
 
-    Shadows are as blue as the sky is bluer than the sun.
+    What fog and rain above keep from the sun's beam comes from the whole sky. Shadows are as blue as the
+    sky is bluer than the sun.
     """
     direction = light.sun_direction
     up = max(float(direction[2]), 0.05)
     beam, sky = sunlight(weather)
-    sun = beam * (max(float(direction[2]), 0.0) + ROUGH)
+    beam *= max(float(direction[2]), 0.0) + ROUGH
+    sun = beam * float(np.exp(-fog.depth / up))
+    sky += beam - sun
     of_sun, of_sky = (c / max(float(c.mean()), 1e-6) for c in (light.sun, light.sky))
     share = sun * of_sun / np.maximum(sun * of_sun + sky * of_sky, 1e-6)
     x, y = -float(direction[0]) / up, -float(direction[1]) / up

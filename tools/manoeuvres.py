@@ -15,9 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from skidpad.core.geometry import Pose, mps_from_kmh
 from skidpad.core.maths.constants import G
+from skidpad.physics.car import BRAKE, STEER, THROTTLE
 from skidpad.physics.fleet import Fleet
 from skidpad.physics.types import VehicleType
-from skidpad.physics.vehicle import BRAKE, STEER, THROTTLE, steer_share
+from skidpad.physics.vehicle import steer_share
 
 Floats = NDArray[np.float64]
 TICK = 0.01  # s

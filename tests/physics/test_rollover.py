@@ -8,6 +8,7 @@ import pytest
 from skidpad.core.geometry import Pose
 from skidpad.core.kernels.jit import kernel
 from skidpad.core.maths.constants import G
+from skidpad.physics.car import BRAKE, STEER, THROTTLE
 from skidpad.physics.fleet import Fleet
 from skidpad.physics.rollover import (
     MEMORY,
@@ -23,7 +24,7 @@ from skidpad.physics.rollover import (
     tip,
 )
 from skidpad.physics.types import vehicle_type
-from skidpad.physics.vehicle import BRAKE, STEER, THROTTLE, steer_share
+from skidpad.physics.vehicle import steer_share
 
 LORRY = vehicle_type("truck")
 CARS = (

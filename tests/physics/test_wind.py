@@ -13,10 +13,10 @@ from skidpad.core.geometry import Pose
 from skidpad.core.settings.parts import Settings
 from skidpad.core.setup import Wind
 from skidpad.core.states import VehicleCommand
+from skidpad.physics.car import THROTTLE
 from skidpad.physics.fleet import Fleet
 from skidpad.physics.presets import find_weather
 from skidpad.physics.types import vehicle_type
-from skidpad.physics.vehicle import THROTTLE
 from skidpad.physics.wind import GUST_LENGTH, Gusts, side_coefficients, wind_of_intensity
 from skidpad.recording.run.log_files import log_hash
 from skidpad.simulation.embedded.engine import EmbeddedBackend

@@ -20,12 +20,14 @@ from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.maths.constants import G
 from skidpad.core.states import ActorStates
 from skidpad.physics.antilock import PRESSURE, regulate
+from skidpad.physics.car import Car, car_of
+from skidpad.physics.loads import write_loads
 from skidpad.physics.params import STIFFNESS, WATER, VehicleParams, WheelStates
 from skidpad.physics.rollover import OVER, SLIDING, TILT, left_arm, tip
 from skidpad.physics.sensed import limit_drive, note_motion, sensed_correction
-from skidpad.physics.stability import Correction, Model, Motion, correction
-from skidpad.physics.tyre import RELAXATION_RADII, V_SLIP_MIN
-from skidpad.physics.wheel import Contact, Torques, Tyre, turn
+from skidpad.physics.stability import Correction, Motion, correction
+from skidpad.physics.tyre import V_SLIP_MIN
+from skidpad.physics.wheel import Contact, Torques, turn
 
 LOAD_TIME = 0.08  # s, lag of load transfer: body on its springs, heave and roll near 2 Hz
 STEER_TIME = 0.05  # s, lag of the steering actuator
@@ -34,8 +36,6 @@ V_CLUTCH = 3.0  # m/s, below which an automatic box takes the engine's drag off 
 V_REVERSE_MAX = 2.0  # m/s, forward speed above which reverse finds no drive
 V_ABS_MIN = 1.5  # m/s, below which anti-lock brakes let wheels lock; ISO 21994 leaves it free
 V_HOLD = 0.1  # m/s and rad/s, below which a braked vehicle comes to rest
-
-THROTTLE, BRAKE, STEER, HANDBRAKE, REVERSE = range(5)  # columns of commands
 
 # Share of the largest road-wheel angle at 0, 20, 60 and 120 km/h: CARLA's default steering curve.
 V_CURVE_1, V_CURVE_2, V_CURVE_3 = 20.0 / 3.6, 60.0 / 3.6, 120.0 / 3.6
@@ -49,47 +49,6 @@ def steer_share(speed: float) -> float:
     if speed < V_CURVE_2:
         return 0.9 - 0.1 * (speed - V_CURVE_1) / (V_CURVE_2 - V_CURVE_1)
     return 0.8 - 0.1 * min((speed - V_CURVE_2) / (V_CURVE_3 - V_CURVE_2), 1.0)
-
-
-class Car(NamedTuple):
-    """One vehicle's parameters and inputs through a tick, as plain numbers; SI."""
-
-    mass: float
-    weight: float  # N on the road
-    yaw_inertia: float
-    x_cog: float
-    a: float
-    b: float
-    half_track: float
-    cog_height: float
-    roll_front: float
-    drag: float
-    throttle: float
-    brake: float
-    steer: float  # rad asked for of the road wheels at standstill
-    handbrake: bool
-    reverse: bool
-    drive_front: float
-    force_max: float
-    power: float
-    speed_max: float
-    engine_drag: float
-    torque_front: float  # N m per wheel at this pedal
-    torque_rear: float
-    torque_hand: float  # N m per rear wheel
-    rolling: float
-    front: Tyre
-    rear: Tyre
-    model: Model
-    side: float  # N over the square of m/s, of the air
-    side_turn: float  # N m over that
-    anti_lock: bool  # ideal
-    cycling: bool  # anti-lock brakes from wheel speeds
-    stability: bool
-    sensed: bool  # stability control from wheel speeds
-    tips: bool
-    lean: float  # rad per m/s^2
-    roll_inertia: float  # m^2
 
 
 class Body(NamedTuple):
@@ -111,102 +70,6 @@ class Push(NamedTuple):
     y: float
     moment: float  # N m
     held: float  # N that brakes could hold at standstill
-
-
-@inner_kernel
-def _car(i: int, p: VehicleParams, command: Floats, grade: float, bank: float) -> Car:
-    """Returns the parameters of vehicle i under this command (5,), on a road of this grade and bank."""
-    brake = min(max(command[BRAKE], 0.0), 1.0)
-    handbrake = command[HANDBRAKE] > 0.5
-    radius, inertia = p.wheel_radius[i], p.wheel_inertia[i]
-    relaxation = RELAXATION_RADII * radius
-    wheelbase = p.a[i] + p.b[i]
-    per_wheel = 0.5 * p.mass[i] * G / wheelbase
-    # no control flow inside the call: numba takes no more than 30 arguments with it
-    torque_hand = p.handbrake_torque[i] if handbrake else 0.0
-    anti_lock, cycling = p.anti_lock[i], p.cycling[i]
-    return Car(
-        p.mass[i],
-        p.mass[i] * G * cos(grade) * cos(bank),
-        p.yaw_inertia[i],
-        p.x_cog[i],
-        p.a[i],
-        p.b[i],
-        0.5 * p.track[i],
-        p.cog_height[i],
-        p.roll_front[i],
-        p.drag[i],
-        min(max(command[THROTTLE], 0.0), 1.0),
-        brake,
-        min(max(command[STEER], -1.0), 1.0) * p.steer_max[i],
-        handbrake,
-        command[REVERSE] > 0.5,
-        p.drive_front[i],
-        p.force_max[i],
-        p.power[i],
-        p.speed_max[i],
-        p.engine_drag[i],
-        brake * p.brake_torque[i, 0],
-        brake * p.brake_torque[i, 1],
-        torque_hand,
-        p.rolling[i],
-        Tyre(p.stiffness[i, 0], per_wheel * p.b[i], relaxation, radius, inertia),
-        Tyre(p.stiffness[i, 1], per_wheel * p.a[i], relaxation, radius, inertia),
-        Model(
-            wheelbase,
-            (1.0 / p.stiffness[i, 0] - 1.0 / p.stiffness[i, 1]) / G,
-            3.0 / p.stiffness[i, 1],
-        ),
-        p.side[i, 0],
-        p.side[i, 1],
-        anti_lock & ~cycling,
-        anti_lock & cycling,
-        p.stability[i],
-        p.stability[i] & p.sensed[i],
-        p.tips[i],
-        p.roll_gradient[i],
-        p.roll_inertia[i],
-    )
-
-
-@inner_kernel
-def _wheel_loads(car: Car, a_x: float, a_y: float, load: Floats) -> None:
-    """Writes quasi-static loads in N into `load` (4,); no axle or wheel ever pulls on the road.
-
-    a_x, a_y: m/s^2 behind the load transfer.
-    """
-    wheelbase = car.a + car.b
-    front = (car.weight * car.b - car.mass * a_x * car.cog_height) / wheelbase
-    front = min(max(front, 0.0), car.weight)
-    moment = 0.5 * car.mass * a_y * car.cog_height / car.half_track
-    if car.tips:
-        _share_loads(car, front, moment, a_y, load)
-        return
-    for axle in range(2):
-        axle_load = front if axle == 0 else car.weight - front
-        share = car.roll_front if axle == 0 else 1.0 - car.roll_front
-        transfer = min(max(share * moment, -0.5 * axle_load), 0.5 * axle_load)
-        load[2 * axle] = 0.5 * axle_load - transfer
-        load[2 * axle + 1] = 0.5 * axle_load + transfer
-
-
-@inner_kernel
-def _share_loads(car: Car, front: float, moment: float, a_y: float, load: Floats) -> None:
-    """Writes the loads of a vehicle that can tip: what a lifted wheel does not take goes to the other axle.
-
-    front: N on the front axle; moment: N to move from the left to the right wheels.
-    """
-    arm = left_arm(car.half_track, car.cog_height, car.lean, a_y)
-    shift = 0.5 * car.weight * (1.0 - arm / car.half_track)
-    moment = min(
-        max(moment + (shift if a_y > 0.0 else -shift), -0.5 * car.weight), 0.5 * car.weight
-    )
-    half_front, half_rear = 0.5 * front, 0.5 * (car.weight - front)
-    ahead = min(max(car.roll_front * moment, -half_front), half_front)
-    behind = min(max(moment - ahead, -half_rear), half_rear)
-    ahead = moment - behind
-    load[0], load[1] = half_front - ahead, half_front + ahead
-    load[2], load[3] = half_rear - behind, half_rear + behind
 
 
 @inner_kernel
@@ -361,7 +224,7 @@ def _advance(
         speed = sqrt(u * u + v * v)
         change = (car.steer * steer_share(speed) - steer) * steer_lag
         steer += min(max(change, -turn_max), turn_max)
-        _wheel_loads(car, a_load[0], a_load[1], load)
+        write_loads(car, a_load[0], a_load[1], load)
         if car.sensed:
             asked = _sense(car, memory, omega, r, a_load, steer, h)
         else:
@@ -467,7 +330,7 @@ def step_vehicles(
     """
     for i in range(active.shape[0]):
         if active[i]:
-            car = _car(i, params, commands[i], grade[i], bank[i])
+            car = car_of(i, params, commands[i], grade[i], bank[i])
             g_x, g_y = -G * sin(grade[i]), -G * sin(bank[i])
             turn_max = params.steer_rate[i] * h
             _advance(i, states, wheels, car, feel[i], g_x, g_y, turn_max, air[i, 0], air[i, 1],

@@ -10,15 +10,10 @@ from skidpad.core.weather import Weather
 from skidpad.physics.optics import fog_extinction
 from skidpad.physics.presets import preset
 from skidpad.roads.roadside import Box, Shape
+from skidpad.sensors.finish.casters import Bodies, standing
 from skidpad.sensors.finish.extras import NO_EXTRAS, Extra
 from skidpad.sensors.finish.fog import fog_of
-from skidpad.sensors.finish.shadows import (
-    GROUND_MASK,
-    Bodies,
-    cast_shadows,
-    shade_of,
-    standing,
-)
+from skidpad.sensors.finish.shadows import GROUND_MASK, cast_shadows, shade_of
 from skidpad.sensors.pictures.lighting import lighting
 from skidpad.sensors.raster.view import camera_view
 from skidpad.sensors.scene.materials import Material

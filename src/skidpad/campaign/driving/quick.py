@@ -16,7 +16,9 @@ import numpy as np
 
 from skidpad.campaign.driving.loop import Stepper
 from skidpad.campaign.driving.outdoors import FileChanges
-from skidpad.campaign.driving.quick_kernel import (
+from skidpad.campaign.driving.quick_kernel import drive_ticks
+from skidpad.campaign.driving.quick_parts import QuickParts, find_parts, make_rules
+from skidpad.campaign.driving.quick_tables import (
     ARRIVED,
     DONE,
     MOVED,
@@ -30,9 +32,7 @@ from skidpad.campaign.driving.quick_kernel import (
     Rules,
     Stop,
     Tables,
-    drive_ticks,
 )
-from skidpad.campaign.driving.quick_parts import QuickParts, find_parts, make_rules
 from skidpad.core.errors import StackError
 from skidpad.core.kernels.calls import find_address
 from skidpad.core.kernels.jit import Held, hold

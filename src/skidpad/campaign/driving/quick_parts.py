@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from skidpad.campaign.driving.loop import Arrival, Stepper, Timer, Unsupervised
 from skidpad.campaign.driving.outdoors import ChangedBackend, FileChanges
-from skidpad.campaign.driving.quick_kernel import Rules
+from skidpad.campaign.driving.quick_tables import Rules
 from skidpad.campaign.driving.stack_at_wheel import StackAtWheel
 from skidpad.envelope.belief import COLD_C
 from skidpad.envelope.govern import GovernedStack

@@ -22,7 +22,7 @@ from numba import cuda
 from numpy.typing import NDArray
 
 from skidpad.campaign.driving.quick import Call, Calls, Returned
-from skidpad.campaign.driving.quick_kernel import DONE
+from skidpad.campaign.driving.quick_tables import DONE
 from skidpad.campaign.runs.card_kernel import KeyLeaves, find_kernel
 from skidpad.campaign.runs.run import OpenRun, Run
 from skidpad.core.kernels.batch import FLOATS, INTS, Leaves, find_leaves

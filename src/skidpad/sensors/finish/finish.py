@@ -13,6 +13,7 @@ from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import Bodywork, LightState
 from skidpad.core.weather import Weather
 from skidpad.roads.roadside import Roadside
+from skidpad.sensors.finish.casters import Bodies, bodies_of, join_bodies, standing
 from skidpad.sensors.finish.clouds import DRIFT, SIZE, draw_clouds, layer_of
 from skidpad.sensors.finish.edges import soften_edges
 from skidpad.sensors.finish.extras import Extra
@@ -21,15 +22,7 @@ from skidpad.sensors.finish.fog import fog_of, veil_sky
 from skidpad.sensors.finish.glow import shine
 from skidpad.sensors.finish.lamps import Lamps
 from skidpad.sensors.finish.retro import gains, send_back
-from skidpad.sensors.finish.shadows import (
-    GROUND_MASK,
-    Bodies,
-    bodies_of,
-    cast_shadows,
-    join_bodies,
-    shade_of,
-    standing,
-)
+from skidpad.sensors.finish.shadows import GROUND_MASK, cast_shadows, shade_of
 from skidpad.sensors.finish.stars import STARS, draw_stars, starlight_of
 from skidpad.sensors.finish.sun import draw_sun, sun_of
 from skidpad.sensors.finish.tone import curve_of, set_tone

@@ -14,7 +14,8 @@ from skidpad.core.frames import RadarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.kernels.jit import Held, kernel
 from skidpad.core.specs import RadarSpec
-from skidpad.roads.kernels import LaneArrays, advance_point, project_point
+from skidpad.roads.along import advance_point
+from skidpad.roads.kernels import LaneArrays, project_point
 from skidpad.roads.queries import RoadMap
 
 STEP, REACH = 5.0, 160.0  # m between places along the lane, and to the last one

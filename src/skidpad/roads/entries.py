@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.kernels.jit import Held, kernel
-from skidpad.roads import kernels
+from skidpad.roads import along, kernels
 from skidpad.roads.kernels import LaneArrays
 
 Point = tuple[int, float, float, float, float, float, float, float, float]
@@ -24,8 +24,8 @@ def project(map: Held[LaneArrays], x: float, y: float, z: float, driving: bool) 
 
 @kernel
 def advance(map: Held[LaneArrays], lane: int, s: float, distance: float, heading: float) -> Point:
-    """Returns the point `distance` in m further along the lanes; see `kernels.advance_point`."""
-    return kernels.advance_point(map.value, lane, s, distance, heading)
+    """Returns the point `distance` in m further along the lanes; see `along.advance_point`."""
+    return along.advance_point(map.value, lane, s, distance, heading)
 
 
 @kernel
@@ -38,7 +38,7 @@ def trace_lane(
     Returns how many there are before the road ends; each is what `advance` gives for its distance.
     """
     for i in range(len(out)):
-        point = kernels.advance_point(map.value, lane, s, (i + 1) * step, heading)
+        point = along.advance_point(map.value, lane, s, (i + 1) * step, heading)
         if point[0] < 0:
             return i
         out[i, 0], out[i, 1], out[i, 2], out[i, 3] = point[3], point[4], point[5], point[7]
@@ -55,5 +55,5 @@ def sample(map: Held[LaneArrays], lane: int, s: float) -> Sample:
 def signal_ahead(
     map: Held[LaneArrays], lane: int, s: float, distance: float, kind: int
 ) -> tuple[int, float]:
-    """Returns row and distance in m of the next signal of a kind; see `kernels.signal_ahead`."""
-    return kernels.signal_ahead(map.value, lane, s, distance, kind)
+    """Returns row and distance in m of the next signal of a kind; see `along.signal_ahead`."""
+    return along.signal_ahead(map.value, lane, s, distance, kind)

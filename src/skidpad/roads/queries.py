@@ -16,7 +16,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.kernels.jit import Held, hold
 from skidpad.core.objects.slots import fill_slots
 from skidpad.core.setup import LanePosition
-from skidpad.roads import entries, kernels
+from skidpad.roads import along, entries, kernels
 from skidpad.roads.baked import BakedMap
 from skidpad.roads.edge import RoadEdge
 from skidpad.roads.lanes import LaneSamples, LaneTable, SignalKind, SignalTable
@@ -304,7 +304,7 @@ class RoadMap:
             if 0.0 <= s + step <= self._lengths[lane]:  # the same lane still
                 s += step
                 continue
-            lane, s = kernels.advance_kernel(self._arrays, lane, s, step)
+            lane, s = along.advance_kernel(self._arrays, lane, s, step)
             if lane < 0:
                 break
             roads.add(int(self.lanes.road[lane]))

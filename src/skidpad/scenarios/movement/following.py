@@ -5,7 +5,8 @@ from __future__ import annotations
 from math import cos, nan, pi, sin
 
 from skidpad.core.kernels.jit import Held, inner_kernel, kernel
-from skidpad.roads.kernels import LaneArrays, advance_point
+from skidpad.roads.along import advance_point
+from skidpad.roads.kernels import LaneArrays
 from skidpad.simulation.scripted import Hands, drive_by
 
 Followed = tuple[

@@ -9,6 +9,7 @@ import numpy as np
 
 from skidpad.core.arrays import Floats, Ints
 from skidpad.core.kernels.jit import Held, inner_kernel, kernel
+from skidpad.roads.along import signal_ahead
 from skidpad.roads.kernels import (
     WIDTH,
     LaneArrays,
@@ -20,7 +21,6 @@ from skidpad.roads.kernels import (
     project_kernel,
     sample_kernel,
     segment_kernel,
-    signal_ahead,
 )
 from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import RoadMap

@@ -13,7 +13,8 @@ from skidpad.core.geometry import footprint
 from skidpad.core.kernels.jit import kernel
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import LightState, SemanticClass
-from skidpad.roads.kernels import LaneArrays, advance_point, project_point
+from skidpad.roads.along import advance_point
+from skidpad.roads.kernels import LaneArrays, project_point
 from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.channels.control import Controller

@@ -11,13 +11,8 @@ from numpy.typing import NDArray
 from skidpad.core import geometry
 from skidpad.core.arrays import Floats
 from skidpad.core.kernels.jit import kernel
-from skidpad.roads.kernels import (
-    LaneArrays,
-    advance_kernel,
-    neighbour_s,
-    project_kernel,
-    sample_kernel,
-)
+from skidpad.roads.along import advance_kernel
+from skidpad.roads.kernels import LaneArrays, neighbour_s, project_kernel, sample_kernel
 
 REFERENCE_DISTANCE = 30.0  # m, the one point at which curvature is read
 PARABOLA = 0.5  # of the curvature (D-063)

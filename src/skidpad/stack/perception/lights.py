@@ -13,7 +13,8 @@ from skidpad.core.arrays import Floats
 from skidpad.core.geometry import Pose
 from skidpad.core.kernels.jit import Held, hold, kernel
 from skidpad.core.vocabulary import LightSource, LightState
-from skidpad.roads.kernels import LaneArrays, advance_kernel
+from skidpad.roads.along import advance_kernel
+from skidpad.roads.kernels import LaneArrays
 from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.memory import Memory, new_memory

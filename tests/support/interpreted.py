@@ -14,7 +14,10 @@ from skidpad.core.kernels.jit import Held, hold
 from skidpad.stack import memory
 from support import stack_parts, stackfakes
 
-HOUSES = ("skidpad.stack.", "skidpad.roads.kernels", stack_parts.__name__, stackfakes.__name__)
+HOUSES = (
+    "skidpad.stack.", "skidpad.roads.kernels", "skidpad.roads.along", stack_parts.__name__,
+    stackfakes.__name__,
+)  # fmt: skip
 COMPILED = (
     "skidpad.stack.perception.corridor",
     "skidpad.stack.perception.hsv",

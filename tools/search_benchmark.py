@@ -41,7 +41,7 @@ from skidpad.search.loop import search, write_search
 RUNS = 1000  # of a race
 TENTHS = 10
 WITHIN = (1e-4, 1e-3)  # share of failures of random runs that a cell should have
-STACKS = {"ours": "4", "follow_lane": "examples/follow_lane.py:FollowLane"}
+STACKS = {"ours": "4", "envelope": "5", "follow_lane": "examples/follow_lane.py:FollowLane"}
 OWN = ("cma", "halton", "random")
 VERIFAI = ("verifai-ce", "verifai-mab", "verifai-halton")
 SAMPLERS = {"ce": "crossEntropy", "mab": "multiArmedBandit", "halton": "halton"}

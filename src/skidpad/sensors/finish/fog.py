@@ -50,6 +50,11 @@ def fog_of(weather: Weather, light: Lighting) -> Fog:
     return Fog(depth, fog, per_m * air.fog_start, air.thinning, air.ground, light.horizon)
 
 
+def share_of_beam(fog: Fog, climb: float) -> float:
+    """Returns the share of the sun's beam that fog and rain let through; climb: m up per m of its way."""
+    return float(np.exp(-fog.depth / climb))
+
+
 def light_fog(light: Lighting, weather: Weather) -> Lighting:
     """Returns the light of a weather in which fog at night has the dim light of lamps about it."""
     per_m = fog_extinction(weather) - CLEAR

@@ -18,7 +18,7 @@ from skidpad.core.weather import Weather
 from skidpad.physics.camera import share_left
 from skidpad.physics.optics import Air, sunlight
 from skidpad.sensors.finish.casters import Bodies
-from skidpad.sensors.finish.fog import Fog
+from skidpad.sensors.finish.fog import Fog, share_of_beam
 from skidpad.sensors.finish.outline import MOST, spans
 from skidpad.sensors.pictures.blocks import BLOCK, ONE, ZERO
 from skidpad.sensors.pictures.height_fog import thinned_fog
@@ -79,7 +79,7 @@ def shade_of(weather: Weather, light: Lighting, fog: Fog) -> Shade:
     up = max(float(direction[2]), 0.05)
     beam, sky = sunlight(weather)
     beam *= max(float(direction[2]), 0.0) + ROUGH
-    sun = beam * float(np.exp(-fog.depth / up))
+    sun = beam * share_of_beam(fog, up)
     sky += beam - sun
     of_sun, of_sky = (c / max(float(c.mean()), 1e-6) for c in (light.sun, light.sky))
     share = sun * of_sun / np.maximum(sun * of_sun + sky * of_sky, 1e-6)

@@ -17,7 +17,7 @@ from skidpad.core.arrays import Floats, Floats32
 from skidpad.core.kernels.jit import inner_kernel, kernel
 from skidpad.core.weather import Weather
 from skidpad.physics.optics import sunlight
-from skidpad.sensors.finish.fog import Fog
+from skidpad.sensors.finish.fog import Fog, share_of_beam
 from skidpad.sensors.pictures.lighting import Colour, Lighting
 from skidpad.sensors.pictures.packing import pack, unpack
 from skidpad.sensors.raster.view import View
@@ -47,7 +47,7 @@ def sun_of(weather: Weather, light: Lighting, fog: Fog) -> Sun:
     beam, sky = sunlight(weather)
     strength = min(beam / (SUNNY * sky), 1.0) if sky > 0.0 else 0.0
     rise = max(float(light.sun_direction[2]), 1e-3)
-    strength *= float(np.exp(-fog.depth / rise))
+    strength *= share_of_beam(fog, rise)
     seen = strength if strength > LEAST else 0.0
     colour = seen * light.sun / max(float(light.sun.max()), 1e-6)
     return Sun(light.sun_direction, colour.astype(np.float32))
